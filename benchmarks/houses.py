@@ -16,7 +16,7 @@ from rich.progress import track
 
 from benchmarks.support.home_figures import WAY, figures, remade
 from benchmarks.support.requirements import outcome
-from mjsim.houses.values import ROOMS
+from mjsim.model.generated_names import ROOMS
 from mjsim.sources import ROOT, digest_of
 
 T = TypeVar("T")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from mjsim.episode import POINTS, Episode
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.disorder import Disorder
 from mjsim.model.footprint import Footprint
@@ -61,12 +62,18 @@ class House:
         """Compile a house and compute where the usual person can walk.
 
         Args:
-            name: Name under `models/houses`, or the path of a `catalogue.toml` or its folder.
+            name: Name under `models/houses`, path of a `catalogue.toml`, its folder or a recipe, or the seed of a
+                generated home, which is generated if necessary.
 
         Raises:
             AssetError: The house cannot be read, does not compile, or breaks a convention of docs/models.md.
+            HouseError: It cannot be generated as asked.
         """
-        catalogue = Catalogue.load(name)
+        return cls.of(load_catalogue(name))
+
+    @classmethod
+    def of(cls, catalogue: Catalogue) -> "House":
+        """Compile the house of a catalogue, as by `load`."""
         house = compiled_house(catalogue)
         require_usable(house)
         floor = house.floor

@@ -32,6 +32,7 @@ __all__ = [
     "World",
     "WorldOptions",
     "compose",
+    "load_catalogue",
     "make",
     "navigable_floor",
     "sample_episode",
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from mjsim.environments.dm_environment import make
     from mjsim.episode import Episode
     from mjsim.errors import MjsimError
+    from mjsim.houses.home_cache import load_catalogue
     from mjsim.model.catalogue import Catalogue
     from mjsim.model.house import navigable_floor
     from mjsim.model.sampling import sample_episode
@@ -56,6 +58,7 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "environments.dm_environment": ("make",),
         "episode": ("Episode",),
         "errors": ("MjsimError",),
+        "houses.home_cache": ("load_catalogue",),
         "model.catalogue": ("Catalogue",),
         "model.house": ("navigable_floor",),
         "model.sampling": ("sample_episode",),

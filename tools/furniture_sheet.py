@@ -14,7 +14,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.houses.chance import stream
 from mjsim.houses.files import write_files
 from mjsim.houses.furnish import placed
 from mjsim.houses.furniture.catalogue import KINDS
@@ -27,6 +26,7 @@ from mjsim.model.assets import models_root
 from mjsim.model.model_files import read_model
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose
+from mjsim.support.random_streams import stream
 
 CELL = (112, 84)  # of a picture, px
 COLUMNS = 18

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from mjsim.houses.generated import CATALOGUE, generate, house_files
+from mjsim.houses.generated import generate, house_files
 from mjsim.houses.programme import NEEDS
 from mjsim.houses.recipe import RECIPE, read_recipe
 from mjsim.houses.values import WALL, Door, FloorPlan, Window
@@ -25,6 +25,7 @@ from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.house import CompiledHouse, compiled_house
+from mjsim.model.house_ref import CATALOGUE
 from mjsim.model.validation.report import check_house_name
 from mjsim.scene_export.export import HOUSE, export_scene
 from mjsim.scene_export.store import SCENE

@@ -41,12 +41,13 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
+    from mjsim.houses.home_cache import load_catalogue
     from mjsim.model.validation.report import check_path
 
     if arguments.picture is not None:
         require_extra("study")
         check_file(arguments.picture, replace=arguments.force)
-    report = check_path(arguments.path, arguments.house)
+    report = check_path(arguments.path, arguments.house, load_catalogue)
     if arguments.json:
         print(json.dumps(as_json(report), indent=2))
     else:

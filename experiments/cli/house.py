@@ -184,14 +184,14 @@ def _export(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
     from mjsim.exporting.procthor import procthor_house
     from mjsim.files import exchange, work_folder, write_text_atomically
+    from mjsim.houses.home_cache import load_catalogue
     from mjsim.houses.recipe import floor_plan_of
     from mjsim.importing import require_extra
-    from mjsim.model.catalogue import Catalogue
 
     out: Path = arguments.out
     if arguments.format == PROCTHOR:
         check_file(out, replace=arguments.force)
-        plan = floor_plan_of(Catalogue.load(arguments.house).house_path)
+        plan = floor_plan_of(load_catalogue(arguments.house).house_path)
         write_text_atomically(out, json.dumps(procthor_house(plan), indent=1) + "\n")
         print(f"{out} ({len(plan.rooms)} rooms, {len(plan.doors)} doors, {len(plan.windows)} windows)")
         return 0

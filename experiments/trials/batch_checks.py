@@ -17,9 +17,10 @@ from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from mjsim.episode import POINTS, Episode
 from mjsim.errors import EpisodeError, PersonError
-from mjsim.houses.recipe import is_generated
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import MAX_HOUSES
+from mjsim.model.house_ref import parse_house
 from mjsim.model.scene import compose
 from mjsim.person_parameters import PersonParameters
 from planner.solver import solver
@@ -43,7 +44,7 @@ def check_names(trials: Sequence[TrialConfig]) -> None:
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
     """What each trial depends on; raises the error of a trial that cannot be run, as far as that shows beforehand."""
     check_names(trials)
-    catalogue = functools.cache(Catalogue.load)
+    catalogue = functools.cache(load_catalogue)
     house = functools.lru_cache(MAX_HOUSES)(House.load)
     for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
         _check_episode(trial, catalogue(trial.house))
@@ -60,7 +61,7 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
 
 def _may_be_small(trial: TrialConfig) -> bool:
     """The houses that come with the package have room for the usual points."""
-    own = trial.house.endswith((".toml", ".json")) or is_generated(trial.house)
+    own = parse_house(trial.house).kind != "shipped"
     return trial.episode is None and (own or trial.points > POINTS)
 
 

@@ -31,6 +31,7 @@ from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
 from experiments.trials.table import write_tables
 from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig
+from mjsim.model.house_ref import parse_house
 
 OUTDATED = "outdated"
 MAX_NAME = 120  # characters, without seeds and hash
@@ -125,7 +126,7 @@ def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
 
 def trial_name(config: TrialConfig, inputs: Inputs) -> str:
     """Folder name of a trial: readable, and unlike that of any other configuration or house."""
-    own_house = config.house.endswith(".toml")
+    own_house = parse_house(config.house).kind == "folder"
     house = Path(config.house).parent.name if own_house else config.house
     words = [house, f"{config.objects:02d}", config.assistance, config.user]
     words += [word for word in (config.planner, config.fidelity) if word not in (DEFAULTS["planner"], "full")]

@@ -23,8 +23,8 @@ from experiments.trials.trial_config import (
     episode_settings,
 )
 from mjsim.files import read_text
-from mjsim.houses.recipe import generated_names, is_generated
-from mjsim.model.catalogue_files import house_name
+from mjsim.model.generated_names import generated_names, is_generated
+from mjsim.model.house_ref import parse_house
 
 MAX_NUMBERS = 1_000_000
 
@@ -192,10 +192,10 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for seeds in people if "houses" in values else ():
-        seeds["house"] = house_name(seeds["house"], folder)
+        seeds["house"] = parse_house(seeds["house"], folder).name
     for name in PATHS:
         if isinstance(path := settings.get(name), str):
-            settings[name] = house_name(path, folder) if name == "house" else str(folder / path)
+            settings[name] = parse_house(path, folder).name if name == "house" else str(folder / path)
     if isinstance(settings.get("phases"), list):
         settings["phases"] = ",".join(map(str, settings["phases"]))
     if "houses" in values and ("house" in settings or "episode" in settings):

@@ -20,7 +20,7 @@ from experiments.trials.shards import Shard, shard_numbers
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
 from mjsim.files import work_folder
-from mjsim.model.catalogue import Catalogue
+from mjsim.houses.home_cache import load_catalogue
 
 _ROWS_OF = re.compile(r"\.rows\.\d+-of-(\d+)\..*")
 
@@ -109,7 +109,7 @@ def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: Trial
 
 
 def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> list[TrialConfig]:
-    catalogue = functools.cache(Catalogue.load)
+    catalogue = functools.cache(load_catalogue)
     by_key: dict[str, list[StoredTrial]] = {}
     for found in stored:
         by_key.setdefault(found.key, []).append(found)

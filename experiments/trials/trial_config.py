@@ -14,7 +14,7 @@ from experiments.participants.distribution import Distributions
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person, view_limits
 from mjsim.episode import CAPACITY, POINTS, Episode
-from mjsim.model.catalogue_files import house_name
+from mjsim.model.house_ref import parse_house
 from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER
 
@@ -186,11 +186,10 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
                 self._set(name, seed)
             _check_seed(name if getattr(self, name) != seed else "seed", getattr(self, name))
         self._set("seed", None)
-        self._set("house", house_name(self.house))
+        house = parse_house(self.house)
+        self._set("house", house.name)
         for name in PATHS:
-            if (path := getattr(self, name)) is not None and (
-                name != "house" or path.endswith((".toml", ".json"))
-            ):
+            if (path := getattr(self, name)) is not None and (name != "house" or house.is_path):
                 self._set(name, str(Path(path).absolute()))
         self._set("phases", ",".join(phases_of(self.phases)))
         self._check()

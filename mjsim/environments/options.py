@@ -15,7 +15,7 @@ from mjsim.environments.observation_layout import CameraOptions, ObservationLayo
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.episode import POINTS, Episode
-from mjsim.model.catalogue import Catalogue
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigableBuilder
 from mjsim.options import WorldOptions
@@ -162,7 +162,7 @@ def build(options: EnvironmentOptions) -> Rearrangement:
     sensors = resolve_sensors(options.observations)
     control = _named(CONTROLS, options.actions, "actions")
     reward = _named(REWARDS, options.reward, "reward")
-    catalogue = Catalogue.load(options.house)
+    catalogue = load_catalogue(options.house)
     floor = compiled_house(catalogue).floor
     make: Callable[[int], Episode]
     count: int | None

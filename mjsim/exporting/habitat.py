@@ -21,7 +21,6 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from mjsim.episode import Episode
-from mjsim.houses.recipe import is_generated
 from mjsim.importing.houses.gltf import RECEPTACLE, SEMANTICS
 from mjsim.importing.houses.meshes import Y_TO_Z
 from mjsim.importing.houses.mjcf import read_mjcf
@@ -41,7 +40,7 @@ _AIR = 0.05  # m that paths keep from walls beyond the body's radius
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
     """Write a house and episodes in it into an existing folder; returns the name of the scene."""
     house = compiled_house(catalogue)
-    name = _slug(catalogue.name if is_generated(catalogue.name) else catalogue.label)
+    name = _slug(catalogue.name if catalogue.ref.kind == "generated" else catalogue.label)
     _save_model(
         folder / "stages", name, catalogue.house_path, "stage_config", {"up": [0, 1, 0], "front": [0, 0, -1]}
     )

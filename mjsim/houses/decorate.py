@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mjsim.houses.chance import stream
 from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import Look
 from mjsim.houses.furniture.piece import Piece, Spot, flattened, moved
 from mjsim.houses.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.houses.values import BACK, SIDES, FloorPlan, Side, Window
+from mjsim.support.random_streams import stream
 
 LOW = 1.15  # m: pictures hang over what is lower
 BESIDE_TILES = 0.3  # m between the tiles of a kitchen and a picture

@@ -1,27 +1,21 @@
-"""Houses of seeds and recipes as folders in the user's cache, each made once."""
+"""Generation of homes from a seed: plan, openings, furniture, and the files of all."""
 
-import functools
-import hashlib
 import math
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 
 from mjsim.errors import HouseError
-from mjsim.files import work_folder
-from mjsim.houses.chance import stream
-from mjsim.houses.files import STYLE, write_files
+from mjsim.houses.files import write_files
 from mjsim.houses.furnish import furnish
 from mjsim.houses.openings import open_up
 from mjsim.houses.palette import draw_palette
 from mjsim.houses.plan import draw_rooms
-from mjsim.houses.recipe import RECIPE, VERSION, Recipe, parse_name, read_recipe
+from mjsim.houses.recipe import RECIPE, Recipe
 from mjsim.houses.values import FloorPlan, Furnishing
-from mjsim.kernels import cache_base
-from mjsim.sources import ROOT, digest_of
+from mjsim.model.generated_names import VERSION
+from mjsim.support.random_streams import stream
 
 ATTEMPTS = 40  # plans
-CATALOGUE = "catalogue.toml"
 # Bins that every home has, and those that larger homes have besides.
 _BINS = ("dish_bin", "laundry_hamper")
 _MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")
@@ -40,7 +34,7 @@ def generate(seed: int, rooms: int) -> tuple[Recipe, Furnishing]:
         try:
             programme, found = draw_rooms(seed, rooms, attempt)
             plan = open_up(seed, programme, found, attempt)
-            return Recipe(VERSION, seed, plan), _furnish(seed, plan)
+            return Recipe(VERSION, seed, plan), furnished(seed, plan)
         except HouseError as error:
             reason = str(error)
     raise HouseError(
@@ -74,27 +68,8 @@ def points_of(plan: FloorPlan) -> int:
     return max(POINTS[0], min(POINTS[1], math.floor(POINTS_PER_M2 * plan.area)))
 
 
-def generated_catalogue(house: str, models: Path) -> Path:
-    """The `catalogue.toml` of a house named by its seed or by the path of its recipe, made where it is not there yet.
-
-    Raises:
-        HouseError: It is named wrongly, of another version of the generator, or cannot be made.
-    """
-    is_recipe = house.endswith(".json")
-    named = read_recipe(Path(house)) if is_recipe else parse_name(house)
-    identity = named.encoded() if isinstance(named, Recipe) else str(named).encode()
-    key = hashlib.sha256(identity + _digest(models).encode()).hexdigest()[:24]
-    folder = cache_base() / "houses" / key
-    if not (folder / CATALOGUE).is_file():
-        if isinstance(named, Recipe):
-            recipe, furnishing = named, _furnish(named.seed, named.plan)
-        else:
-            recipe, furnishing = generate(named.seed, named.rooms)
-        _write(folder, house_files(recipe, furnishing, models))
-    return folder / CATALOGUE
-
-
-def _furnish(seed: int, plan: FloorPlan) -> Furnishing:
+def furnished(seed: int, plan: FloorPlan) -> Furnishing:
+    """Furnish a floor plan; `HouseError` if a required piece finds no place."""
     return furnish(plan, _bins(seed, plan), draw_palette(seed), seed)
 
 
@@ -103,30 +78,3 @@ def _bins(seed: int, plan: FloorPlan) -> tuple[str, ...]:
     count = min(4, max(1, round(plan.area / 15) - 1))
     more = stream(seed, "bins").choice(_MORE_BINS, count, replace=False)
     return (*_BINS, *sorted(str(key) for key in more))
-
-
-def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write all files at once; where another process was quicker, its folder stays."""
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with work_folder(folder.parent) as work:
-            for name, content in files.items():
-                (work / name).parent.mkdir(exist_ok=True)
-                (work / name).write_bytes(content)
-            try:
-                work.chmod(0o755)
-                work.rename(folder)
-            except OSError:
-                if not (folder / CATALOGUE).is_file():
-                    raise
-    except OSError as error:
-        raise HouseError(
-            f"cannot write the house to {folder}: {error.strerror}; free some space there"
-        ) from error
-
-
-@functools.cache
-def _digest(models: Path) -> str:
-    """Of all that a house follows from besides its name."""
-    style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
-    return digest_of(ROOT / "mjsim" / "houses", *style) + version("ortools") + version("numpy")

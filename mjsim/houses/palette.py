@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from mjsim.houses.chance import stream
 from mjsim.houses.values import FloorPlan, Palette, Rgb, Room
+from mjsim.support.random_streams import stream
 
 WET = ("bathroom", "shower_room", "utility")
 _WOODS: tuple[tuple[Rgb, ...], ...] = (  # of one home

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mjsim.errors import HouseError
-from mjsim.houses.values import ROOMS
+from mjsim.model.generated_names import ROOMS
 
 
 @dataclass(frozen=True)

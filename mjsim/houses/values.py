@@ -14,7 +14,6 @@ from typing import Literal
 WALL = 0.12  # between two rooms
 OUTER_WALL = 0.21  # beyond the floor
 HEIGHT = 2.6  # of the ceilings
-ROOMS = (1, 10)  # of a home
 
 Side = Literal["south", "east", "north", "west"]
 SIDES: tuple[Side, ...] = ("south", "east", "north", "west")

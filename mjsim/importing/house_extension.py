@@ -13,12 +13,13 @@ import numpy as np
 
 from mjsim.errors import AssetError
 from mjsim.files import exchange, read_text, work_folder, write_text_atomically
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.catalogue_files import CATALOGUE, house_name
 from mjsim.model.house import compiled_house
+from mjsim.model.house_ref import CATALOGUE, parse_house
 
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
 _SLOTS = 2  # places along each side of a bin where a hand puts things beside each other (mjsim.person.slots)
@@ -63,14 +64,14 @@ class HouseExtension:
         if folder.exists() and not folder.is_dir():
             raise AssetError(f"{folder} is not a folder; choose another --out")
         if self._file.exists():
-            self.catalogue = Catalogue.load(str(self._file))
+            self.catalogue = load_catalogue(str(self._file))
             self._text = read_text(self._file)
             extended = tomllib.loads(self._text).get("extends")
             if house is not None and extended != _reference(house, folder):
                 owner = extended or self.catalogue.label
                 raise AssetError(f"{self._file} belongs to {owner!r}, not to {house!r}; choose another --out")
         else:
-            self.catalogue = Catalogue.load(house or "apartment")
+            self.catalogue = load_catalogue(house or "apartment")
             self._text = _HEADER.format(json.dumps(_reference(house or "apartment", folder)))
 
     @property
@@ -144,7 +145,7 @@ class HouseExtension:
         swap(new, place)
         try:
             write_text_atomically(self._file, self._with(entry))
-            catalogue = Catalogue.load(str(self._file))
+            catalogue = load_catalogue(str(self._file))
         except BaseException:
             swap(place, new)
             if before is None:
@@ -179,5 +180,5 @@ def held_in(room: Floats, size: Floats) -> int:
 
 def _reference(house: str, folder: Path) -> str:
     """A house as a catalogue in a folder names it: a name, or a path from there."""
-    name = house_name(house)
-    return os.path.relpath(Path(name).resolve(), folder.resolve()) if name.endswith(".toml") else name
+    named = parse_house(house)
+    return os.path.relpath(Path(named.name).resolve(), folder.resolve()) if named.is_path else named.name

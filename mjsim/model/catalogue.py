@@ -10,9 +10,9 @@ import msgspec
 from mjsim.episode import POINTS
 from mjsim.errors import AssetError, brief
 from mjsim.files import is_file
-from mjsim.houses.recipe import is_generated
 from mjsim.model.assets import models_root
-from mjsim.model.catalogue_files import catalogue_path, house_name, read_tables
+from mjsim.model.catalogue_files import catalogue_file, read_tables
+from mjsim.model.house_ref import HouseRef, parse_house
 from mjsim.model.model_files import content_hash
 
 T = TypeVar("T")
@@ -57,7 +57,7 @@ class Catalogue:
     Two catalogues are equal when the contents of all their files are.
 
     Attributes:
-        name: What `Catalogue.load` was given: a name under `models/houses`, or a path.
+        ref: How the house was named.
         label: Name of the house shown to the person.
         house_path: MJCF file of the house.
         rooms: Room key -> label.
@@ -68,7 +68,7 @@ class Catalogue:
         content: Hash over the catalogue and every model, mesh and texture file that it leads to.
     """
 
-    name: str
+    ref: HouseRef
     label: str
     house_path: Path
     rooms: Mapping[str, str]
@@ -85,31 +85,38 @@ class Catalogue:
         return hash(self.content)
 
     @property
-    def is_shipped(self) -> bool:
-        """Whether it comes with the package: it was neither loaded by a path nor generated."""
-        return not self.name.endswith((".toml", ".json")) and not is_generated(self.name)
+    def name(self) -> str:
+        """Name of the house in records."""
+        return self.ref.name
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
-        """Read and check the catalogue of a house.
+        """Read and check the catalogue of a house that need not be generated.
 
         Args:
-            house: Name of a folder under `models/houses`, the path of a `catalogue.toml` or its folder, the seed of
-                a generated house (`generated:7`, `generated:7?rooms=5`), or the path of its recipe.
+            house: Name of a folder under `models/houses`, or the path of a `catalogue.toml` or its folder.
+                `mjsim.load_catalogue` takes generated houses, too.
 
         Raises:
-            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
-                or used twice; the message names the culprit.
-            HouseError: A house cannot be generated as asked.
+            AssetError: As by `read`.
 
         Example:
             >>> catalogue = Catalogue.load("apartment")
             >>> sorted(catalogue.categories)
             ['books', 'dishes', 'laundry', 'office', 'recycling', 'toys']
         """
-        path = catalogue_path(house)
-        tables, text = read_tables(path)
-        return _Reader(path, tables).catalogue(house_name(house), text)
+        return cls.read(parse_house(house))
+
+    @classmethod
+    def read(cls, house: HouseRef) -> "Catalogue":
+        """Read and check the catalogue of a house. Nothing is generated.
+
+        Raises:
+            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
+                or used twice; the message names the culprit.
+        """
+        tables, text = read_tables(house)
+        return _Reader(catalogue_file(house), tables).catalogue(house, text)
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
@@ -166,7 +173,7 @@ class _Reader:
         self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
         self._objects = self._entries(tables.objects, _ObjectEntry, "objects")
 
-    def catalogue(self, name: str, text: str) -> Catalogue:
+    def catalogue(self, house: HouseRef, text: str) -> Catalogue:
         categories, receptacles, objects = (
             self._checked_categories(),
             self._checked_receptacles(),
@@ -175,7 +182,7 @@ class _Reader:
         house_path = self._file(self._house, "house")
         models = [house_path, *(r.path for r in receptacles.values()), *(o.path for o in objects.values())]
         return Catalogue(
-            name=name,
+            ref=house,
             label=self._house.label,
             house_path=house_path,
             rooms=self._rooms,

@@ -6,65 +6,48 @@ from typing import Any
 
 from mjsim.errors import AssetError, brief
 from mjsim.files import is_file, read_text
-from mjsim.houses.recipe import is_generated, parse_name
 from mjsim.model.assets import models_root
+from mjsim.model.house_ref import CATALOGUE, HouseRef, parse_house
 
-CATALOGUE = "catalogue.toml"
 MAX_EXTENDS = 20  # catalogues, each of which extends the next
 
 
-def house_name(house: str, folder: Path = Path()) -> str:
-    """A house as it is recorded: by its name if it is generated or comes with the package, else by a path.
-
-    Args:
-        house: Name of a house, path of a `catalogue.toml`, of the folder that holds one, or of a recipe.
-        folder: Folder that relative paths start from.
-
-    Raises:
-        HouseError: It is generated, but named wrongly or of another version of the generator.
-    """
-    if is_generated(house):
-        return str(parse_name(house))
-    if house.endswith((".toml", ".json")):
-        return str(folder / house)
-    is_path = Path(house).name != house
-    if house and (is_path or not is_file(models_root() / "houses" / house / CATALOGUE)):
-        path = folder / house / CATALOGUE
-        if is_path or is_file(path):
-            return str(path)
-    return house
+def base_of(house: HouseRef) -> HouseRef | None:
+    """The house that a catalogue extends. None if it extends none, or cannot be read."""
+    if house.file is None:
+        return None
+    try:
+        name = tomllib.loads(read_text(house.file)).get("extends")
+        return parse_house(name, house.file.parent) if isinstance(name, str) else None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+        return None  # reading the catalogue reports it
 
 
-def catalogue_path(house: str, folder: Path = Path()) -> Path:
-    """File of a catalogue, given as `house_name` takes it; a generated house is made where that is needed.
+def catalogue_file(house: HouseRef) -> Path:
+    """Absolute path of a catalogue.
 
     Raises:
-        AssetError: There is no such house.
-        HouseError: It cannot be generated.
+        AssetError: There is none, or the home has yet to be generated.
     """
-    name = house_name(house, folder)
-    if is_generated(name) or name.endswith(".json"):
-        from mjsim.houses.generated import generated_catalogue  # OR-Tools takes a while to load
-
-        return generated_catalogue(name, models_root())
-    if name.endswith(".toml"):
-        if not is_file(Path(name)):
-            raise AssetError(
-                f"no catalogue at {name}; give a house name, or the path of a {CATALOGUE} or its folder"
-            )
-        return Path(name).resolve()
-    houses = models_root() / "houses"
-    path = houses / name / CATALOGUE
-    if not name or not is_file(path):
-        known = sorted(p.parent.name for p in houses.glob(f"*/{CATALOGUE}"))
+    if house.file is None:
         raise AssetError(
-            f"no house {house!r}; there are {known}, or give the path of a {CATALOGUE} or its folder"
+            f"the home {house.name!r} has not been generated; load it with mjsim.load_catalogue, which generates it"
         )
-    return path
+    if is_file(house.file):
+        return house.file.resolve() if house.kind == "folder" else house.file
+    remedy = f"the path of a {CATALOGUE} or its folder"
+    if house.kind == "folder":
+        raise AssetError(f"no catalogue at {house.name}; give a house name, or {remedy}")
+    known = sorted(path.parent.name for path in (models_root() / "houses").glob(f"*/{CATALOGUE}"))
+    raise AssetError(f"no house {house.name!r}; there are {known}, or give {remedy}")
 
 
-def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
-    """Tables of a catalogue with those of the one that it extends, whose entries it replaces by key, and texts."""
+def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
+    """Read the tables of a catalogue and its text, each with those of the catalogue that it extends.
+
+    An entry replaces the one of the same key in the extended catalogue.
+    """
+    path = catalogue_file(house)
     try:
         text = read_text(path)
         tables = tomllib.loads(text)
@@ -79,7 +62,7 @@ def read_tables(path: Path, extended: tuple[Path, ...] = ()) -> tuple[dict[str, 
         raise AssetError(
             f"{path}: extends = {name!r} leads to no catalogue that stands by itself; name a house"
         )
-    base, base_text = read_tables(catalogue_path(name, path.parent), (*extended, path))
+    base, base_text = read_tables(house.base or parse_house(name, path.parent), (*extended, path))
     for key, table in tables.items():
         mergeable = isinstance(table, dict) and isinstance(base.get(key), dict)
         base[key] = {**base[key], **table} if mergeable else table

@@ -15,9 +15,10 @@ from experiments.procedure.house_pictures import floor_plan, room_views
 from experiments.web.view.page import run_page
 from experiments.web.view.tour import tour_page
 from mjsim.files import exchange, work_folder
-from mjsim.houses.recipe import is_generated, parse_name
-from mjsim.model.catalogue import Catalogue
+from mjsim.houses.home_cache import load_catalogue
+from mjsim.model.generated_names import parse_name
 from mjsim.model.house import compiled_house
+from mjsim.model.house_ref import parse_house
 from mjsim.render import Renderer
 from mjsim.scene_export.export import export_scene
 from mjsim.sources import source_digest
@@ -65,10 +66,11 @@ def home_key(name: str) -> str:
         ConfigError: It has no name of which a folder could be called.
         HouseError: A generated house is named wrongly.
     """
-    if is_generated(name):
-        named = parse_name(name)
-        return f"generated_{named.seed}_{named.rooms}"
-    Catalogue.load(name)
+    named = parse_house(name)
+    if named.kind == "generated":
+        home = parse_name(named.name)
+        return f"generated_{home.seed}_{home.rooms}"
+    load_catalogue(name)
     path = Path(name).absolute()
     key = re.sub(r"[^A-Za-z0-9-]+", "_", path.parent.name if path.is_file() else path.name).strip("_")
     if not key:
@@ -85,12 +87,12 @@ def draw_home(name: str, folder: Path) -> Home:
         RenderError: Nothing can be drawn on this machine.
         OSError: The folder cannot be written.
     """
-    catalogue = Catalogue.load(name)
+    catalogue = load_catalogue(name)
     digest = hashlib.sha256(f"{name}\n{catalogue.content}\n{_code()}".encode()).hexdigest()[:20]
     if (kept := _kept(folder)) and kept.digest == digest:
         return kept
-    house = House.load(name)
-    shown = catalogue.name if is_generated(name) else name
+    house = House.of(catalogue)
+    shown = catalogue.name if catalogue.ref.kind == "generated" else name
     count, area = len(house.rooms.labels), round(house.rooms.area, 1)
     with work_folder(folder.parent) as work:
         home = Home(shown, catalogue.label, count, area, _draw(house, work), digest)

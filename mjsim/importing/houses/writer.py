@@ -19,7 +19,7 @@ from mjsim.importing.model_writer import comment, look_lines, write_png
 from mjsim.importing.surface import Floats
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.catalogue_files import CATALOGUE
+from mjsim.model.house_ref import CATALOGUE
 
 MODEL = "house.xml"
 MESHES = "meshes"

@@ -1,6 +1,6 @@
 """The report that `mjsim check` gives of a house, a receptacle, an object or an episode."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,8 +9,8 @@ import numpy as np
 from mjsim.episode import POINTS, Episode
 from mjsim.errors import AssetError, EpisodeError, PhysicsError, SamplingError
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.catalogue_files import CATALOGUE
 from mjsim.model.house import CompiledHouse, compiled_house
+from mjsim.model.house_ref import CATALOGUE
 from mjsim.model.model_files import elements
 from mjsim.model.sampling import points_that_fit, sample_episode
 from mjsim.model.scene import assemble
@@ -43,22 +43,31 @@ class Report:
         return not errors(self.findings)
 
 
-def check_path(name: str, house: str | None = None) -> Report:
-    """Check a catalogue, its folder, a house by name, an MJCF file, or an episode, with the house for it."""
+Load = Callable[[str], Catalogue]  # from the name of a house
+
+
+def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> Report:
+    """Check a catalogue, its folder, a house by name, an MJCF file, or an episode.
+
+    Args:
+        name: What to check.
+        house: Name of an episode's house, if not its own.
+        load: Loads the house; `mjsim.load_catalogue` also generates it.
+    """
     path = Path(name)
     if path.suffix == ".json":
-        return check_episode_file(path, house)
+        return check_episode_file(path, house, load)
     if path.suffix == ".xml":
-        return _check_model(path)
+        return _check_model(path, load)
     if path.is_dir() and not (path / CATALOGUE).is_file():
         raise AssetError(f"no {CATALOGUE} in {path}; give a house's folder, or one of its files")
-    return check_house_name(str(path / CATALOGUE) if path.is_dir() else name)
+    return check_house_name(str(path / CATALOGUE) if path.is_dir() else name, load)
 
 
-def check_house_name(name: str) -> Report:
+def check_house_name(name: str, load: Load = Catalogue.load) -> Report:
     """Check a house with its receptacles and objects, and sample it."""
     try:
-        catalogue = Catalogue.load(name)
+        catalogue = load(name)
     except AssetError as error:
         return Report("house", name, (_unreadable("catalogue", error),))
     house = compiled_house(catalogue)
@@ -108,14 +117,14 @@ def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
     return fits, found
 
 
-def check_episode_file(path: Path, house: str | None = None) -> Report:
+def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> Report:
     """Check an episode against its house, or against another one."""
     try:
         episode = Episode.load(path)
     except EpisodeError as error:
         return Report("episode", str(path), (_unreadable("episode", error),))
     try:
-        catalogue = Catalogue.load(house or episode.house)
+        catalogue = load(house or episode.house)
         built = compiled_house(catalogue)
         require_usable(built)
     except AssetError as error:
@@ -131,7 +140,7 @@ def check_episode_file(path: Path, house: str | None = None) -> Report:
     return Report("episode", str(path), tuple(found), facts, (view,))
 
 
-def _check_model(path: Path) -> Report:
+def _check_model(path: Path, load: Load) -> Report:
     """Check an MJCF file by the body that it has."""
     if not path.is_file():
         raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
@@ -141,7 +150,7 @@ def _check_model(path: Path) -> Report:
     elif "object" in bodies or not path.with_name(CATALOGUE).is_file():
         findings, kind = check_object(path), "object"
     else:
-        return check_house_name(str(path.with_name(CATALOGUE)))
+        return check_house_name(str(path.with_name(CATALOGUE)), load)
     compiled = compile_model(kind, path)
     if not isinstance(compiled, Compiled) or not len(compiled.solid):
         return Report(kind, str(path), tuple(findings))

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.errors import AssetError, MjsimError
-from mjsim.houses.recipe import is_generated
 from mjsim.kernels import cache_base
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse
@@ -31,9 +30,9 @@ def require_usable(house: CompiledHouse) -> None:
     Once per process, and a generated one once for all: its cached verdict is one on its content, by this code.
     """
     catalogue = house.catalogue
-    if catalogue.is_shipped:
+    if catalogue.ref.kind == "shipped":
         return
-    verdict = _verdict(catalogue) if is_generated(catalogue.name) else None
+    verdict = _verdict(catalogue) if catalogue.ref.kind == "generated" else None
     if verdict is not None and verdict.is_file():
         return
     if found := errors(house.once("findings", lambda: check_house(house))):

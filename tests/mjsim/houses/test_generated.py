@@ -11,9 +11,10 @@ from experiments.errors import ConfigError
 from experiments.trials.design import read_design
 from mjsim.errors import HouseError
 from mjsim.houses.generated import generate, house_files
-from mjsim.houses.recipe import VERSION, generated_names, parse_name, read_recipe, split_of
+from mjsim.houses.home_cache import load_catalogue
+from mjsim.houses.recipe import read_recipe
 from mjsim.model.assets import models_root
-from mjsim.model.catalogue import Catalogue
+from mjsim.model.generated_names import VERSION, generated_names, parse_name, split_of
 from mjsim.model.sampling import sample_episode
 from mjsim.model.validation.report import check_path
 
@@ -31,18 +32,18 @@ def test_another_process_makes_the_same_bytes() -> None:
 
 @pytest.mark.parametrize("rooms", [1, 3, 6])
 def test_a_house_can_be_used_and_holds_as_many_objects_as_it_says(rooms: int) -> None:
-    report = check_path(f"generated:11?rooms={rooms}")
+    report = check_path(f"generated:11?rooms={rooms}", load=load_catalogue)
     assert not report.findings
-    catalogue = Catalogue.load(f"generated:11?rooms={rooms}")
+    catalogue = load_catalogue(f"generated:11?rooms={rooms}")
     assert len(catalogue.rooms) == rooms
     assert len(sample_episode(catalogue, objects=8, seed=5).objects) == 8
 
 
 def test_a_house_is_recorded_with_its_rooms_and_the_version() -> None:
-    catalogue = Catalogue.load("generated:11?rooms=3")
+    catalogue = load_catalogue("generated:11?rooms=3")
     assert catalogue.name == f"generated:11?rooms=3&version={VERSION}"
-    assert Catalogue.load(catalogue.name) == catalogue
-    assert not catalogue.is_shipped
+    assert load_catalogue(catalogue.name) == catalogue
+    assert catalogue.ref.kind == "generated"
 
 
 def test_a_recipe_gives_the_same_house(tmp_path: Path) -> None:
@@ -50,7 +51,7 @@ def test_a_recipe_gives_the_same_house(tmp_path: Path) -> None:
     path = tmp_path / "house.json"
     path.write_bytes(recipe.encoded())
     assert read_recipe(path) == recipe
-    assert Catalogue.load(str(path)) == Catalogue.load("generated:11?rooms=3")
+    assert load_catalogue(str(path)) == load_catalogue("generated:11?rooms=3")
 
 
 def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
@@ -58,7 +59,7 @@ def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "house.json"
     path.write_bytes(recipe.encoded().replace(f'"version": {VERSION}'.encode(), b'"version": 99'))
     with pytest.raises(HouseError, match=r"version 99 .* this is version"):
-        Catalogue.load(str(path))
+        load_catalogue(str(path))
 
 
 @pytest.mark.parametrize(
@@ -73,7 +74,7 @@ def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
 )
 def test_malformed_names_are_refused(name: str, message: str) -> None:
     with pytest.raises(HouseError, match=message):
-        Catalogue.load(name)
+        load_catalogue(name)
 
 
 def test_the_number_of_rooms_follows_from_the_seed() -> None:
@@ -107,8 +108,8 @@ def test_the_command_writes_a_house_that_stock_mujoco_loads(tmp_path: Path) -> N
         main(["house", "generate", "--rooms", "2", "--seed", "11", "--no-pictures", "--out", str(out)]) == 0
     )
     assert mujoco.MjModel.from_xml_path(str(out / "house.xml")).ngeom > 100
-    assert len(Catalogue.load(str(out)).rooms) == 2
-    assert Catalogue.load(str(out / "recipe.json")) == Catalogue.load("generated:11?rooms=2")
+    assert len(load_catalogue(str(out)).rooms) == 2
+    assert load_catalogue(str(out / "recipe.json")) == load_catalogue("generated:11?rooms=2")
 
 
 def test_people_of_a_design_get_a_house_each(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ def test_another_number_of_rooms_is_refused() -> None:
 
 
 def programmes() -> Iterator[frozenset[str]]:
-    from mjsim.houses.chance import stream
+    from mjsim.support.random_streams import stream
 
     for seed in range(60):
         yield frozenset(draw_programme(8, stream(seed, "programme")).areas)

@@ -8,6 +8,7 @@ import pytest
 
 from experiments.cli import main as cli
 from experiments.house import House
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
 from mjsim.model.catalogue import Catalogue
@@ -46,7 +47,7 @@ def test_a_house_comes_back_with_its_rooms_floor_and_bins(tmp_path, name, capsys
     assert str(scene) in capsys.readouterr().out
     _, report = import_house(scene, tmp_path / "back", HouseOptions())
     assert [f for f in report.findings if f.severity == "error"] == []
-    ours, again = Catalogue.load(name), Catalogue.load(str(tmp_path / "back"))
+    ours, again = load_catalogue(name), Catalogue.load(str(tmp_path / "back"))
     assert again.rooms == ours.rooms
     assert {r.key: (r.room, r.place) for r in again.receptacles.values()} == {
         r.key: (r.room, r.place) for r in ours.receptacles.values()

@@ -455,7 +455,7 @@ def test_a_failure_while_installing_leaves_all_as_it_was(tmp_path, monkeypatch, 
     def fail(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("mjsim.importing.house_extension.Catalogue.load", fail)
+    monkeypatch.setattr("mjsim.importing.house_extension.load_catalogue", fail)
     with pytest.raises(OSError, match="disk full"):
         add_mesh(
             brick(tmp_path), extension, Entry.named("brick", "toys"), ImportOptions(mass=0.4), force=force

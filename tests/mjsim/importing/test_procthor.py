@@ -8,6 +8,7 @@ from house_scenes import write_procthor
 
 from experiments.cli import main as cli
 from mjsim.errors import AssetError
+from mjsim.houses.home_cache import load_catalogue
 from mjsim.houses.recipe import floor_plan_of
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.procthor_plan import read_plan
@@ -91,7 +92,7 @@ def test_our_plans_come_back_with_the_same_rooms_and_doors(tmp_path):
             )
             == 0
         )
-        ours, (again, _) = floor_plan_of(Catalogue.load(name).house_path), read_plan(path)
+        ours, (again, _) = floor_plan_of(load_catalogue(name).house_path), read_plan(path)
         assert [(room.key, room.label) for room in again.rooms] == [(r.key, r.label) for r in ours.rooms]
         np.testing.assert_allclose(
             [area(room) for room in again.rooms], [r.floor.grown(0.06).area for r in ours.rooms], atol=0.01
@@ -112,7 +113,7 @@ def test_our_plans_are_imported_with_the_same_rooms(tmp_path):
     cli.main(["house", "export", "--house", name, "--format", "procthor", "--out", str(path)])
     import_house(path, tmp_path / "out", HouseOptions())
     ours, house = (
-        floor_plan_of(Catalogue.load(name).house_path),
+        floor_plan_of(load_catalogue(name).house_path),
         compiled_house(Catalogue.load(str(tmp_path / "out"))),
     )
     for room in ours.rooms:

@@ -10,7 +10,7 @@ from experiments.trials.trial_config import TrialConfig
 from mjsim.errors import AssetError
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
-from mjsim.model.catalogue_files import house_name
+from mjsim.model.house_ref import parse_house
 
 SHIPPED = models_root() / "houses" / "apartment" / "catalogue.toml"
 
@@ -101,10 +101,10 @@ def test_a_house_may_be_named_by_its_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = str(Path("mine", "catalogue.toml"))
     assert Catalogue.load("mine") == Catalogue.load("./mine") == Catalogue.load(file)
-    assert (Catalogue.load("mine").name, house_name("apartment")) == (file, "apartment")
+    assert (Catalogue.load("mine").name, parse_house("apartment").name) == (file, "apartment")
     for given in ("mine", "./mine", file):
         assert TrialConfig(house=given, objects=2, assistance="none", seed=0).house == str(tmp_path / file)
-    assert not Catalogue.load("mine").is_shipped
+    assert Catalogue.load("mine").ref.kind == "folder"
 
 
 def test_an_installed_package_prefers_the_models_it_carries(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""One stream of chance for each purpose and room, so that a new chair changes no plan."""
+"""A random stream for each purpose and room, so that a new chair changes no plan."""
 
 import hashlib
 from typing import TYPE_CHECKING

@@ -1,0 +1,99 @@
+"""Names of generated homes: a seed, a number of rooms, and the version of the generator."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from urllib.parse import parse_qsl, urlencode
+
+from mjsim.errors import HouseError
+from mjsim.support.random_streams import stream
+
+PREFIX = "generated:"
+VERSION = 3  # of the generator; raise it with every change that alters the home of a seed
+ROOMS = (1, 10)  # least and most rooms of a home
+MAX_SEED = 2**63 - 1
+MAX_HOUSES = 100_000  # in a range
+# Shares of homes with 1 to 10 rooms, including bathrooms and halls, if no number is asked for.
+_SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
+_SPLITS: Mapping[str, float] = {"train": 0.8, "validation": 0.9, "test": 1.0}
+
+
+@dataclass(frozen=True)
+class GeneratedName:
+    """The home that `generated:7?rooms=5` names."""
+
+    seed: int
+    rooms: int
+
+    def __str__(self) -> str:
+        return f"{PREFIX}{self.seed}?rooms={self.rooms}&version={VERSION}"
+
+
+def is_generated(house: str) -> bool:
+    """True if a text names a house by its seed."""
+    return house.startswith(PREFIX)
+
+
+def parse_name(house: str) -> GeneratedName:
+    """Parse `generated:SEED`, `generated:SEED?rooms=N` or a recorded name.
+
+    Raises:
+        HouseError: It is malformed, or was recorded by another version of the generator.
+    """
+    found = re.fullmatch(rf"{PREFIX}(\d{{1,19}})(?:\?(.*))?", house, re.ASCII)
+    values = dict(parse_qsl(found[2], keep_blank_values=True)) if found and found[2] else {}
+    numbers = all(re.fullmatch(r"\d{1,9}", value, re.ASCII) for value in values.values())
+    if not found or int(found[1]) > MAX_SEED or not numbers or set(values) - {"rooms", "version"}:
+        raise HouseError(f"{house!r:.80} names no house; write {PREFIX}7 or {PREFIX}7?rooms=5")
+    seed = int(found[1])
+    check_version(int(values.get("version", VERSION)), house)
+    rooms = int(values["rooms"]) if "rooms" in values else _default_rooms(seed)
+    if not ROOMS[0] <= rooms <= ROOMS[1]:
+        raise HouseError(f"{house!r:.80} has {rooms} rooms; ask for {ROOMS[0]} to {ROOMS[1]}")
+    return GeneratedName(seed, rooms)
+
+
+def generated_names(houses: str) -> list[str]:
+    """Names of the home `generated:7`, or of a range of seeds such as `generated:0:200`, whose end is excluded.
+
+    Both take `?rooms=5` and `?split=train`, which leaves out the seeds of the other splits.
+
+    Raises:
+        HouseError: The range is malformed or empty.
+    """
+    found = re.fullmatch(rf"{PREFIX}(\d{{1,18}})(?::(\d{{1,18}}))?(?:\?(.*))?", houses, re.ASCII)
+    values = dict(parse_qsl(found[3] or "", keep_blank_values=True)) if found else {}
+    split = values.pop("split", None)
+    if not found or split not in (None, *_SPLITS):
+        raise HouseError(
+            f"{houses!r:.80} names no houses; write {PREFIX}0:200, {PREFIX}0:200?rooms=5 or "
+            f"{PREFIX}0:200?split=train ({', '.join(_SPLITS)})"
+        )
+    first = int(found[1])
+    seeds = range(first, int(found[2]) if found[2] else first + 1)
+    if len(seeds) > MAX_HOUSES:
+        raise HouseError(f"{houses!r:.80} names more than {MAX_HOUSES} houses")
+    query = f"?{urlencode(values)}" if values else ""
+    names = [str(parse_name(f"{PREFIX}{seed}{query}")) for seed in seeds if split in (None, split_of(seed))]
+    if not names:
+        raise HouseError(f"{houses!r:.80} names no house; a range's end is not included")
+    return names
+
+
+def split_of(seed: int) -> str:
+    """`train`, `validation` or `test`: 80, 10 and 10 % of all seeds, by a hash."""
+    share = stream(seed, "split").random()
+    return next(name for name, end in _SPLITS.items() if share < end)
+
+
+def check_version(version: int, subject: str) -> None:
+    """Raise a HouseError, which names the subject, unless `version` is that of this generator."""
+    if version != VERSION:
+        raise HouseError(
+            f"{subject} is of version {version} of the generator of houses, and this is version {VERSION}; "
+            f"install the mjsim of then, or generate it anew without the version"
+        )
+
+
+def _default_rooms(seed: int) -> int:
+    return 1 + int(stream(seed, "rooms").choice(len(_SHARES), p=_SHARES))

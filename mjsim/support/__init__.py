@@ -1,0 +1,1 @@
+"""Support that has nothing to do with houses: random streams."""
