@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.support.first_frame import measure_first_frame
-from benchmarks.support.play_hostile import NGINX, measure_hostile
 from benchmarks.support.play_load import load, measure_capacity, measure_latency
 from benchmarks.support.play_server import Report
 from benchmarks.support.requirements import Requirement, requirement_lines
@@ -17,7 +16,6 @@ from experiments.errors import ConfigError
 
 SESSIONS, DRAWING_SESSIONS = 3, 25  # a core, with frames and with clients that draw
 SECONDS, QUICK_SECONDS = 15.0, 4.0  # of each case
-HOSTILE_SOCKETS = 2000
 OPENINGS, QUICK_OPENINGS = 5, 1  # of a link, in each case
 TRIES = 3  # numbers of sessions that are tried, each smaller than the one before
 FAST = ("--fidelity", "event")
@@ -37,12 +35,6 @@ REQUIREMENTS = {
         ),
         Requirement("bandwidth of each of them, kbit/s", "states_kbit_s", "<=", 100.0),
         Requirement("memory of the server for each of them, MB", "states_memory_mb", "<=", 80.0),
-    ),
-    "hostile": (
-        Requirement(
-            "states a second of another person, one machine being hostile", "states_per_s", ">=", 24.9
-        ),
-        Requirement("slowest new visit meanwhile, s", "slowest_visit_s", "<=", 2.0),
     ),
     "first-frame": (
         Requirement("from the link to Start, first visit, s", "first_s", "<=", 3.0),
@@ -70,7 +62,6 @@ def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]
     measures = {
         "latency": _latency,
         "capacity": _capacity,
-        "hostile": _hostile,
         "first-frame": _first_frame,
     }
     with tempfile.TemporaryDirectory(prefix="mjsim-play-") as folder:
@@ -99,14 +90,6 @@ def _line(name: str, case: Mapping[str, Any]) -> str:
     )
 
 
-def _hostile_line(name: str, case: Mapping[str, Any]) -> str:
-    return (
-        f"{name}: {case['states_per_s']:.1f} states/s, slowest new visit {case['slowest_visit_s']:.2f} s; "
-        f"of the hostile machine {case['sockets_served']} sockets of one visit were served, {case['visits_begun']} "
-        f"visits begun, and its flood left {case['journal_kb']:.0f} kB"
-    )
-
-
 def _first_frame_line(name: str, case: Mapping[str, Any]) -> str:
     return (
         f"{name}: {case['seconds']:.2f} s from the link to Start (slowest of {case['tries']}: "
@@ -114,7 +97,7 @@ def _first_frame_line(name: str, case: Mapping[str, Any]) -> str:
     )
 
 
-LINES = {"hostile": _hostile_line, "first-frame": _first_frame_line}
+LINES = {"first-frame": _first_frame_line}
 
 
 def _progress(part: str) -> Report:
@@ -161,21 +144,6 @@ def _counts(most: int, quick: bool) -> Sequence[int]:
 def _held(tried: Sequence[Mapping[str, float]]) -> float:
     """How many sessions hold, at the last try."""
     return tried[-1]["sessions"] if tried[-1]["holds"] else 0.0
-
-
-def _hostile(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
-    seconds, words = _size(quick)
-    cases = {}
-    for name in ("directly", *(["through NGINX"] if NGINX else [])):
-        report(f"{name}, {seconds:.0f} s")
-        place = folder / name.replace(" ", "-")
-        place.mkdir()
-        cases[name] = measure_hostile(place, HOSTILE_SOCKETS, seconds, *words, nginx=name != "directly")
-    return {
-        "cases": cases,
-        "states_per_s": min(case["states_per_s"] for case in cases.values()),
-        "slowest_visit_s": max(case["slowest_visit_s"] for case in cases.values()),
-    }
 
 
 def _first_frame(folder: Path, report: Report, quick: bool) -> dict[str, Any]:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.support.play_hostile import NGINX
 from benchmarks.support.play_server import PATIENCE
 from benchmarks.support.ports import listens
 
+NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
 DEPLOY = Path(__file__).parents[1] / "deploy"
 STUDY = """
 [[cells]]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from msgspec import structs
+from user_code import condition, participant
 
-from benchmarks.support.user_code import condition, participant
 from experiments.cli.main import main
 from experiments.errors import ConfigError, UserCodeError
 from experiments.record import records

@@ -4,8 +4,8 @@ import json
 import signal
 
 import pytest
+from user_code import participant, planner
 
-from benchmarks.support.user_code import participant, planner
 from faults.conftest import FAST, PROBLEM
 
 

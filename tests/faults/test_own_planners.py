@@ -3,8 +3,8 @@
 import json
 
 import pytest
+from user_code import planner
 
-from benchmarks.support.user_code import planner
 from experiments.cli.main import main
 from experiments.errors import UserCodeError
 from experiments.record import records

@@ -8,8 +8,8 @@ import threading
 import time
 
 import pytest
+from user_code import participant
 
-from benchmarks.support.user_code import participant
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.files import read_json

@@ -14,8 +14,8 @@ import pytest
 from example_house import write_example_house
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from user_code import participant
 
-from benchmarks.support.user_code import participant
 from experiments.cli.main import main
 from experiments.errors import RecordError, ReplayError
 from experiments.record import records

@@ -3,7 +3,8 @@
 import os
 import sys
 
-from benchmarks.support.user_code import participant
+from user_code import participant
+
 from experiments.trials.batch import run_batch
 from experiments.trials.design import factorial
 

@@ -4,8 +4,8 @@ import shutil
 from contextlib import closing
 
 import pytest
+from user_code import participant
 
-from benchmarks.support.user_code import participant
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.archive import adopt, new_archive, pack, run_paths

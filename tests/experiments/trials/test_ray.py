@@ -10,8 +10,8 @@ from contextlib import nullcontext
 
 import pytest
 from ray.cluster_utils import Cluster
+from user_code import participant
 
-from benchmarks.support.user_code import participant
 from experiments.errors import ConfigError
 from experiments.record import records
 from experiments.record.run_directory import TRIALS

@@ -7,8 +7,8 @@ import sys
 import av
 import numpy as np
 import pytest
+from user_code import participant
 
-from benchmarks.support.user_code import participant
 from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events

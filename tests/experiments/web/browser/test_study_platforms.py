@@ -11,9 +11,8 @@ import time
 from contextlib import nullcontext
 
 import pytest
-from nginx_site import make_certificate, nginx_before
+from nginx_site import NGINX, make_certificate, nginx_before
 
-from benchmarks.support.play_hostile import NGINX
 from benchmarks.support.play_server import PATIENCE
 from benchmarks.support.ports import free_ports, listens
 from tests.experiments.people.platforms.emulator import SECRET

@@ -9,9 +9,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from benchmarks.support.good_files import FAST, MESHES, PROBLEM, made_up_rows, prepare
-from benchmarks.support.hostile_code import code_case, environment_case
-from benchmarks.support.hostile_files import (
+from faults.good_files import FAST, MESHES, PROBLEM, made_up_rows, prepare
+from faults.hostile_code import code_case, environment_case
+from faults.hostile_files import (
     Rng,
     damage_file,
     damage_table,
@@ -22,7 +22,7 @@ from benchmarks.support.hostile_files import (
     pick,
     rows_of,
 )
-from benchmarks.support.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, CaseFactory
+from faults.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, CaseFactory
 
 ODD = """
 nan inf -1 0 1e308 -0.0 -- - ١٢ 0x10 1_000 1,2 a:b None [] ../.. / /dev/full /dev/zero /dev/null keep.txt keep
@@ -143,8 +143,23 @@ def _episode(folder: Path, rng: Rng) -> Case:
         kind, must = damage_text(path, rng)
     if rng.uniform() < 0.5:
         return Case("check", f"episode: {kind}", ["check", "episode.json"], must)
-    words = ["run", "--episode", "episode.json", "--time-limit", "2", "--out", "out", *FAST]
+    words = [
+        "run",
+        "--episode",
+        "episode.json",
+        "--time-limit",
+        "2",
+        "--out",
+        "out",
+        *FAST,
+        "--fidelity",
+        _tier(rng),
+    ]
     return Case("run", f"episode: {kind}", words, must)
+
+
+def _tier(rng: Rng) -> str:
+    return str(pick(["event", "full"], rng))
 
 
 HOME = "--house home/catalogue.toml --objects 2 --points 5"
@@ -155,7 +170,7 @@ def _home(folder: Path, rng: Rng) -> Case:
     kind, must = damage_text(path, rng)
     lines = {
         "check": "check home/catalogue.toml",
-        "run": f"run {HOME} --time-limit 2 --out out {' '.join(FAST)}",
+        "run": f"run {HOME} --time-limit 2 --out out {' '.join(FAST)} --fidelity {_tier(rng)}",
         "house": f"house {HOME} --out out.xml",
         "check object": f"check home/{path.name}",
     }

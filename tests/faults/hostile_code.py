@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from user_code import condition, participant, planner
 
-from benchmarks.support.hostile_files import Rng, pick
-from benchmarks.support.user_code import condition, participant, planner
-from benchmarks.support.warm_commands import REFUSED, Case
+from faults.hostile_files import Rng, pick
+from faults.warm_commands import REFUSED, Case
 
 LIMIT = "0.5"  # s that a call may take
 RUN = "run --objects 2 --fidelity event --no-regret --no-floor-plan --no-video --time-limit 20 --out out"

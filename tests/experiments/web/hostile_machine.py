@@ -3,7 +3,6 @@
 import asyncio
 import json
 import multiprocessing
-import shutil
 import subprocess
 import time
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
+from nginx_site import NGINX
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
@@ -25,8 +25,7 @@ from experiments.web.protocol import MAX_INPUTS
 
 HOSTILE, OTHER = "127.0.0.66", "127.0.0.2"  # addresses of the hostile machine, and of who opens new visits
 SPOOFED = 60  # visits that the hostile machine begins in the names of others
-NGINX = shutil.which("nginx", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
-DOCUMENT = Path(__file__).parents[2] / "docs" / "play.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "play.md"
 MAIN = """daemon off; pid {folder}/pid; error_log {folder}/error.log; worker_rlimit_nofile 16384;
 events {{ worker_connections 8192; }}
 http {{ access_log off; client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy;

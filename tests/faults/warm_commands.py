@@ -31,6 +31,7 @@ LONGEST = 3000  # characters that a refusal may have
 PIPE, CLOSED = "a pipe that never ends", "closed"
 REFUSED, USED = "refused", "used"
 BAD = re.compile(r"Traceback \(most recent|internal error|Fatal Python error|\w*Warning: ")
+UNSTABLE = "replay the recorded actions"  # part of the message when the physics of an accepted model fails
 EXIT = os._exit  # which commands may replace
 ENDS = (0, 1, 2)
 LARGEST_COMPARED = 10_000_000  # bytes of a file whose content is compared
@@ -212,6 +213,8 @@ def _fault(case: Case, code: int, output: str, before: Mapping[str, str], after:
         return f"died of {signal.Signals(-code).name}"
     if BAD.search(output) or code not in ENDS:
         return f"traceback (exit {code})"
+    if UNSTABLE in output:
+        return "accepted, but its physics failed"
     if lost := [name for name in before if after.get(name) != before[name] and name not in case.changes]:
         return f"lost {lost[0]}"
     new = [name for name in after if name not in before and not (name.endswith(PREVIEW) and name in output)]
