@@ -11,47 +11,16 @@ from typing import Any, cast
 from urllib.parse import urlsplit
 
 import numpy as np
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
 from benchmarks.support.play_server import PATIENCE
+from benchmarks.support.simulated_link import CountingConnection, Link
 from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS, MAX_STEPS_AHEAD
 
 STEP = 0.04  # s of a control step
 # A text frame of 126 bytes, masked with zeros, that ends early.
 HALF_A_MESSAGE = b"\x81\xfe\x00\x7e" + bytes(4) + b'{"type": "inputs", "inputs": [{"num'
-RETRANSMISSION = 0.2  # s that a lost packet costs, as TCP sends it again
-
-
-@dataclass(frozen=True)
-class Link:
-    """What a network does to messages, each way.
-
-    Attributes:
-        latency: s.
-        jitter: Standard deviation of what comes on top, s.
-        loss: Share of messages that are lost and sent again.
-    """
-
-    latency: float = 0.0
-    jitter: float = 0.0
-    loss: float = 0.0
-
-    def delay(self, rng: np.random.Generator) -> float:
-        """What a message takes, s."""
-        lost = RETRANSMISSION * (rng.geometric(1.0 - self.loss) - 1) if self.loss else 0.0
-        return self.latency + abs(float(rng.normal(0.0, self.jitter))) + float(lost)
-
-
-class CountingConnection(ClientConnection):
-    """A connection that counts what arrives, as it is on the wire."""
-
-    received = 0  # bytes
-
-    def data_received(self, data: bytes) -> None:
-        """Count, and take it."""
-        self.received += len(data)
-        super().data_received(data)
 
 
 @dataclass(frozen=True)
@@ -75,7 +44,6 @@ class SimulatedBrowser:
     Args:
         address: Of the visit.
         codec: `jpeg`, `h264`, or `none` for a client that draws: it stamps its inputs, and promises them step by step.
-        batch: How many control steps a client that draws puts into one message.
         link: What the network does.
         size: Of the view, px.
         seed: Of the network's chance.
@@ -95,7 +63,6 @@ class SimulatedBrowser:
         address: str,
         *,
         codec: str = "none",
-        batch: int = 1,
         link: Link | None = None,
         size: tuple[int, int] = (640, 480),
         seed: int = 0,
@@ -103,7 +70,7 @@ class SimulatedBrowser:
         self.address = address
         self._tab = secrets.token_hex(8)
         self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec}
-        self.draws, self._batch = codec == "none", batch
+        self.draws = codec == "none"
         self._step: int | None = (
             None  # the next control step of a client that draws; None while the clock stands
         )
@@ -269,9 +236,8 @@ class SimulatedBrowser:
                     due = time.perf_counter()
                     continue
                 self._step += 1
-                if self._step % self._batch == 0:
-                    made, self._made = self._made, []
-                    self._send_inputs(made, until=self._step)
+                made, self._made = self._made, []
+                self._send_inputs(made, until=self._step)
                 due += STEP
                 await asyncio.sleep(max(0.0, due - time.perf_counter()))
             self._made.clear()  # they are repeated once the clock runs again

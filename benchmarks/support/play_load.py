@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.support.play_browser import Link, SimulatedBrowser
+from benchmarks.support.play_browser import SimulatedBrowser
 from benchmarks.support.play_server import TASK_ALONE, PlayProcess, Report, memory, processor_time, worker_of
+from benchmarks.support.simulated_link import Link
 from experiments.record.phases import TASK
 
 PERIOD = 0.25  # s between two inputs
@@ -64,7 +65,6 @@ def measure_capacity(
     counts: Sequence[int],
     report: Report,
     *words: str,
-    batch: int = 1,
     core: int | None = None,
 ) -> list[dict[str, float]]:
     """Which numbers of sessions at once hold 15 frames a second and 150 ms, or 25 states a second and 60 ms.
@@ -76,15 +76,14 @@ def measure_capacity(
         counts: Numbers of sessions to try, descending, until one holds.
         report: Takes lines about the progress.
         words: Further words of the server's command line.
-        batch: How many control steps a client that draws puts into one message.
         core: The only one that the server may use; None for all.
     """
     tried = []
     for count in counts:
         report(f"{count} sessions at once, {codec}, {seconds:.0f} s")
-        visits = folder / f"{codec}-{count}-{batch}"
+        visits = folder / f"{codec}-{count}"
         with PlayProcess(visits, *TASK_ALONE, "--sessions", str(count), *words, core=core) as server:
-            browsers = [SimulatedBrowser(server.begin(), codec=codec, batch=batch) for _ in range(count)]
+            browsers = [SimulatedBrowser(server.begin(), codec=codec) for _ in range(count)]
             tried.append(asyncio.run(_sessions_at_once(server, browsers, seconds, SETTLING_TOGETHER)))
         if tried[-1]["holds"]:
             break
