@@ -13,7 +13,7 @@ import mjsim
 PUBLIC = [
     "IDLE", "ActionResult", "Catalogue", "Episode", "FollowPath", "MjsimError", "Move", "Observation",
     "PersonParameters", "Pick", "Place", "Refusal", "Scene", "StepResult", "Stop", "Wait", "World", "WorldOptions",
-    "compose", "make", "navigable_floor", "sample_episode",
+    "compose", "load_catalogue", "make", "navigable_floor", "sample_episode",
 ]  # fmt: skip
 
 
