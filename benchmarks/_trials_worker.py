@@ -25,7 +25,7 @@ from experiments.house import House
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
+from mjsim.values.options import WorldOptions
 from mjsim.world import World
 
 # Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
@@ -49,7 +49,7 @@ PARTS = {
         "experiments.record.writer.RecordWriter.record",
         "experiments.record.export.save_arrays",
         "experiments.record.export.write_json",
-        "mjsim.episode.Episode.save",
+        "mjsim.values.episode.Episode.save",
     ),
 }
 REST = "participant and the rest"

@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks.support.agreement import TierResult, run_all_in_tiers
 from experiments.trials.trial_config import TrialConfig
-from mjsim.options import FIDELITIES
+from mjsim.values.options import FIDELITIES
 
 SEEDS = 50
 QUICK_SEEDS = 2

@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.support.recorded_trial import RecordedTrial, play, record_trial
 from experiments.house import House
-from mjsim.actions import Move
 from mjsim.model.scene import Scene, compose
-from mjsim.options import FIDELITIES
+from mjsim.values.actions import Move
+from mjsim.values.options import FIDELITIES
 from mjsim.world import World
 from mjsim.world_state import set_physics, take_physics
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from experiments.errors import ExperimentError
 from hud.errors import HudError
-from mjsim.errors import MjsimError
+from mjsim.values.errors import MjsimError
 from planner.errors import PlannerError
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
-from mjsim.episode import POINTS, Episode
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.disorder import Disorder
@@ -19,7 +18,8 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.sampling import house_points, sample_episode
 from mjsim.model.validation.validate import require_usable
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.path_following import ARRIVED_WITHIN
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh

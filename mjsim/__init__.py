@@ -39,33 +39,43 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from mjsim.actions import IDLE, ActionResult, FollowPath, Move, Pick, Place, Refusal, Stop, Wait
     from mjsim.environments.dm_environment import make
-    from mjsim.episode import Episode
-    from mjsim.errors import MjsimError
     from mjsim.houses.home_cache import load_catalogue
     from mjsim.model.catalogue import Catalogue
     from mjsim.model.house import navigable_floor
     from mjsim.model.sampling import sample_episode
     from mjsim.model.scene import Scene, compose
-    from mjsim.observation import Observation
-    from mjsim.options import WorldOptions
-    from mjsim.person_parameters import PersonParameters
+    from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, Place, Refusal, Stop, Wait
+    from mjsim.values.episode import Episode
+    from mjsim.values.errors import MjsimError
+    from mjsim.values.observation import Observation
+    from mjsim.values.options import WorldOptions
+    from mjsim.values.person_parameters import PersonParameters
     from mjsim.world import StepResult, World
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
-        "actions": ("IDLE", "ActionResult", "FollowPath", "Move", "Pick", "Place", "Refusal", "Stop", "Wait"),
+        "values.actions": (
+            "IDLE",
+            "ActionResult",
+            "FollowPath",
+            "Move",
+            "Pick",
+            "Place",
+            "Refusal",
+            "Stop",
+            "Wait",
+        ),
         "environments.dm_environment": ("make",),
-        "episode": ("Episode",),
-        "errors": ("MjsimError",),
+        "values.episode": ("Episode",),
+        "values.errors": ("MjsimError",),
         "houses.home_cache": ("load_catalogue",),
         "model.catalogue": ("Catalogue",),
         "model.house": ("navigable_floor",),
         "model.sampling": ("sample_episode",),
         "model.scene": ("Scene", "compose"),
-        "observation": ("Observation",),
-        "options": ("WorldOptions",),
-        "person_parameters": ("PersonParameters",),
+        "values.observation": ("Observation",),
+        "values.options": ("WorldOptions",),
+        "values.person_parameters": ("PersonParameters",),
         "world": ("StepResult", "World"),
     }
 

@@ -9,9 +9,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjsim.conflicts import PACKAGES, hidden_package, shared_names
-from mjsim.errors import RenderError
-from mjsim.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.support.conflicts import PACKAGES, hidden_package, shared_names
+from mjsim.support.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.values.errors import RenderError
 
 if TYPE_CHECKING:
     from mjsim.render.context import GlInfo
@@ -111,7 +111,7 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
 
 def _cache() -> str:
     try:
-        from mjsim.kernels import cache_base  # imports numba, which may be broken
+        from mjsim.support.kernels import cache_base  # imports numba, which may be broken
 
         folder = cache_base()
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

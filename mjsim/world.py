@@ -7,7 +7,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.actions import (
+from mjsim.fidelity import make_tier
+from mjsim.health.values import Health, HealthSample
+from mjsim.model.scene import Scene
+from mjsim.values.actions import (
     IDLE,
     TIME_TOLERANCE,
     Action,
@@ -20,13 +23,10 @@ from mjsim.actions import (
     Wait,
     WorldEvent,
 )
-from mjsim.errors import PhysicsError, StateError
-from mjsim.fidelity import make_tier
-from mjsim.health.values import Health, HealthSample
-from mjsim.model.scene import Scene
-from mjsim.observation import Observation
-from mjsim.options import WorldOptions
-from mjsim.steps import Steps
+from mjsim.values.errors import PhysicsError, StateError
+from mjsim.values.observation import Observation
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import Steps
 from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED
 from mjsim.walking.walker import BACK_OFF, Walker
 from mjsim.world_state import WorldState

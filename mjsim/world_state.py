@@ -21,13 +21,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import StateError
 from mjsim.health.monitor import HealthState
-from mjsim.observation import ObjectStatus
 from mjsim.person.carrying import CarryingState
 from mjsim.person.grips import GripState
 from mjsim.person.rig import RigState
-from mjsim.sources import digest_of
+from mjsim.support.sources import digest_of
+from mjsim.values.errors import StateError
+from mjsim.values.observation import ObjectStatus
 
 CHECKPOINT_PERIOD = 10.0  # s at least from one checkpoint to the next
 

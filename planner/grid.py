@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 
 MARGIN = 1e-3  # m; a segment is listed in cells that it misses by less, so that rounding never loses a touch
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 
 SLACK = 1e-9  # m, for the rounding of lengths
 REPEATED = 1e-9  # m between corners that count as one

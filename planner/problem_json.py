@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 
-from mjsim.files import read_json
+from mjsim.support.files import read_json
 from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind

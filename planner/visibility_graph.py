@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from shapely.geometry.polygon import orient
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 from planner.path_search import Edges

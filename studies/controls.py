@@ -12,7 +12,7 @@ from experiments.errors import ConfigError
 from experiments.participants.distribution import Distributions
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 FILE = Path(__file__).with_name("controls.toml")
 

@@ -10,7 +10,7 @@ from typing import Any
 from experiments.analysis.page import Block, Paragraph, p_value, page, table
 from experiments.record.files import write_json
 from experiments.study.robustness import left_out_table
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 from studies.forest import forest
 from studies.published import Published, inconsistencies
 from studies.score import POOL, TRUTHS, Row, Score

@@ -9,7 +9,7 @@ from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.state import HudState
 from mjsim.model.scene import compose
-from mjsim.observation import Observation
+from mjsim.values.observation import Observation
 from mjsim.world import World
 
 SIZES = ((640, 480), (960, 720), (1920, 1080))

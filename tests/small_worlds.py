@@ -5,11 +5,11 @@ import math
 import mujoco
 import numpy as np
 
-from mjsim.actions import WAIT, Move
-from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
+from mjsim.values.actions import WAIT, Move
+from mjsim.values.episode import Episode, PlacedObject, StartPose
+from mjsim.values.options import WorldOptions
 from mjsim.world import World
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)

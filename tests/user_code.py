@@ -5,7 +5,7 @@ def participant(statement: str, after: int = 0) -> str:
     """A module with a participant that walks in circles; after so many control steps it does something else."""
     return f"""
 import os, signal, sys, time
-from mjsim.actions import FollowPath, Move, Pick, Place, Wait
+from mjsim.values.actions import FollowPath, Move, Pick, Place, Wait
 class Own:
     needs = frozenset()
     count = 0

@@ -26,11 +26,11 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.errors import RenderError
-from mjsim.files import replacing
 from mjsim.model.scene import compose
 from mjsim.model.sight import visible_objects
-from mjsim.observation import ObjectStatus, Observation
+from mjsim.support.files import replacing
+from mjsim.values.errors import RenderError
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world import World
 
 Image = NDArray[np.uint8]

@@ -16,8 +16,8 @@ from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
-from mjsim.observation import ObjectStatus
-from mjsim.options import FIDELITIES
+from mjsim.values.observation import ObjectStatus
+from mjsim.values.options import FIDELITIES
 
 
 @dataclass(frozen=True)

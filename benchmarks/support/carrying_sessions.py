@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.actions import IDLE, WAIT, Action, EventKind, Move, Pick
-from mjsim.episode import Episode
 from mjsim.model.scene import compose
+from mjsim.values.actions import IDLE, WAIT, Action, EventKind, Move, Pick
+from mjsim.values.episode import Episode
 from mjsim.walking.path_following import wrap_angle
 from mjsim.walking.polyline import path_length, point_along, project
 from mjsim.world import World

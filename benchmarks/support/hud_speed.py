@@ -20,9 +20,9 @@ from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.model.scene import compose
-from mjsim.observation import Observation
 from mjsim.render import render_house_map, render_pictures
 from mjsim.render.cameras import camera_pose
+from mjsim.values.observation import Observation
 from mjsim.world import World
 
 SIZE = (640, 480)

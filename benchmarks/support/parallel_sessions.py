@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import track
 
 from experiments.house import House
-from mjsim.episode import Episode, PlacedObject, StartPose
+from mjsim.values.episode import Episode, PlacedObject, StartPose
 
 T = TypeVar("T")
 

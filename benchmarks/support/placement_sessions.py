@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.actions import IDLE, EventKind, Pick, Place
-from mjsim.episode import Episode, PlacedObject
-from mjsim.errors import PhysicsError
 from mjsim.model.catalogue import Category
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
+from mjsim.values.actions import IDLE, EventKind, Pick, Place
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.errors import PhysicsError
+from mjsim.values.options import WorldOptions
 from mjsim.world import World
 
 SEED = 2026

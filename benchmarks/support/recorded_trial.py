@@ -12,12 +12,12 @@ from experiments.house import House
 from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
-from mjsim.actions import Action, Move
-from mjsim.episode import POINTS
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import Scene, compose
-from mjsim.observation import Observation
-from mjsim.options import WorldOptions
+from mjsim.values.actions import Action, Move
+from mjsim.values.episode import POINTS
+from mjsim.values.observation import Observation
+from mjsim.values.options import WorldOptions
 from mjsim.world import MAX_STEPS, StepResult, World
 from mjsim.world_state import WorldState
 

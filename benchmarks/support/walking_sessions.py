@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.actions import IDLE, Move
-from mjsim.episode import Episode
-from mjsim.errors import PhysicsError
 from mjsim.model.footprint import footprint
 from mjsim.model.scene import assemble
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, Move
+from mjsim.values.episode import Episode
+from mjsim.values.errors import PhysicsError
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.polyline import point_along
 from mjsim.world import World
 from planner.errors import UnreachableError

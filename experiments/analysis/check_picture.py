@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjsim.files import replacing
 from mjsim.model.validation.findings import Finding
 from mjsim.model.validation.report import Report
 from mjsim.model.validation.views import Drawing
+from mjsim.support.files import replacing
 
 SIDE = 9.0  # inches of the longest side of a drawing
 LINES = 100  # findings below the drawing: more would make a picture that viewers do not open

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison import Block, batch_origin, mean_interval
-from mjsim.files import replacing
+from mjsim.support.files import replacing
 
 PANEL = (2.6, 2.4)  # inches
 PAIR, MEAN = "#9AA5B1", "#0072B2"

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjsim.files import replacing
 from mjsim.model.disorder import Disorder
+from mjsim.support.files import replacing
 
 _KINDS = 15  # bars
 _BLUE = "#0072B2"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.cli.options import add_command, text_list
 from experiments.cli.requirements import require_extra
 from experiments.errors import ConfigError
-from mjsim.files import replacing
+from mjsim.support.files import replacing
 
 if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval

@@ -43,7 +43,7 @@ def exit_code(error: Exception) -> int | None:
     # Imported only on errors, so that `mjsim plan` starts fast.
     from experiments.errors import ExperimentError, ReplayError, UserCodeError
     from hud.errors import HudError
-    from mjsim.errors import MjsimError, PhysicsError, RenderError
+    from mjsim.values.errors import MjsimError, PhysicsError, RenderError
     from planner.errors import PlannerError
 
     # A full disk, a missing driver, a broken installation: no other command line would help.
@@ -67,7 +67,7 @@ def message(error: Exception) -> str:
         text = "a path has a null character in it; correct the file that names it"
     else:
         text = str(error)
-    from mjsim.errors import brief
+    from mjsim.values.errors import brief
 
     return brief(text)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.cli.options import add_command, add_force, add_setting
 from experiments.errors import ConfigError
-from mjsim.episode import POINTS
+from mjsim.values.episode import POINTS
 
 MJCF, GLTF = ".xml", ".glb"
 GENERATE, EXPORT, GALLERY = "generate", "export", "gallery"
@@ -154,8 +154,8 @@ def _generate(arguments: argparse.Namespace) -> int:
     """Write the house of a seed into a folder, checked, with pictures: whole or not at all."""
     from experiments.house import House
     from experiments.procedure.house_pictures import draw_house
-    from mjsim.files import exchange, work_folder
     from mjsim.model.model_files import copy_house
+    from mjsim.support.files import exchange, work_folder
 
     out: Path = arguments.out
     if out.exists() and not (arguments.force and (out / "recipe.json").is_file()):
@@ -183,10 +183,10 @@ def _export(arguments: argparse.Namespace) -> int:
     from experiments.house import House
     from experiments.record.run_directory import check_file
     from mjsim.exporting.procthor import procthor_house
-    from mjsim.files import exchange, work_folder, write_text_atomically
     from mjsim.houses.home_cache import load_catalogue
     from mjsim.houses.recipe import floor_plan_of
     from mjsim.importing import require_extra
+    from mjsim.support.files import exchange, work_folder, write_text_atomically
 
     out: Path = arguments.out
     if arguments.format == PROCTHOR:
@@ -221,9 +221,9 @@ def _export(arguments: argparse.Namespace) -> int:
 
 def _write(scene: Any, path: Path) -> None:
     """Write a composed scene in the format that the ending of the path names."""
-    from mjsim.files import replacing
     from mjsim.model.export import export_house
     from mjsim.scene_export.export import export_episode
+    from mjsim.support.files import replacing
 
     if path.suffix == MJCF:
         export_house(scene, path)

@@ -15,8 +15,8 @@ import numpy as np
 
 from experiments.cli.options import HelpFormatter, add_setting
 from experiments.errors import ConfigError
-from mjsim.episode import POINTS
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
+from mjsim.values.episode import POINTS
 
 if TYPE_CHECKING:
     from mjsim.importing.episodes import EpisodeObject

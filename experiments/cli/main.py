@@ -13,8 +13,8 @@ from typing import NoReturn
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
 from experiments.session.signals import exit_code, exit_raised, signal_of, signals_raised
-from mjsim.errors import brief
-from mjsim.gl_choice import postpone_gl
+from mjsim.support.gl_choice import postpone_gl
+from mjsim.values.errors import brief
 
 COMMANDS = {
     "run": "run one trial and film it",

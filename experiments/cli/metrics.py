@@ -12,7 +12,7 @@ from typing import Any
 from experiments.cli.options import add_command, add_force
 from experiments.errors import RecordError, ReplayError
 from experiments.people.copies import note_derived
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 DESCRIPTION = """\
 Compute the metrics of a run directory, of a batch folder or of the folder of `mjsim play` anew, from event log and

@@ -18,8 +18,8 @@ from experiments.trials.design import numbers
 from experiments.trials.trial_config import DEFAULTS, SETTINGS, TrialConfig, episode_settings
 from hud.conditions import condition_names
 from hud.options import option_names
-from mjsim.person_parameters import RANGES, PersonParameters
 from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
+from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solver import SOLVERS
 
 PERSON_VALUES = {  # options of their own, because they are changed most

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from experiments.errors import ConfigError
-from mjsim.files import read_bytes, read_stream
+from mjsim.support.files import read_bytes, read_stream
 from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status
 from planner.problem import RoutingProblem
@@ -195,7 +195,7 @@ class _Search(threading.Thread):
 
 def _publish(problem: RoutingProblem, plan: Plan, certificate: Path | None) -> None:
     if certificate is not None:
-        from mjsim.files import write_text_atomically  # loaded only where it is needed
+        from mjsim.support.files import write_text_atomically  # loaded only where it is needed
 
         write_text_atomically(certificate, claim_to_json(problem, plan) + "\n")
     print(plan_to_json(problem, plan))

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.people.copies import note_derived
     from experiments.record.run_directory import check_file
     from experiments.web.view.page import view_page
-    from mjsim.files import replacing
+    from mjsim.support.files import replacing
 
     if arguments.out is not None:
         if arguments.out.suffix != ".html":

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hud.state import HudState
-from mjsim.actions import Action, ActionResult
-from mjsim.episode import CAPACITY
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import Action, ActionResult
+from mjsim.values.episode import CAPACITY
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
 from planner.plan import Visit
 
 if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator

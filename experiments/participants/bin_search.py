@@ -8,7 +8,7 @@ from experiments.house import House
 from experiments.participants.base import NEARBY, Percept, Point
 from experiments.participants.distances import estimated_distances
 from experiments.participants.looking import FullTurn
-from mjsim.actions import TIME_TOLERANCE, Action
+from mjsim.values.actions import TIME_TOLERANCE, Action
 
 ARRIVED = 0.5  # m from a viewpoint before the look around begins
 

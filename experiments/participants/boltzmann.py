@@ -15,7 +15,7 @@ from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.participants.base import Choice, Participant, ParticipantFactory, Percept
 from experiments.participants.visit_executor import VisitExecutor
-from mjsim.actions import WAIT, Action
+from mjsim.values.actions import WAIT, Action
 from planner.plan import Visit
 
 TEMPERATURE = 0.5  # m

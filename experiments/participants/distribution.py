@@ -19,7 +19,7 @@ import msgspec
 
 from experiments.blame import shown
 from experiments.errors import ConfigError
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 SHAPES = ("constant", "normal", "lognormal", "uniform", "beta", "mixture")
 _STANDARD = statistics.NormalDist()

@@ -7,7 +7,7 @@ from experiments.participants.base import Participant, Percept
 from experiments.participants.nearest import Nearest
 from experiments.participants.searcher import Searcher
 from experiments.participants.visit_executor import VisitExecutor
-from mjsim.actions import WAIT, Action
+from mjsim.values.actions import WAIT, Action
 
 
 class BreadcrumbFollower:

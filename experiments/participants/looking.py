@@ -3,7 +3,7 @@
 import math
 
 from experiments.participants.base import Percept
-from mjsim.actions import Action, Move
+from mjsim.values.actions import Action, Move
 
 TURNING = 0.8  # of the turning speed
 LOOK_GAIN = 4.0  # rad/s per rad of pitch

@@ -6,7 +6,7 @@ from experiments.house import House
 from experiments.participants.base import Participant, Percept, Point
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
-from mjsim.actions import TIME_TOLERANCE, WAIT, Action
+from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
 

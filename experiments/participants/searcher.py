@@ -8,7 +8,7 @@ from experiments.participants.distances import estimated_distances
 from experiments.participants.frontier import Frontier, Place
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
-from mjsim.actions import IDLE, TIME_TOLERANCE, WAIT, Action
+from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
 SEARCHED = 0.5  # m from a viewpoint before the look around begins

@@ -9,7 +9,7 @@ from experiments.house import House
 from experiments.participants.base import Guidance, Percept, Point
 from experiments.participants.bin_search import BinSearch
 from experiments.participants.distances import estimated_distances
-from mjsim.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
+from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
 from mjsim.walking.polyline import project
 from planner.plan import Visit, VisitKind
 

@@ -22,7 +22,7 @@ from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.table import write_tables
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
 FREE = ("line", "text")  # kinds of items whose answers are written freely

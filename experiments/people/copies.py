@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 INDEX = "copies.jsonl"  # in the study's folder, and in its tables and exports for what was made of those
 

@@ -17,7 +17,7 @@ from experiments.people.store import Person, Store, change_database
 from experiments.study.table import ANALYSIS, FILES
 from experiments.trials.table import NAME, read_rows, write_tables
 from experiments.web.server.visits import Visits
-from mjsim.files import WORK, remove_leftovers, write_text_atomically
+from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
 LEFTOVER_S = 3600.0  # for which unfinished work may be that of a command on another machine
 

@@ -17,7 +17,7 @@ from experiments.people.copies import INDEX, note_copy
 from experiments.people.store import Answer, Person, Store, TrialRow
 from experiments.people.study_file import Study
 from experiments.record.files import write_json
-from mjsim.files import exchange, work_folder, write_text_atomically
+from mjsim.support.files import exchange, work_folder, write_text_atomically
 
 DESCRIPTION, README, IGNORED = "dataset_description.json", "README.md", ".psychds-ignore"
 DATA, RUNS, CODEBOOK = "data", "runs", Path("documentation", "codebook.csv")

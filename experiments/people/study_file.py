@@ -21,7 +21,7 @@ from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.trials.design import read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
-from mjsim.files import read_bytes
+from mjsim.support.files import read_bytes
 
 CONSENT, DEVICE, COMPREHENSION, SURVEY = "consent", "device", "comprehension", "survey"
 DEBRIEFING, COMPLETION = "debriefing", "completion"

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 from experiments.house import House
 from mjsim.model.house import compiled_house
 from mjsim.model.sight import FieldOfView, visible_receptacles
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.person_parameters import PersonParameters
 from planner.errors import PlannerError
 
 Point = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 
 from experiments.errors import ConfigError
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 
 class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

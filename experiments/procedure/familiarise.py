@@ -11,7 +11,7 @@ from experiments.procedure.story import reading_time, story_text
 from experiments.record.phases import FLYTHROUGH, STORY, TRAINING
 from experiments.record.records import PHASE_BEGUN, PHASE_ENDED, Event, EventLog
 from mjsim.model.sight import FieldOfView
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.person_parameters import PersonParameters
 
 
 @dataclass(frozen=True)

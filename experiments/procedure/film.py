@@ -12,10 +12,10 @@ from experiments.procedure.camera_path import CameraPath, camera_path
 from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.caption import Captions
-from mjsim.files import replacing
 from mjsim.model.house import compiled_house
-from mjsim.person_parameters import PICTURE_ASPECT, PersonParameters
 from mjsim.render import CameraPose, Renderer
+from mjsim.support.files import replacing
+from mjsim.values.person_parameters import PICTURE_ASPECT, PersonParameters
 
 FPS = 25
 MIN_DURATION = 1.0  # s

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from mjsim.files import replacing
 from mjsim.model.house import compiled_house
-from mjsim.person_parameters import PersonParameters
 from mjsim.render import CameraPose, Renderer, render_house_map
+from mjsim.support.files import replacing
+from mjsim.values.person_parameters import PersonParameters
 
 SIZE = (960, 640)  # px
 FIELD = math.radians(62.0)  # vertical; corners need a wider one than people have

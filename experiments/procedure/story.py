@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from experiments.errors import ConfigError
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 STORY_FILE = Path(__file__).with_name("story.md")
 READING_SPEED = 238.0  # words a minute (Brysbaert, Journal of Memory and Language 109, 2019)

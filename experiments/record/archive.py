@@ -20,7 +20,7 @@ from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.run_directory import PACKED, is_run
-from mjsim.files import MAX_INPUT, read_bytes, work_folder
+from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 
 WAIT_S = 60.0  # how long to wait for another process that changes the same archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"

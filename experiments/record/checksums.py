@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from experiments.errors import RecordError
-from mjsim.files import check_input, read_bytes, write_text_atomically
+from mjsim.support.files import check_input, read_bytes, write_text_atomically
 
 CHECKSUMS = "SHA256SUMS"
 _LINE = re.compile(r"([0-9a-f]{64})  ([^/\\]+)")

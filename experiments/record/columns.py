@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from experiments.record.files import TEXT, Layout
-from mjsim.actions import Move, Pick, Place, StepAction
-from mjsim.errors import ActionError
-from mjsim.observation import ObjectStatus
-from mjsim.steps import States
+from mjsim.values.actions import Move, Pick, Place, StepAction
+from mjsim.values.errors import ActionError
+from mjsim.values.observation import ObjectStatus
+from mjsim.values.steps import States
 from mjsim.world_state import WorldState
 
 OBJECTS = -1  # in a shape: the number of objects

@@ -6,7 +6,7 @@ import msgspec
 
 from experiments.errors import RecordError
 from experiments.record.events import TYPES, LoggedEvent
-from mjsim.actions import EventKind
+from mjsim.values.actions import EventKind
 
 
 class OutcomeEvent(LoggedEvent, frozen=True):

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from mjsim.actions import Refusal
+from mjsim.values.actions import Refusal
 from planner.plan import Status, VisitKind
 
 Seconds = Annotated[float, msgspec.Meta(ge=0.0)]

@@ -12,7 +12,7 @@ from experiments.record.files import save_arrays, write_json
 from experiments.record.metrics import measure
 from experiments.record.reader import Record
 from experiments.record.run_directory import free_name
-from mjsim.files import replacing
+from mjsim.support.files import replacing
 
 NOTHING_FILMED = "none: nothing was filmed"  # in place of the renderer's name
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.files import check_input, read_text, replacing, write_text_atomically
-from mjsim.files import read_json as strict_json
+from mjsim.support.files import check_input, read_text, replacing, write_text_atomically
+from mjsim.support.files import read_json as strict_json
 
 # NumPy's name of an array's type (or `TEXT`), and its shape; None where any length will do.
 Layout = tuple[str, tuple[int | None, ...]]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.record.columns import HEALTH
 from experiments.record.records import Event
-from mjsim.actions import EventKind
+from mjsim.values.actions import EventKind
 
 # Name in the metrics -> kind of event.
 COUNTED = {

@@ -12,7 +12,7 @@ from experiments.record.health import summarise_health
 from experiments.record.origin import is_simulated
 from experiments.record.phases import FLYTHROUGH
 from experiments.record.records import PARTICIPANT, PHASE_ENDED, Event
-from mjsim.motion_parameters import GROUPS
+from mjsim.values.motion_parameters import GROUPS
 
 REGRETFUL = 0.01  # m; smaller regrets are ties
 COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`

@@ -26,12 +26,12 @@ from experiments.record.event_check import check_event
 from experiments.record.files import read_arrays
 from experiments.record.journal import Entry, Header
 from experiments.record.records import Event, EventLog
-from mjsim.actions import StepAction
-from mjsim.episode import Episode
-from mjsim.errors import EpisodeError, PersonError
-from mjsim.files import read_bytes
-from mjsim.observation import Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.files import read_bytes
+from mjsim.values.actions import StepAction
+from mjsim.values.episode import Episode
+from mjsim.values.errors import EpisodeError, PersonError
+from mjsim.values.observation import Observation
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world_state import WorldState
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 # 7: groups of a person's values. 6: the participant. 5: distances between places, ties, gaps of suggestions.
 # 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.

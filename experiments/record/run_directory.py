@@ -10,7 +10,7 @@ from pathlib import Path
 from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.checksums import CHECKSUMS, write_checksums
-from mjsim.files import exchange, work_folder
+from mjsim.support.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way
 SAMPLE = 100  # number of folders in a batch that are looked into; looking into all takes long over a network

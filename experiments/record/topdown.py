@@ -16,11 +16,11 @@ from experiments.house import House
 from experiments.record.records import Event
 from hud.text import Typeface
 from hud.theme import Face
-from mjsim.episode import Episode
-from mjsim.files import replacing
-from mjsim.kernels import cache_base
-from mjsim.observation import Observation
-from mjsim.sources import source_digest
+from mjsim.support.files import replacing
+from mjsim.support.kernels import cache_base
+from mjsim.support.sources import source_digest
+from mjsim.values.episode import Episode
+from mjsim.values.observation import Observation
 
 # Okabe-Ito colours, distinct for all common kinds of colour vision.
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")

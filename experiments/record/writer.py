@@ -12,11 +12,11 @@ from experiments.record.columns import HEALTH, STATUSES, row_type, state_columns
 from experiments.record.journal import Checkpoint, Entry, Journal
 from experiments.record.reader import Record, assemble
 from experiments.record.records import EventLog
-from mjsim.actions import Move, Pick, StepAction
-from mjsim.episode import Episode
 from mjsim.health.values import HealthSample
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.steps import Steps
+from mjsim.values.actions import Move, Pick, StepAction
+from mjsim.values.episode import Episode
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.steps import Steps
 from mjsim.world import World
 from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
 

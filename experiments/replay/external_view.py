@@ -11,10 +11,10 @@ from experiments.session.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3
 from mjsim.model.scene import Scene
-from mjsim.observation import Observation
-from mjsim.person_parameters import PersonParameters
 from mjsim.render import CameraPose, LayeredRenderer
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS
+from mjsim.values.observation import Observation
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world import World
 
 # Simulated time, s -> where the camera is.

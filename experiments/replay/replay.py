@@ -20,9 +20,9 @@ from experiments.session.film_config import CAMERAS, FIRST_PERSON, FREE, FilmCon
 from experiments.session.first_person import Filming, FirstPersonRenderer
 from experiments.session.video import VideoWriter
 from experiments.session.viewer import Viewer
-from mjsim.errors import AssetError
-from mjsim.files import replacing
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.files import replacing
+from mjsim.values.errors import AssetError
+from mjsim.values.person_parameters import PersonParameters
 
 MAX_WIDTH = 1280  # px of the picture in a film of what a page showed
 

@@ -17,10 +17,10 @@ from experiments.session.endings import COMPLETE, PHYSICS_ERROR
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
 from experiments.session.viewer import Viewer
-from mjsim.errors import ActionError, PhysicsError, StateError
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
-from mjsim.steps import Steps
+from mjsim.values.errors import ActionError, PhysicsError, StateError
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import Steps
 from mjsim.world import World
 from planner.regret import RegretEvaluator
 from planner.service import Planner

@@ -17,10 +17,10 @@ from hud.conditions import condition
 from hud.markers import BREADCRUMB, GOAL
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.actions import EventKind, WorldEvent
-from mjsim.episode import Episode
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.options import WorldOptions
+from mjsim.values.actions import EventKind, WorldEvent
+from mjsim.values.episode import Episode
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.options import WorldOptions
 from planner.plan import Visit, VisitKind
 from planner.route import XY, TaskState
 from planner.service import Planner

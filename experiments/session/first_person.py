@@ -17,12 +17,12 @@ from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.errors import RenderError
 from mjsim.model.avatar import EYE
 from mjsim.model.scene import Scene
-from mjsim.observation import Observation
 from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
 from mjsim.render.cameras import CameraPose
+from mjsim.values.errors import RenderError
+from mjsim.values.observation import Observation
 from mjsim.world import World
 
 

@@ -9,7 +9,6 @@ from experiments.participants.base import Choice, Guidance, Percept, Point, posi
 from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
-from mjsim.actions import ActionResult
 from mjsim.model.drawn_state import drawn_state
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.sight import (
@@ -20,7 +19,8 @@ from mjsim.model.sight import (
     visible_receptacles,
     visible_shares,
 )
-from mjsim.observation import ObjectStatus, Observation
+from mjsim.values.actions import ActionResult
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world import World
 
 

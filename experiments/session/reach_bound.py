@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 
 from experiments.house import House
-from mjsim.episode import Episode
 from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.values.episode import Episode
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from experiments.record.records import Event
 from experiments.session.assistant import Assistant
-from mjsim.actions import EventKind, WorldEvent
-from mjsim.observation import Observation
+from mjsim.values.actions import EventKind, WorldEvent
+from mjsim.values.observation import Observation
 
 WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 # that come from outside of the simulation

@@ -15,10 +15,10 @@ from experiments.session.signals import signal_of
 from experiments.session.user_code import decide, needs_of
 from experiments.session.viewer import OnProgress, Progress, Viewer
 from hud.state import HudState
-from mjsim.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
-from mjsim.errors import PhysicsError
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.steps import Steps
+from mjsim.values.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
+from mjsim.values.errors import PhysicsError
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.steps import Steps
 from mjsim.world import World
 
 FINAL_HOLD = 1.6  # s that the session is shown after the last delivery

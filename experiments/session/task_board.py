@@ -15,9 +15,9 @@ from hud.messages import fade, message
 from hud.projection import CameraView
 from hud.state import Message, Vec3
 from hud.task import Alternative, KnownPlan, PlanAhead, TaskObject, TaskReceptacle, TaskStep, TaskView
-from mjsim.episode import CAPACITY, Episode
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import CAPACITY, Episode
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
 from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route

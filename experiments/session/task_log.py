@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.record.records import EventLog
 from experiments.session.reach_bound import reach_bound
-from mjsim.episode import Episode
+from mjsim.values.episode import Episode
 from planner.plan import Status, Visit, VisitKind
 from planner.route import Route, TaskState
 from planner.service import Planner

@@ -21,8 +21,8 @@ from hud.errors import SchemaError
 from hud.schema import check_state
 from hud.state import HudState
 from hud.task import TaskView
-from mjsim.actions import Action
-from mjsim.errors import PhysicsError, RenderError
+from mjsim.values.actions import Action
+from mjsim.values.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
 LONGEST_LIMIT = 1e6  # s

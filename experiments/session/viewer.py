@@ -6,7 +6,7 @@ from typing import Protocol
 
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.observation import Observation
+from mjsim.values.observation import Observation
 from mjsim.world import World
 
 

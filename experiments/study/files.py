@@ -18,7 +18,7 @@ from experiments.record.run_directory import check_file
 from experiments.study.analysis import Analysis, Test, tests_of
 from experiments.study.table import FILES, PEOPLE, REPORT, STATISTICS, TESTS, StudyTable
 from experiments.trials.trial_config import SEEDS
-from mjsim.files import replacing, write_text_atomically
+from mjsim.support.files import replacing, write_text_atomically
 
 TEST_COLUMNS = (
     *("origin", "measure", "column", "test", "effect", "objects", "statistic", "df1", "df2", "people", "p"),

@@ -19,7 +19,7 @@ from experiments.analysis.statistics.power import power_of
 from experiments.errors import ConfigError, StatisticsError
 from experiments.study.analysis import random_factors
 from experiments.study.table import StudyTable
-from mjsim.files import replacing
+from mjsim.support.files import replacing
 
 SLOPE = "house x assistance"
 

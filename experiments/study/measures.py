@@ -14,7 +14,7 @@ from experiments.record.displays import Displays
 from experiments.record.metrics import CIRCUMSTANCES, Metrics
 from experiments.study.designs import FOLDER
 from experiments.trials.trial_config import SETTINGS
-from mjsim.files import read_bytes
+from mjsim.support.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
 SHOWN = 20  # columns in a sentence

@@ -22,7 +22,7 @@ from experiments.record.run_directory import TRIALS, is_run
 from experiments.record.topdown import PLANNED, WALKED, planned_path
 from experiments.study.figures import svg
 from experiments.study.table import StudyTable
-from mjsim.episode import Episode
+from mjsim.values.episode import Episode
 
 WIDTH = 4.0  # inches of a panel
 DISTANCE = "distance"

@@ -27,7 +27,7 @@ from experiments.study.figures import answers, by_condition, interactions, varia
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.study.paths import paths_figure
 from experiments.study.robustness import Selection
-from mjsim.errors import MjsimError
+from mjsim.values.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"
 CAUTION = (

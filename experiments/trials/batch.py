@@ -31,8 +31,8 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor, Pools
-from mjsim.files import remove_leftovers, work_folder
 from mjsim.model.house import MAX_HOUSES
+from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
 RETRIES = 5  # maximum number of machines that a trial loses before it is run alone

@@ -15,14 +15,14 @@ from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
-from mjsim.episode import POINTS, Episode
-from mjsim.errors import EpisodeError, PersonError
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import MAX_HOUSES
 from mjsim.model.house_ref import parse_house
 from mjsim.model.scene import compose
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.errors import EpisodeError, PersonError
+from mjsim.values.person_parameters import PersonParameters
 from planner.solver import solver
 
 Houses = Callable[[str], House]

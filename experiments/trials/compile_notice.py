@@ -7,7 +7,7 @@ from pathlib import Path
 
 from numba.core.event import Event, Listener, register
 
-from mjsim.kernels import cache_base, cache_folder
+from mjsim.support.kernels import cache_base, cache_folder
 
 NOTICE = "compiling numeric code that no command has used since the last update; this takes up to a minute"
 NOT_KEPT = (

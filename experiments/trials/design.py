@@ -22,9 +22,9 @@ from experiments.trials.trial_config import (
     TrialConfig,
     episode_settings,
 )
-from mjsim.files import read_text
 from mjsim.model.generated_names import generated_names, is_generated
 from mjsim.model.house_ref import parse_house
+from mjsim.support.files import read_text
 
 MAX_NUMBERS = 1_000_000
 

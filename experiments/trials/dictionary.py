@@ -11,8 +11,8 @@ from experiments.record.displays import Displays
 from experiments.record.health import COUNTED
 from experiments.record.metrics import Metrics
 from experiments.trials.trial_config import SETTINGS, TrialConfig
-from mjsim.motion_parameters import GROUPS
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.motion_parameters import GROUPS
+from mjsim.values.person_parameters import PersonParameters
 
 Columns = dict[str, tuple[str, str]]  # type and description, by name
 

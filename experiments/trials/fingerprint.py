@@ -17,9 +17,9 @@ from experiments.participants import participant_names
 from experiments.procedure.story import story_text
 from experiments.record.phases import STORY
 from experiments.trials.trial_config import PATHS, TrialConfig
-from mjsim.files import read_bytes
 from mjsim.model.catalogue import Catalogue
-from mjsim.sources import PACKAGES, digest_of, source_digest
+from mjsim.support.files import read_bytes
+from mjsim.support.sources import PACKAGES, digest_of, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
 # Code on which the record of a trial depends; what only looks at records is not here.

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from experiments.errors import ConfigError
 from experiments.participants.behaviour import Parameter, draw, quantiles
 from experiments.participants.distribution import Distributions
-from mjsim.errors import PersonError
-from mjsim.motion_parameters import GROUPS
-from mjsim.person_parameters import RANGES, PersonParameters
+from mjsim.values.errors import PersonError
+from mjsim.values.motion_parameters import GROUPS
+from mjsim.values.person_parameters import RANGES, PersonParameters
 
 if TYPE_CHECKING:
     import numpy as np

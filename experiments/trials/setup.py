@@ -24,10 +24,10 @@ from experiments.session.viewer import Viewer
 from experiments.trials.fingerprint import fingerprint, trial_inputs
 from experiments.trials.person import check_person, drawn_person
 from experiments.trials.trial_config import TrialConfig
-from mjsim.episode import Episode
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import Episode
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.exact.solver import ExactSolver
 from planner.regret import RegretEvaluator

@@ -12,7 +12,7 @@ import pyarrow.parquet
 from experiments.errors import RecordError
 from experiments.record.origin import is_simulated
 from experiments.trials.trial_config import SEEDS
-from mjsim.files import check_input, replacing
+from mjsim.support.files import check_input, replacing
 
 NAME = "trials"
 _TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # equal for equal trials

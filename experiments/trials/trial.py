@@ -34,10 +34,10 @@ from experiments.trials.setup import (
 )
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
-from mjsim.errors import PhysicsError
-from mjsim.files import work_folder
 from mjsim.model.scene import Scene, compose
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.files import work_folder
+from mjsim.values.errors import PhysicsError
+from mjsim.values.person_parameters import PersonParameters
 from planner.service import Planner
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.distribution import Distributions
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person, view_limits
-from mjsim.episode import CAPACITY, POINTS, Episode
 from mjsim.model.house_ref import parse_house
-from mjsim.options import CAPACITIES, FIDELITIES, WorldOptions
+from mjsim.values.episode import CAPACITY, POINTS, Episode
+from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER
 
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes

@@ -12,10 +12,10 @@ from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names
-from mjsim.actions import WAIT, FollowPath, Move, Pick, Place
-from mjsim.episode import Episode, PlacedObject, StartPose
 from mjsim.model.scene import Scene, compose
-from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
+from mjsim.values.episode import Episode, PlacedObject, StartPose
+from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.world import World
 from planner.exact.solver import ExactSolver
 from planner.exact.warm_start import NOTHING_KNOWN

@@ -11,9 +11,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from mjsim.actions import Action, ActionResult, Move, Pick, Place, Refusal
-from mjsim.observation import Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import Action, ActionResult, Move, Pick, Place, Refusal
+from mjsim.values.observation import Observation
+from mjsim.values.person_parameters import PersonParameters
 
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # of the highest speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # rad

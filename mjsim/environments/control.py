@@ -12,10 +12,10 @@ from typing import Any, Protocol
 import numpy as np
 from dm_env import specs
 
-from mjsim.actions import IDLE, Action, Move, Pick, Place
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.errors import ActionError
-from mjsim.observation import Observation
+from mjsim.values.actions import IDLE, Action, Move, Pick, Place
+from mjsim.values.errors import ActionError
+from mjsim.values.observation import Observation
 from mjsim.world import StepResult, World
 
 Steps = Generator[Action, StepResult, None]

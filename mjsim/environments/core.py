@@ -11,7 +11,6 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind
 from mjsim.environments.control import Control
 from mjsim.environments.episodes import CompiledEpisode, EpisodeCache
 from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError
@@ -19,8 +18,9 @@ from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
 from mjsim.environments.sensors import SENSORS, Sensor, SensorInput
 from mjsim.environments.sensors.vision import visible_pixels
-from mjsim.errors import ActionError, PhysicsError, SamplingError
-from mjsim.observation import ObjectStatus, Observation
+from mjsim.values.actions import EventKind
+from mjsim.values.errors import ActionError, PhysicsError, SamplingError
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]

@@ -9,14 +9,14 @@ import numpy as np
 
 from mjsim.diagnostics import INSTALL_DM_CONTROL
 from mjsim.environments.errors import ViewerError
-from mjsim.episode import Episode
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
-from mjsim.person_parameters import PersonParameters
 from mjsim.render import Labels, Renderer
+from mjsim.values.episode import Episode
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world import World
 
 _COUNT_STREAM = 41  # draws the number of objects independently of what the seed decides in the house

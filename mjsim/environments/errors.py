@@ -1,6 +1,6 @@
 """Errors of the environments."""
 
-from mjsim.errors import MjsimError
+from mjsim.values.errors import MjsimError
 
 
 class EnvironmentConfigError(MjsimError):

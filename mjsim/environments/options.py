@@ -14,12 +14,12 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
-from mjsim.episode import POINTS, Episode
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigableBuilder
-from mjsim.options import WorldOptions
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 
 T = TypeVar("T")
 

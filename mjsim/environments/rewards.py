@@ -7,9 +7,9 @@ from typing import Protocol
 import numpy as np
 
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.episode import CAPACITY
 from mjsim.model.scene import Scene
-from mjsim.observation import ObjectStatus, Observation
+from mjsim.values.episode import CAPACITY
+from mjsim.values.observation import ObjectStatus, Observation
 
 HANDLING_TIME = 2.0  # s, about what a pick or a place takes
 

@@ -20,7 +20,6 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from mjsim.episode import Episode
 from mjsim.importing.houses.gltf import RECEPTACLE, SEMANTICS
 from mjsim.importing.houses.meshes import Y_TO_Z
 from mjsim.importing.houses.mjcf import read_mjcf
@@ -29,7 +28,8 @@ from mjsim.importing.surface import Floats
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.model_files import read_model
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import Episode
+from mjsim.values.person_parameters import PersonParameters
 
 _UPRIGHT = np.linalg.inv(Y_TO_Z)
 _CEILING = 2.6  # m, of regions

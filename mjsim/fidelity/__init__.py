@@ -6,7 +6,7 @@ Serves `mjsim.world.World`, which hides the tier behind one interface.
 from mjsim.fidelity.event import Event
 from mjsim.fidelity.full import Full
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
+from mjsim.values.options import WorldOptions
 
 __all__ = ["make_tier"]
 

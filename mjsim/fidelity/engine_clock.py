@@ -5,7 +5,7 @@ from typing import Any
 
 import mujoco
 
-from mjsim.kernels import c_function
+from mjsim.support.kernels import c_function
 
 
 def stop_engine_clock() -> None:

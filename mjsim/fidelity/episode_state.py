@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind, WorldEvent
-from mjsim.errors import StateError
 from mjsim.health.monitor import HealthState
-from mjsim.inventory import Inventory
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.observation import ObjectStatus, Observation
+from mjsim.values.actions import EventKind, WorldEvent
+from mjsim.values.errors import StateError
+from mjsim.values.inventory import Inventory
+from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world_state import PersonState, StateDetails
 
 Floats = NDArray[np.float64]

@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal, StepAction
 from mjsim.fidelity.body_state import PITCH, VX, VY, X
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import TIME
@@ -16,9 +15,10 @@ from mjsim.fidelity.motion_planner import MotionPlanner, PlannedMotion
 from mjsim.fidelity.tier import Tier
 from mjsim.health.values import Health, HealthSample
 from mjsim.model.scene import Scene
-from mjsim.observation import Observation
-from mjsim.options import WorldOptions
-from mjsim.steps import States, Steps
+from mjsim.values.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal, StepAction
+from mjsim.values.observation import Observation
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import States, Steps
 from mjsim.walking.path_following import Walk
 from mjsim.world_state import WorldState
 

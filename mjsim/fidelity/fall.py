@@ -7,14 +7,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind
 from mjsim.fidelity.body_state import FORWARD, HEADING, SERVO, TURN_RATE, VX, VY, X, Y
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.fidelity.kinematic_world import KinematicWorld
 from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.options import REST_STEPS
 from mjsim.person.rig import RigState
+from mjsim.values.actions import EventKind
+from mjsim.values.options import REST_STEPS
 
 _SETTLING_TIME = 1.0  # s, for other objects that still move when the released one has come to rest
 

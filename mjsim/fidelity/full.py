@@ -6,18 +6,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
-from mjsim.errors import ActionError, StateError
 from mjsim.fidelity.engine_clock import stop_engine_clock
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.fidelity.tier import Tier
 from mjsim.health.monitor import HealthMonitor
 from mjsim.health.values import Health, HealthSample
-from mjsim.inventory import LEFT, RIGHT
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.options import WorldOptions
 from mjsim.person.carrying import Carrying
 from mjsim.person.feasibility import resolve_pick, resolve_place
 from mjsim.person.grips import Grips
@@ -25,6 +20,11 @@ from mjsim.person.person import Motion, Person
 from mjsim.person.picking import pick
 from mjsim.person.placing import place
 from mjsim.person.rig import Rig
+from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
+from mjsim.values.errors import ActionError, StateError
+from mjsim.values.inventory import LEFT, RIGHT
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.options import WorldOptions
 from mjsim.world_state import PersonState, StateHash, WorldState, set_physics, take_physics
 
 # The next object may push a delivered one a little; farther out than this it has left its receptacle.

@@ -10,12 +10,12 @@ from mjsim.fidelity import kinematics
 from mjsim.fidelity.body_state import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.trunk_contact import Floor
-from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField
-from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.load_room import BodyMotion
 from mjsim.person.postures import Contacts, Hands, Holding, update_hands
-from mjsim.steps import States
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import CarryingParameters
+from mjsim.values.steps import States
 from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, later_step, next_step
 
 Floats = NDArray[np.float64]

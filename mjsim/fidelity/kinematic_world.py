@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import StateError
 from mjsim.fidelity.body_state import LOOK
 from mjsim.fidelity.full import Full
 from mjsim.fidelity.kinematic_steps import (
@@ -24,13 +23,14 @@ from mjsim.fidelity.kinematic_steps import (
 from mjsim.fidelity.kinematics import Gait
 from mjsim.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.fidelity.trunk_contact import Floor
-from mjsim.inventory import LEFT
 from mjsim.model import avatar
 from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
 from mjsim.person.grips import AWAKE
-from mjsim.steps import States
+from mjsim.values.errors import StateError
+from mjsim.values.inventory import LEFT
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import States
 from mjsim.walking.path_following import Walk
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.

@@ -29,11 +29,11 @@ from mjsim.fidelity.body_state import (
     Y,
 )
 from mjsim.fidelity.trunk_contact import Floor, is_clear, slide
-from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
 from mjsim.person import rate_limits
+from mjsim.support.kernels import kernel
+from mjsim.values.options import WorldOptions
 
 
 class Gait(NamedTuple):

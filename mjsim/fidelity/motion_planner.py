@@ -1,4 +1,4 @@
-"""Picks and places computed without physics, with the times and speeds of `mjsim.person_parameters`.
+"""Picks and places computed without physics, with the times and speeds of `mjsim.values.person_parameters`.
 
 Only the fall of a released object is physics. Success is decided by the same test as in `mjsim.person.placing`.
 """
@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import ActionResult, EventKind, Place
 from mjsim.fidelity import motion_primitives
 from mjsim.fidelity.body_state import FORWARD, HEADING, X, Y
 from mjsim.fidelity.fall import Fall, drop
@@ -23,6 +22,7 @@ from mjsim.person.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.person.load_room import BodyMotion
 from mjsim.person.placing import hover_height, square_heading
 from mjsim.person.slots import LoadExtent, Slot, best_slot, object_corners
+from mjsim.values.actions import ActionResult, EventKind, Place
 
 Vector = NDArray[np.float64]
 

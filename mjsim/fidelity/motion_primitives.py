@@ -22,10 +22,10 @@ from mjsim.fidelity.kinematic_steps import (
     write_row,
 )
 from mjsim.fidelity.kinematics import Gait
-from mjsim.kernels import kernel
-from mjsim.motion_parameters import MotionParameters
 from mjsim.person.hand_path import progress
-from mjsim.steps import States
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import MotionParameters
+from mjsim.values.steps import States
 
 Floats = NDArray[np.float64]
 

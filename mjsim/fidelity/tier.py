@@ -7,12 +7,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
-from mjsim.errors import PhysicsError
 from mjsim.fidelity.episode_state import EpisodeState
 from mjsim.health.values import HealthSample
-from mjsim.observation import Observation
-from mjsim.steps import States, Steps
+from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
+from mjsim.values.errors import PhysicsError
+from mjsim.values.observation import Observation
+from mjsim.values.steps import States, Steps
 from mjsim.walking.path_following import ARRIVED, BLOCKED, CHANGED, WALKING, Walk, plain, step_from_python
 
 

@@ -9,8 +9,8 @@ import shapely
 from numpy.typing import NDArray
 
 from mjsim.fidelity.body_state import VX, VY, X, Y
-from mjsim.kernels import kernel
 from mjsim.model.footprint import footprint
+from mjsim.support.kernels import kernel
 
 _TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
 _MAX_STEP = 0.05  # m; a disc of 0.20 m cannot jump over a wall in steps of this length

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind
 from mjsim.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.health.settle_times import SettlingObject
 from mjsim.model.rays import first_hit, moving_geoms
 from mjsim.model.scene import Scene
+from mjsim.values.actions import EventKind
 
 CHECK_DISTANCE = 0.02  # m from its anchor, beyond which an object's path is checked
 

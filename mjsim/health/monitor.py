@@ -12,16 +12,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import EventKind
-from mjsim.errors import PhysicsError
 from mjsim.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
 from mjsim.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
 from mjsim.health.settle_times import SettleTimer, SettleTimerState
 from mjsim.health.values import QUIET, Health, HealthSample
 from mjsim.model.scene import Scene
-from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
 from mjsim.person.rig import Rig
+from mjsim.values.actions import EventKind
+from mjsim.values.errors import PhysicsError
+from mjsim.values.options import WorldOptions
 
 _KICK = 2.0  # times the walking speed: a light object that bounces off a walking person
 _FALL = 5.6  # m/s, from the height at which objects are carried

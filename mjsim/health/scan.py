@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.house import compiled_house
 from mjsim.model.rooms import nearest_rectangle
 from mjsim.model.scene import Scene
 from mjsim.person.grips import site_angle, site_gap
+from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjsim.health.scan import PUSHED, SLOW
 from mjsim.model.scene import Scene
-from mjsim.options import REST_STEPS
+from mjsim.values.options import REST_STEPS
 
 
 @dataclass

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mjsim.errors import HouseError
 from mjsim.houses.decorate import decorate
 from mjsim.houses.furniture.builder import Builder
 from mjsim.houses.furniture.catalogue import KINDS
@@ -17,6 +16,7 @@ from mjsim.houses.space import UNUSED, Place, Space
 from mjsim.houses.usual import LITTLE, MOST_PLANTS, MUSTS, OFTEN, PLANTS, ROUNDS, SHARES, USUAL
 from mjsim.houses.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
 SIZES = 4  # a piece is made so often, each time smaller, for a lack of space

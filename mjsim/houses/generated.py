@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from mjsim.errors import HouseError
 from mjsim.houses.files import write_files
 from mjsim.houses.furnish import furnish
 from mjsim.houses.openings import open_up
@@ -14,6 +13,7 @@ from mjsim.houses.recipe import RECIPE, Recipe
 from mjsim.houses.values import FloorPlan, Furnishing
 from mjsim.model.generated_names import VERSION
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
 
 ATTEMPTS = 40  # plans
 # Bins that every home has, and those that larger homes have besides.

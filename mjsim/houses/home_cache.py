@@ -7,17 +7,17 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-from mjsim.errors import HouseError
-from mjsim.files import work_folder
 from mjsim.houses.files import STYLE
 from mjsim.houses.recipe import Recipe, read_recipe
-from mjsim.kernels import cache_base
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.catalogue_files import MAX_EXTENDS, base_of
 from mjsim.model.generated_names import parse_name
 from mjsim.model.house_ref import CATALOGUE, HouseRef, parse_house
-from mjsim.sources import digest_of
+from mjsim.support.files import work_folder
+from mjsim.support.kernels import cache_base
+from mjsim.support.sources import digest_of
+from mjsim.values.errors import HouseError
 
 # Modules outside the generator that a home follows from.
 _BESIDES = ("model/generated_names.py", "support/random_streams.py")

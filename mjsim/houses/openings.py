@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjsim.errors import HouseError
 from mjsim.houses.programme import DOOR, NEEDS, Programme, Way
 from mjsim.houses.values import (
     OUTER_WALL,
@@ -20,6 +19,7 @@ from mjsim.houses.values import (
     Window,
 )
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
 
 CLEAR, CLEAR_FRONT = 0.92, 0.95  # m, width of doors
 WIDE_CLEAR = (1.4, 1.6, 1.8)  # m, of passages

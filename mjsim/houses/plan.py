@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from ortools.sat.python import cp_model
 
-from mjsim.errors import HouseError
 from mjsim.houses.programme import NEEDS, Programme, draw_programme, use_of
 from mjsim.houses.values import WALL, Rectangle, Room
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
 
 GRID = 0.2  # m
 TRIES = 500  # programmes

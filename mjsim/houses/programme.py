@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjsim.errors import HouseError
 from mjsim.model.generated_names import ROOMS
+from mjsim.values.errors import HouseError
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import msgspec
 
-from mjsim.errors import HouseError
-from mjsim.files import read_bytes
 from mjsim.houses.values import FloorPlan
 from mjsim.model.generated_names import PREFIX, GeneratedName, check_version
+from mjsim.support.files import read_bytes
+from mjsim.values.errors import HouseError
 
 RECIPE = "recipe.json"
 

@@ -5,7 +5,7 @@ For users of `mjsim import` (docs/import.md); needs the extra `import`.
 
 from importlib.util import find_spec
 
-from mjsim.errors import AssetError
+from mjsim.values.errors import AssetError
 
 EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "PIL", "trimesh", "yaml")
 

@@ -18,8 +18,8 @@ from typing import Any, NoReturn
 import msgspec
 import numpy as np
 
-from mjsim.errors import EpisodeError, brief
-from mjsim.files import MAX_INPUT, read_bytes
+from mjsim.support.files import MAX_INPUT, read_bytes
+from mjsim.values.errors import EpisodeError, brief
 
 MOVED = 0.05  # m; RoomR's objects differ by less between two simulations of the same pose
 HOUSE = 60.0  # m; objects that fell out of the scene are farther away

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mjsim.errors import AssetError
-from mjsim.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
@@ -20,6 +18,8 @@ from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.house_ref import CATALOGUE, parse_house
+from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
+from mjsim.values.errors import AssetError
 
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
 _SLOTS = 2  # places along each side of a bin where a hand puts things beside each other (mjsim.person.slots)

@@ -9,10 +9,10 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
 from mjsim.importing.look import Look
 from mjsim.importing.object_import import ImportedObject
 from mjsim.importing.surface import Floats
+from mjsim.values.errors import AssetError
 
 MODEL = "object.xml"
 _ROLLING = "1 0.02 0.02"  # friction of what would roll: slide, spin, roll

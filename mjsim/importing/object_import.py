@@ -7,7 +7,6 @@ import numpy as np
 import trimesh
 from trimesh.transformations import translation_matrix
 
-from mjsim.errors import AssetError
 from mjsim.importing.grip import Grip, find_grip
 from mjsim.importing.look import Look, make_look
 from mjsim.importing.parts import Parts, convex_parts
@@ -19,6 +18,7 @@ from mjsim.importing.surface import Floats, Surface, cleaned
 from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.importing.weight import Weight, weigh
 from mjsim.model.validation.object_rules import SIZE
+from mjsim.values.errors import AssetError
 
 _COARSE = 0.005  # of the longest side, greatest distance between numbers of 32 bits
 _FAR = 10.0  # longest sides from the origin, from where on the report says so

@@ -13,9 +13,9 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.resolvers import FilePathResolver
 
-from mjsim.errors import AssetError
-from mjsim.files import check_input
 from mjsim.importing.surface import Floats, Surface, joined
+from mjsim.support.files import check_input
+from mjsim.values.errors import AssetError
 
 SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # bytes

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS
 from mjsim.model.validation.object_rules import SIZE
+from mjsim.values.errors import AssetError
 
 MIN_SIDE, MAX_SIDE = SIZE
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from mjsim.errors import AssetError
 from mjsim.importing.surface import Floats
 from mjsim.model.validation.object_rules import MASS
+from mjsim.values.errors import AssetError
 
 MIN_MASS, MAX_MASS = MASS
 DENSITY = 400.0  # kg/m^3, between cloth and hollow plastic, and wood

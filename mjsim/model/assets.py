@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mjsim.errors import AssetError
+from mjsim.values.errors import AssetError
 
 
 def models_root() -> Path:

@@ -21,9 +21,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.model.hand_look import draw_hand
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.errors import AssetError
+from mjsim.values.person_parameters import PersonParameters
 
 STATIC_BIT = 1
 OBJECT_BIT = 4

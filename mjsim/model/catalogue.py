@@ -7,13 +7,13 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
-from mjsim.episode import POINTS
-from mjsim.errors import AssetError, brief
-from mjsim.files import is_file
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue_files import catalogue_file, read_tables
 from mjsim.model.house_ref import HouseRef, parse_house
 from mjsim.model.model_files import content_hash
+from mjsim.support.files import is_file
+from mjsim.values.episode import POINTS
+from mjsim.values.errors import AssetError, brief
 
 T = TypeVar("T")
 

@@ -4,10 +4,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from mjsim.errors import AssetError, brief
-from mjsim.files import is_file, read_text
 from mjsim.model.assets import models_root
 from mjsim.model.house_ref import CATALOGUE, HouseRef, parse_house
+from mjsim.support.files import is_file, read_text
+from mjsim.values.errors import AssetError, brief
 
 MAX_EXTENDS = 20  # catalogues, each of which extends the next
 

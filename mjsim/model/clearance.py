@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from mjsim.kernels import kernel
 from mjsim.model.footprint import footprint
+from mjsim.support.kernels import kernel
 
 BORDER = 0.4  # m of grid around the rooms
 

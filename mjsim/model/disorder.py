@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mjsim.errors import EpisodeError, brief
-from mjsim.files import read_text
+from mjsim.support.files import read_text
+from mjsim.values.errors import EpisodeError, brief
 
 _COUNTS, _DISTANCES = 0, 1  # keys of the random streams
 

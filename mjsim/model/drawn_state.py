@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import mujoco
 
-from mjsim.errors import AssetError
-from mjsim.files import replacing, write_text_atomically
 from mjsim.model.scene import Scene
+from mjsim.support.files import replacing, write_text_atomically
+from mjsim.values.errors import AssetError
 
 ASSETS = "assets"
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from mjsim.errors import AssetError
 from mjsim.model.rooms import RoomMap
+from mjsim.values.errors import AssetError
 
 CIRCLE_SIDES = 32  # a circumscribed polygon covers 0.5 % of the radius too much, never too little
 

@@ -12,11 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.rays import Floats, Mask
 from mjsim.model.scene import Scene
 from mjsim.model.sight import large_boxes
-from mjsim.observation import Observation
+from mjsim.support.kernels import kernel
+from mjsim.values.observation import Observation
 
 CELL = 0.25  # m
 _MOVED = 1e-3  # m by which an object was moved

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlencode
 
-from mjsim.errors import HouseError
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
 
 PREFIX = "generated:"
 VERSION = 3  # of the generator; raise it with every change that alters the home of a seed

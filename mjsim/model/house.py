@@ -9,7 +9,6 @@ from typing import Any, TypeVar, cast
 
 import mujoco
 
-from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.footprint import Footprint, footprint
 from mjsim.model.model_files import read_model
@@ -17,6 +16,7 @@ from mjsim.model.navigable import NavigableFloor, installed_builder
 from mjsim.model.object_model import remove_visuals, separate_visuals
 from mjsim.model.receptacles import ReceptacleGeometry, receptacle_geometries
 from mjsim.model.rooms import RoomMap
+from mjsim.values.errors import AssetError
 
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05

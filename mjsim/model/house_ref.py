@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from mjsim.files import is_file
 from mjsim.model.assets import models_root
 from mjsim.model.generated_names import is_generated, parse_name
+from mjsim.support.files import is_file
 
 CATALOGUE = "catalogue.toml"
 

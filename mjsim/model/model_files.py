@@ -8,9 +8,9 @@ from pathlib import Path
 
 import mujoco
 
-from mjsim.errors import AssetError
-from mjsim.files import is_file, read_bytes
 from mjsim.model.assets import models_root
+from mjsim.support.files import is_file, read_bytes
+from mjsim.values.errors import AssetError
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.errors import SamplingError
+from mjsim.values.errors import SamplingError
 
 GROUP = "mjsim.navigable"
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.errors import AssetError
+from mjsim.values.errors import AssetError
 
 
 @dataclass(frozen=True, eq=False)

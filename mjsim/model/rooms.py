@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.errors import AssetError
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
+from mjsim.values.errors import AssetError
 
 PREFIX = "room:"
 

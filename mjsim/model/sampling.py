@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.episode import POINTS, Episode, PlacedObject, StartPose
-from mjsim.errors import SamplingError, brief
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.disorder import Disorder
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.settling import settle
 from mjsim.model.validation.validate import require_usable
+from mjsim.values.episode import POINTS, Episode, PlacedObject, StartPose
+from mjsim.values.errors import SamplingError, brief
 
 MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
 START_CLEARANCE = 0.5  # m, from the start to every object

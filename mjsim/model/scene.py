@@ -8,8 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.episode import Episode, PlacedObject
-from mjsim.errors import AssetError, EpisodeError
 from mjsim.model.avatar import attach_avatar
 from mjsim.model.bounding_volumes import tighten
 from mjsim.model.catalogue import Catalogue
@@ -19,7 +17,9 @@ from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.episode_rules import check_fit, check_overlaps, check_poses
 from mjsim.model.validation.findings import Finding, errors, one_line
 from mjsim.model.validation.validate import require_usable
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.errors import AssetError, EpisodeError
+from mjsim.values.person_parameters import PersonParameters
 
 T = TypeVar("T")
 

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.episode import Episode, PlacedObject
-from mjsim.errors import PhysicsError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.scene import Scene, compose
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.errors import PhysicsError
 
 REST_SPEED = 0.01  # m/s
 MAX_TIME = 6.0  # s

@@ -13,12 +13,12 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.drawn_state import drawn_state
 from mjsim.model.rays import DRAWN, RIM, Floats, Mask, first_hit, moving_geoms
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.scene import Scene
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.kernels import kernel
+from mjsim.values.person_parameters import PersonParameters
 
 INSET = 0.7  # of the half extents: box corners and face centres of round objects are empty
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.inventory import LEFT, RIGHT
-from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.house import compiled_house
 from mjsim.model.scene import Scene
-from mjsim.motion_parameters import CarryingParameters
 from mjsim.person.load_room import BodyMotion, drawn_in
 from mjsim.person.person import Person
 from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.person.slots import object_corners
 from mjsim.person.strain import count_strain
+from mjsim.support.kernels import kernel
+from mjsim.values.inventory import LEFT, RIGHT
+from mjsim.values.motion_parameters import CarryingParameters
 
 LOW, HIGH = 0.93, 1.60  # m, heights of carried objects
 

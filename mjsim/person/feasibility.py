@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjsim.actions import ActionResult, Pick, Place, Refusal
-from mjsim.inventory import Inventory
 from mjsim.model import avatar
 from mjsim.model.rays import receptacle_in_sight, sees
-from mjsim.observation import ObjectStatus
 from mjsim.person.person import Person
+from mjsim.values.actions import ActionResult, Pick, Place, Refusal
+from mjsim.values.inventory import Inventory
+from mjsim.values.observation import ObjectStatus
 
 _CHEST = 0.75  # of the eye's height
 

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
 from mjsim.person.rig import Rig, find_id
+from mjsim.support.kernels import kernel
 
 AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for ten physics steps or more
 

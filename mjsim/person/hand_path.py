@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 
 STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of a movement's two parts, horizontal and vertical
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.clearance import ClearanceField, clearance_at
-from mjsim.motion_parameters import CarryingParameters
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import CarryingParameters
 
 Floats = NDArray[np.float64]
 

@@ -8,19 +8,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import Move
-from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.motion_parameters import MotionParameters
-from mjsim.options import WorldOptions
 from mjsim.person.grips import Grips
 from mjsim.person.hand_path import point_between
 from mjsim.person.postures import move_hand, posture_pace
 from mjsim.person.rate_limits import change_pitch, change_turn_rate, change_velocity
 from mjsim.person.receptacle_heights import ReceptacleHeights
 from mjsim.person.rig import Rig
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.kernels import kernel
+from mjsim.values.actions import Move
+from mjsim.values.motion_parameters import MotionParameters
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.
 Motion = Generator[None, None, bool]

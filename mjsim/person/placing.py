@@ -5,12 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.options import REST_STEPS
 from mjsim.person.hand_path import STRAIGHT
 from mjsim.person.person import Motion, Person, Steps, wrap
 from mjsim.person.slots import Slot, best_slot, load_extent, object_corners
+from mjsim.support.kernels import kernel
+from mjsim.values.options import REST_STEPS
 
 Vector = NDArray[np.float64]
 

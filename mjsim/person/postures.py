@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
-from mjsim.motion_parameters import CarryingParameters, MotionParameters
 from mjsim.person.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion, drawn_in
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import CarryingParameters, MotionParameters
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 
 Command = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.rays import SOLID
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
-from mjsim.kernels import kernel
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
+from mjsim.values.errors import AssetError
 
 Vector = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.person.person import Person
+from mjsim.support.kernels import kernel
 
 Vector = NDArray[np.float64]
 

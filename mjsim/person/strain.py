@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
 from mjsim.person.grips import site_gap
+from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 

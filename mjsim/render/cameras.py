@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.errors import RenderError
 from mjsim.model.avatar import EYE
-from mjsim.person_parameters import PICTURE_ASPECT
+from mjsim.values.errors import RenderError
+from mjsim.values.person_parameters import PICTURE_ASPECT
 
 # Nearer than any surface gets to an eye inside a body of radius 0.2 m; farther than any view indoors.
 NEAR = 0.04

@@ -19,8 +19,8 @@ from typing import Any
 
 import mujoco
 
-from mjsim.errors import RenderError
-from mjsim.gl_choice import BACKENDS, DEFAULT, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.support.gl_choice import BACKENDS, DEFAULT, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.values.errors import RenderError
 
 EGL_REMEDY = (
     f"install an EGL driver, on Debian or Ubuntu: apt-get install {' '.join(EGL_PACKAGES)}; "

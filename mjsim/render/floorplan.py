@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.errors import RenderError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
@@ -16,6 +15,7 @@ from mjsim.render.context import current_context
 from mjsim.render.profiles import MAX_SIDE, RenderProfile
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS, Rasteriser
 from mjsim.render.scene_settings import DirectionalLight
+from mjsim.values.errors import RenderError
 
 _PAPER = 244  # grey level where there is no house
 # Above any house of one storey.

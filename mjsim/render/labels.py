@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import RenderError
 from mjsim.model.scene import Scene
+from mjsim.values.errors import RenderError
 
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"

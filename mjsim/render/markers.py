@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import RenderError
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import outside
+from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024
 # Most of a marker's colour is emitted and a little is lit, so that it reads as a solid but looks alike in every room.

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import Bounds
+from mjsim.support.kernels import inlined, kernel
 
 # Both in-plane half-sizes of a box that is worth testing against, m.
 _MIN_HALF_SIZE = 0.4

@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError, RenderError
 from mjsim.model.catalogue import Catalogue
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Rasteriser
 from mjsim.render.scene_settings import DirectionalLight
+from mjsim.values.errors import AssetError, RenderError
 
 SUPERSAMPLING = 3
 # Share of the picture's side that its subject fills.

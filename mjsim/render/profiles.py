@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mjsim.errors import RenderError
+from mjsim.values.errors import RenderError
 
 MAX_SIDE = 8192  # px, of a frame
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import RenderError
 from mjsim.render import context
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import Bounds, outside, without
@@ -24,6 +23,7 @@ from mjsim.render.scene_settings import (
     visual_option,
 )
 from mjsim.render.shadows import ContactShadows
+from mjsim.values.errors import RenderError
 
 FIRST_PERSON_GROUPS = (0, 1, 2)
 TOP_DOWN_GROUPS = (0, 2)

@@ -8,8 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.errors import RenderError
 from mjsim.render.profiles import MAX_SIDE, RenderProfile
+from mjsim.values.errors import RenderError
 
 _Flag = mujoco.mjtRndFlag
 

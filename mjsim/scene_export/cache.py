@@ -13,12 +13,12 @@ from pathlib import Path
 import cv2
 import mujoco
 
-from mjsim.files import WORK, replacing, work_folder
-from mjsim.kernels import UNUSED
 from mjsim.model.catalogue import Catalogue
 from mjsim.scene_export.export import export_scene, floor_json
 from mjsim.scene_export.store import GZIP
-from mjsim.sources import source_digest
+from mjsim.support.files import WORK, replacing, work_folder
+from mjsim.support.kernels import UNUSED
+from mjsim.support.sources import source_digest
 
 _LEVEL = 9
 _COMPRESSED = (".webp",)  # endings of files that are so already

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mjsim.kernels import cache_base
+from mjsim.support.kernels import cache_base
 
 GZIP = ".gz"  # ending of files that are stored compressed
 SCENE = "scene.json"  # the file that names the others

@@ -7,12 +7,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.render.profiles import FAST
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
 from mjsim.scene_export.cube_maps import laid_out
 from mjsim.scene_export.shapes import MESHES, Floats, Indices, Shape, shape_of
+from mjsim.values.errors import AssetError
 
 _OPAQUE_FROM = 0.995  # MuJoCo blends geoms of a lower alpha
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB

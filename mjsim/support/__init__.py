@@ -1,1 +1,1 @@
-"""Support that has nothing to do with houses: random streams."""
+"""Support for all other folders: files, kernels, random streams, digests of sources, the choice of GL."""

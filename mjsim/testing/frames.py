@@ -17,9 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import MjsimError
-from mjsim.files import replacing
 from mjsim.render import gl_info
+from mjsim.support.files import replacing
+from mjsim.values.errors import MjsimError
 
 UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
 CLOSE_ENOUGH = 45.0  # dB

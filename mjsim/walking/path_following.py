@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import TIME_TOLERANCE
-from mjsim.kernels import kernel
-from mjsim.motion_parameters import WalkingParameters
-from mjsim.person_parameters import PersonParameters
+from mjsim.support.kernels import kernel
+from mjsim.values.actions import TIME_TOLERANCE
+from mjsim.values.motion_parameters import WalkingParameters
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.polyline import AT_THE_END, Path, distance, path_length, point_along, project, rest_of
 
 ARRIVED_WITHIN = 0.06  # m from the end of its path, a walk is over

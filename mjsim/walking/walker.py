@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import IDLE, FollowPath, Move, Pick, Place, StepAction
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, FollowPath, Move, Pick, Place, StepAction
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.path_following import ARRIVED, BLOCKED, Obstacles, Pace, Walk, plain, step_from_python
 
 BACK_OFF = Move(forward=-0.4, left=0.3)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
+from mjsim.support.kernels import inlined, kernel
 from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
 from planner.exact.warm_start import Start

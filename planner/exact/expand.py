@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
+from mjsim.support.kernels import inlined, kernel
 from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among

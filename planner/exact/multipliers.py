@@ -6,7 +6,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 from planner.exact.deadline import NEVER, Deadline
 from planner.exact.instance import Instance
 from planner.exact.table import Table, new_table, rows_of

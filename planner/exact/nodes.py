@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
+from mjsim.support.kernels import inlined, kernel
 from planner.exact.table import INFINITE
 
 NO_PARENT = -1

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import inlined, kernel
+from mjsim.support.kernels import inlined, kernel
 from planner.exact import table as tables
 from planner.exact.instance import FAR, Instance
 from planner.exact.simd import LANES, min_plus, min_plus_each

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.kernels import kernel
+from mjsim.support.kernels import kernel
 from planner.exact.deadline import Deadline
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import Instance

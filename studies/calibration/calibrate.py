@@ -12,7 +12,7 @@ from experiments.participants.distribution import Distributions
 from experiments.record.origin import origin_of
 from experiments.study.table import StudyTable
 from experiments.trials.exclusions import LeftOut
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 from studies.calibration.inference import OBJECTS, Cells, Fit, Rows, fit
 from studies.calibration.population import FreeParameters
 from studies.calibration.surrogate import Surrogate, Values, learn

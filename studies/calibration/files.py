@@ -16,7 +16,7 @@ from experiments.analysis.page import Block, Paragraph, Picture, page, table
 from experiments.record.files import write_json
 from experiments.study.figures import svg
 from experiments.study.robustness import left_out_table
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 from studies.calibration.calibrate import Calibration, fitted_study
 from studies.calibration.inference import missed_orders
 

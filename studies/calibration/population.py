@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from experiments.participants.distribution import Distribution, Distributions, distribution
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 FILE = Path(__file__).parents[1] / "calibration.toml"
 Values = NDArray[np.float64]

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point, positions_of
 from experiments.participants.nearest import Nearest
-from mjsim.actions import IDLE, ActionResult, FollowPath, Move, Pick, StepAction
 from mjsim.environments.core import ObservationDict, Rearrangement
 from mjsim.model.scene import Scene
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, StepAction
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.walker import Walker
 
 Policy = Callable[[ObservationDict], NDArray[np.float32]]

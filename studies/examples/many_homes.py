@@ -25,7 +25,7 @@ from experiments.analysis.statistics.mixed import mixed_model
 from experiments.study.analysis import random_factors
 from experiments.study.measures import read_measures
 from experiments.study.table import StudyTable, read_study
-from mjsim.files import replacing
+from mjsim.support.files import replacing
 
 FIRST, SECOND = "none", "optimal"  # of the picture
 

@@ -36,7 +36,7 @@ from experiments.study.simulate import read_study, study_path
 from experiments.trials.batch import BatchProgress, run_batch
 from experiments.trials.design import Design
 from experiments.trials.trial_reader import read_trials
-from mjsim.files import replacing, write_text_atomically
+from mjsim.support.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem

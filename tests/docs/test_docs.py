@@ -34,7 +34,7 @@ from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from hud.options import option_names
 from mjsim.model.catalogue import Catalogue
-from mjsim.person_parameters import RANGES
+from mjsim.values.person_parameters import RANGES
 from tools.data_dictionary import data_dictionary
 
 TESTS = Path(__file__).parents[1]
@@ -108,7 +108,7 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
         "mjsim.environments.dm_environment",
         "mjsim.model.catalogue",
         "mjsim.model.sampling",
-        "mjsim.person_parameters",
+        "mjsim.values.person_parameters",
         "mjsim.world",
         "planner.geodesics",
         "planner.problem",

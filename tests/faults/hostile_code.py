@@ -239,7 +239,7 @@ def _sense(read: Any) -> None:
     from dm_env import specs
 
     from mjsim.environments.sensors import Sensor
-    from mjsim.errors import MjsimError
+    from mjsim.values.errors import MjsimError
 
     try:
         _play({"observations": (Sensor("mine", lambda _: specs.Array((2,), np.float64), read),)})

@@ -14,8 +14,8 @@ from experiments.replay.replay import replay
 from experiments.session.first_person import FilmConfig
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, PROBLEM, ROOT, one_line
-from mjsim.errors import RenderError
 from mjsim.render import context
+from mjsim.values.errors import RenderError
 
 
 @pytest.mark.slow

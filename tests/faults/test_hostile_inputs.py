@@ -13,7 +13,7 @@ from experiments.errors import ConfigError
 from faults import warm_commands
 from faults.hostile_cases import case_factory
 from faults.warm_commands import REFUSED, UNSTABLE, USED, Case, CaseFactory, run_cases
-from mjsim.files import WORK
+from mjsim.support.files import WORK
 
 
 def refuse(text="no"):

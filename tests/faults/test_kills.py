@@ -20,7 +20,7 @@ from experiments.trials import trial
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_reader import ROWS
 from faults.conftest import BRIEF
-from mjsim.files import remove_leftovers
+from mjsim.support.files import remove_leftovers
 
 CASES = int(os.environ.get("MJSIM_KILL_CASES", "1"))  # for each command, of four kills each
 FAST = ("--objects", "6", "--fidelity", "event", "--no-regret")

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from mjsim.files import MAX_AGE, WORK, exchange, remove_leftovers, replacing, work_folder
+from mjsim.support.files import MAX_AGE, WORK, exchange, remove_leftovers, replacing, work_folder
 
 
 @pytest.mark.parametrize("name", ["house.xml", "trials/episode.json"])
@@ -27,7 +27,7 @@ def test_work_is_removed_once_it_has_not_changed_for_a_day(name, tmp_path):
 def test_a_process_looks_for_leftovers_once(tmp_path, monkeypatch):
     """A batch writes thousands of trials into one folder, and listing it takes longer the more there are."""
     searched = []
-    monkeypatch.setattr("mjsim.files.remove_leftovers", lambda folder: searched.append(folder))
+    monkeypatch.setattr("mjsim.support.files.remove_leftovers", lambda folder: searched.append(folder))
     for _ in range(3):
         with work_folder(tmp_path):
             pass

@@ -9,7 +9,7 @@ import pytest
 
 from experiments.cli.main import main
 from faults.conftest import FAST, PROBLEM, one_line
-from mjsim.files import read_stream, replacing
+from mjsim.support.files import read_stream, replacing
 
 DEEP = 200_000  # brackets in brackets
 BAD_TEXTS = {
@@ -93,7 +93,7 @@ def test_inputs_without_end(name, kind, tmp_path, capsys):
 def test_a_stream_that_does_not_end(limits, monkeypatch):
     """One that sends nothing more, or goes on too long, or has too much."""
     for name, value in limits.items():
-        monkeypatch.setattr(f"mjsim.files.{name}", value)
+        monkeypatch.setattr(f"mjsim.support.files.{name}", value)
     reading, writing = os.pipe()
     os.write(writing, b'{"distances": ')
     with pytest.raises(OSError, match=r"does not end|larger than"):

@@ -19,7 +19,7 @@ from experiments.replay.replay import replay
 from experiments.session.signals import PATIENCE, Stopped, signals_postponed, signals_raised
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, ROOT, one_line
-from mjsim.files import WORK
+from mjsim.support.files import WORK
 
 RUN = ("run", *FAST, "--no-video", "--no-floor-plan", "--assistance", "none", "--user", "own_code:build")
 

@@ -17,7 +17,7 @@ from hud.options.reroute import CLEARANCE
 from hud.schema import from_dict, to_dict
 from hud.state import HudState, InventorySlot, MessageKind
 from hud.task import Alternative, KnownPlan, TaskStep
-from mjsim.actions import EventKind, Refusal
+from mjsim.values.actions import EventKind, Refusal
 
 
 def shown(name, view):

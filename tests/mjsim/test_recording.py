@@ -9,9 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_worlds import do, finish, scene_of
 
-from mjsim.actions import Pick
-from mjsim.errors import StateError
 from mjsim.model.scene import compose
+from mjsim.values.actions import Pick
+from mjsim.values.errors import StateError
 from mjsim.world import World
 from mjsim.world_state import StateHash, WorldState, engine_versions, model_fingerprint
 

@@ -10,12 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_worlds import do, finish, scene_of, walk_to, world_of
 
-from mjsim.actions import IDLE, EventKind, Move, Pick, Place, Refusal
-from mjsim.errors import ActionError, AssetError, PhysicsError
 from mjsim.model import avatar
 from mjsim.model.scene import compose
-from mjsim.observation import ObjectStatus
-from mjsim.options import FIDELITIES, WorldOptions
+from mjsim.values.actions import IDLE, EventKind, Move, Pick, Place, Refusal
+from mjsim.values.errors import ActionError, AssetError, PhysicsError
+from mjsim.values.observation import ObjectStatus
+from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.world import World
 
 tiers = pytest.mark.parametrize("fidelity", FIDELITIES)

@@ -7,7 +7,7 @@ import pytest
 from planning_cases import optimum
 from sessions import opened, play
 
-from mjsim.observation import ObjectStatus
+from mjsim.values.observation import ObjectStatus
 from planner.problem import RoutingProblem, Shipment
 
 

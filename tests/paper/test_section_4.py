@@ -11,7 +11,7 @@ from sessions import opened
 
 from experiments.procedure.story import story_text
 from mjsim.model import sampling
-from mjsim.observation import ObjectStatus
+from mjsim.values.observation import ObjectStatus
 
 HOUSES = range(200)
 LEVELS = (6, 12, 18, 24)

@@ -11,8 +11,8 @@ from hud import theme
 from hud.compose import Compositor
 from hud.markers import BREADCRUMB, BREADCRUMB_RADIUS, CHEST, FLAGPOLE
 from mjsim.model.sight import FieldOfView, in_field_of_view, visible_objects
-from mjsim.observation import ObjectStatus
 from mjsim.render import CameraPose, Renderer
+from mjsim.values.observation import ObjectStatus
 
 CONDITIONS = ("none", "highlight", "optimal")
 UPDATED = "The plan has been updated."

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
-from mjsim.errors import AssetError
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
+from mjsim.values.errors import AssetError
 
 Floats = NDArray[np.float64]
 CREASE = math.radians(40.0)  # faces that meet at a sharper angle get separate normals

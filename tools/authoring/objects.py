@@ -4,8 +4,8 @@ from pathlib import Path
 
 import cv2
 
-from mjsim.errors import AssetError
-from mjsim.files import replacing
+from mjsim.support.files import replacing
+from mjsim.values.errors import AssetError
 from tools.authoring import (
     mesh_books,
     mesh_dishes,

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
-from mjsim.files import replacing
+from mjsim.support.files import replacing
+from mjsim.values.errors import AssetError
 from tools.authoring import artwork, textiles
 from tools.authoring.patterns import (
     Floats,

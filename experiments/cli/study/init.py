@@ -24,7 +24,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from experiments.people import TEMPLATE
     from experiments.record.run_directory import check_file
-    from mjsim.files import read_text, write_text_atomically
+    from mjsim.support.files import read_text, write_text_atomically
 
     check_file(arguments.study, replace=arguments.force)
     write_text_atomically(arguments.study, read_text(TEMPLATE))

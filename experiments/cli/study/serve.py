@@ -155,7 +155,7 @@ def _secret(folder: Path) -> bytes:
         return text.encode()
     path = folder / SECRET_FILE
     if not path.is_file():
-        from mjsim.files import write_text_atomically
+        from mjsim.support.files import write_text_atomically
 
         write_text_atomically(path, secrets.token_hex(32) + "\n")
         path.chmod(0o600)

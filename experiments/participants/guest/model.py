@@ -18,7 +18,7 @@ from experiments.participants.guest.walking import Detours, Walking
 from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
 from hud.markers import BREADCRUMB, FLAGPOLE
-from mjsim.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
+from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
 from mjsim.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
 

@@ -11,7 +11,7 @@ from experiments.participants.base import Percept, Point
 from experiments.participants.distances import estimated_distances
 from experiments.participants.frontier import Frontier, Place
 from experiments.participants.guest.decision import Decision, Task, choose, first_step_costs, judged_distances
-from mjsim.episode import CAPACITY
+from mjsim.values.episode import CAPACITY
 from planner.errors import PlannerError
 from planner.plan import Visit, VisitKind
 

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 from websockets.asyncio.client import ClientConnection, connect
 
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # px of the page

@@ -7,7 +7,7 @@ from experiments.errors import ConfigError
 from experiments.people.file_lines import line_of
 from experiments.people.recruitment import recruiter
 from experiments.people.study_file import COMPREHENSION, CONSENT, Study
-from mjsim.files import read_text
+from mjsim.support.files import read_text
 
 PAID = ("prolific", "connect", "external-question")  # platforms on which nobody works for nothing
 EXAMPLES = ("your institution", "example.org", "example.com")

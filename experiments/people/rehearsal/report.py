@@ -16,7 +16,7 @@ from experiments.people.rehearsal.run import SERVED, Settings
 from experiments.people.store import Store
 from experiments.people.study_file import Study
 from experiments.web.server.visits import token_hash
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
 STATUS = {  # of people by what they did

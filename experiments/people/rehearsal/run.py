@@ -18,7 +18,7 @@ from experiments.people.recruitment import recruiter
 from experiments.people.rehearsal.person import Person, Rehearsed, Surroundings
 from experiments.people.rehearsal.plan import Planned, plan_people
 from experiments.people.study_file import Study
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
 WORKERS = "20"  # trials at a time; in a hurry, they need not be on time

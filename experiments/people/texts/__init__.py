@@ -9,7 +9,7 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.people.items import Item
-from mjsim.files import read_bytes
+from mjsim.support.files import read_bytes
 
 FOLDER = Path(__file__).parent
 _PLACE = re.compile(r"\{(\w+)\}")

@@ -12,8 +12,8 @@ from experiments.trials.workers import worker_pool
 from experiments.web.gallery.homes import PAGE, Home, draw_home, home_key
 from experiments.web.gallery.sheet import sheets
 from experiments.web.view.page import own_page
-from mjsim.errors import MjsimError, RenderError
-from mjsim.files import replacing
+from mjsim.support.files import replacing
+from mjsim.values.errors import MjsimError, RenderError
 
 HOMES, SHEET = "homes", "sheet_{}.png"
 

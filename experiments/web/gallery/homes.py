@@ -14,14 +14,14 @@ from experiments.house import House
 from experiments.procedure.house_pictures import floor_plan, room_views
 from experiments.web.view.page import run_page
 from experiments.web.view.tour import tour_page
-from mjsim.files import exchange, work_folder
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.generated_names import parse_name
 from mjsim.model.house import compiled_house
 from mjsim.model.house_ref import parse_house
 from mjsim.render import Renderer
 from mjsim.scene_export.export import export_scene
-from mjsim.sources import source_digest
+from mjsim.support.files import exchange, work_folder
+from mjsim.support.sources import source_digest
 
 PLAN, VIEW = (480, 400), (300, 200)  # px
 PAGE, ABOUT = "index.html", "home.json"

@@ -21,7 +21,7 @@ from experiments.record.journal import sync_folder
 from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import VISIT
 from experiments.trials.trial_config import MAX_SEED
-from mjsim.files import write_text_atomically
+from mjsim.support.files import write_text_atomically
 
 JOURNALS = "journals"
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")

@@ -11,9 +11,9 @@ from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.model import avatar
 from mjsim.model.scene import Scene
-from mjsim.observation import Observation
-from mjsim.person_parameters import PICTURE_ASPECT
 from mjsim.render.cameras import camera_pose
+from mjsim.values.observation import Observation
+from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world import World
 
 DECIMALS = 4  # of m, rad and quaternions

@@ -9,7 +9,7 @@ from experiments.house import House
 from experiments.procedure.camera_path import camera_path
 from experiments.web.view.page import run_page
 from hud.state import HudState, InventorySlot
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.person_parameters import PersonParameters
 
 INTERVAL = 0.2  # s between two poses, which the page mixes
 NEAR = 0.05  # m from the place in a room where the tour looks around

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from mjsim.environments.episodes import CompiledEpisode
 from mjsim.environments.observation_layout import ObservationLayout
-from mjsim.episode import StartPose
-from mjsim.observation import Observation
 from mjsim.render import Frame
+from mjsim.values.episode import StartPose
+from mjsim.values.observation import Observation
 from mjsim.world import World
 
 IMAGES = ("rgb", "depth", "segmentation")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
-from mjsim.observation import ObjectStatus
+from mjsim.values.observation import ObjectStatus
 
 _STATUS = tuple(ObjectStatus)
 

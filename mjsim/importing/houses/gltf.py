@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from trimesh.transformations import quaternion_matrix, scale_matrix
 
-from mjsim.errors import AssetError
-from mjsim.files import read_json, read_text
 from mjsim.importing.houses.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
 from mjsim.importing.houses.plan import MAX_SIDE, unit_of
 from mjsim.importing.houses.rooms import boxes_of
@@ -27,6 +25,8 @@ from mjsim.importing.houses.values import (
 )
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS, ImportDecision
+from mjsim.support.files import read_json, read_text
+from mjsim.values.errors import AssetError
 
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"

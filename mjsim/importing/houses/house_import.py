@@ -9,9 +9,6 @@ from pathlib import Path
 import numpy as np
 from trimesh.transformations import translation_matrix
 
-from mjsim.episode import POINTS
-from mjsim.errors import AssetError, RenderError
-from mjsim.files import work_folder
 from mjsim.importing.houses.bins import place_bins
 from mjsim.importing.houses.gltf import INSTANCE, read_habitat, read_mesh_scene
 from mjsim.importing.houses.look import make_looks
@@ -37,6 +34,9 @@ from mjsim.importing.values import ImportDecision
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.validation.findings import Finding, errors
 from mjsim.model.validation.report import Report, check_house_name
+from mjsim.support.files import work_folder
+from mjsim.values.episode import POINTS
+from mjsim.values.errors import AssetError, RenderError
 
 REPORT, PICTURE = "report.json", "preview.png"
 _FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself

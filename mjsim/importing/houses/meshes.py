@@ -10,11 +10,11 @@ import numpy as np
 import trimesh
 from trimesh.transformations import rotation_matrix, scale_matrix
 
-from mjsim.errors import AssetError
-from mjsim.files import check_input, read_bytes
 from mjsim.importing.houses.values import TEXTURE_SIDE
 from mjsim.importing.reading import MAX_TRIANGLES, Beside, check_mesh_file, parsing, surface_of
 from mjsim.importing.surface import Floats, Surface
+from mjsim.support.files import check_input, read_bytes
+from mjsim.values.errors import AssetError
 
 SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")

@@ -11,7 +11,6 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
-from mjsim.errors import AssetError
 from mjsim.importing.houses.meshes import primitive
 from mjsim.importing.houses.values import (
     TEXTURE_SIDE,
@@ -25,6 +24,7 @@ from mjsim.importing.houses.values import (
 from mjsim.importing.surface import Floats, Surface
 from mjsim.model.model_files import read_model
 from mjsim.model.rooms import PREFIX, RoomMap
+from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")
 _SEEN = (0, 1, 2)  # groups that viewers show

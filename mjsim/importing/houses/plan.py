@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from mjsim.errors import AssetError
 from mjsim.importing.houses.solids import Solid
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS
+from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m
 BODY = 0.27  # m, radius of a person with a little air

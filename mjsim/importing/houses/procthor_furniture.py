@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from mjsim.errors import AssetError, brief
-from mjsim.files import read_json, read_text
 from mjsim.houses.files import STYLE, used_materials
 from mjsim.houses.furniture.catalogue import KINDS
 from mjsim.houses.furniture.look import draw_look
@@ -22,7 +20,9 @@ from mjsim.importing.houses.procthor_plan import Thing
 from mjsim.importing.houses.values import Piece
 from mjsim.importing.surface import Floats
 from mjsim.model.assets import models_root
+from mjsim.support.files import read_json, read_text
 from mjsim.support.random_streams import stream
+from mjsim.values.errors import AssetError, brief
 
 DATABASE = "asset-database.json"  # of ProcTHOR: types and sizes of its assets
 _DRAWN = 4  # pieces of each kind, among which the nearest is chosen

@@ -15,11 +15,11 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from mjsim.errors import AssetError, brief
-from mjsim.files import read_json, read_text
 from mjsim.houses.values import WALL
 from mjsim.importing.houses.rooms import boxes_of, words_of
 from mjsim.importing.houses.values import NamedRoom
+from mjsim.support.files import read_json, read_text
+from mjsim.values.errors import AssetError, brief
 
 NAMES = "mjsim_rooms"  # of the metadata: room id -> [key, label], where the house was one of ours
 _TYPES = {"livingroom": "living_room"}  # the others are their own words

@@ -10,12 +10,12 @@ import trimesh
 import yaml
 from trimesh.transformations import rotation_matrix, translation_matrix
 
-from mjsim.errors import AssetError, brief
-from mjsim.files import read_text
 from mjsim.importing.houses.meshes import primitive
 from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
+from mjsim.support.files import read_text
+from mjsim.values.errors import AssetError, brief
 
 SUFFIXES = (".yaml", ".yml")
 # Width, depth and height, m, where the layout leaves one to the mesh.

@@ -14,12 +14,12 @@ import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
-from mjsim.errors import AssetError, brief
-from mjsim.files import read_text
 from mjsim.importing.houses.plan import CELL, MAX_SIDE, Mask, Plan, clearance
 from mjsim.importing.houses.solids import merged_rectangles
 from mjsim.importing.houses.values import NamedRoom, Piece
 from mjsim.importing.surface import Floats
+from mjsim.support.files import read_text
+from mjsim.values.errors import AssetError, brief
 
 _NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)  # m, half of the way that parts two rooms; the wider ones part halls
 _HALL = 45.0  # m^2, floor of a room that is rather parted at wider openings

@@ -11,13 +11,13 @@ import numpy as np
 import trimesh
 from trimesh.transformations import compose_matrix
 
-from mjsim.errors import AssetError
-from mjsim.files import read_text
 from mjsim.importing.houses.meshes import primitive, read_parts
 from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out, numbers
 from mjsim.importing.reading import PLAIN
 from mjsim.importing.surface import Floats, Surface
 from mjsim.importing.values import ImportDecision
+from mjsim.support.files import read_text
+from mjsim.values.errors import AssetError
 
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.importing.houses.solids import LOW
 from mjsim.importing.houses.values import Piece, left_out
 from mjsim.importing.values import ImportDecision
 from mjsim.model.validation.object_rules import SIZE
+from mjsim.values.errors import AssetError
 
 _STOREY = 2.1  # m above a floor, from where on another floor is another storey
 _LEVEL = 0.4  # share of the largest level that a floor has at least

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.importing.surface import Floats, Surface
 from mjsim.importing.values import ImportDecision
+from mjsim.values.errors import AssetError
 
 TEXTURE_SIDE = 512  # px, longest side of a picture
 

@@ -11,7 +11,7 @@ from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
 from mjsim.model.validation.floor import WalkableFloor
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.person_parameters import PersonParameters
 
 DEFAULT = PersonParameters()  # a study may have others
 SNAP = 1.0  # m, from a receptacle's site `approach` to where a person can stand

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError
-from mjsim.files import read_text
 from mjsim.model.footprint import outline_points
 from mjsim.model.model_files import content_hash, elements, name_files
 from mjsim.model.validation.findings import Finding
+from mjsim.support.files import read_text
+from mjsim.values.errors import AssetError
 
 MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
 LOOK_GROUPS, SOLID_GROUPS = (0, 1, 2), (0, 3)

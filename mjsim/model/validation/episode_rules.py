@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.episode import Episode, PlacedObject
 from mjsim.model.avatar import PREFIX, TRUNK
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.findings import Finding
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.person_parameters import PersonParameters
 
 MAX_OBJECTS = 200
 FULL = 8  # objects that a receptacle is sure to hold

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from mjsim.errors import brief
+from mjsim.values.errors import brief
 
 Severity = Literal["error", "warning"]
 

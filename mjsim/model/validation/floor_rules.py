@@ -14,7 +14,7 @@ from mjsim.model.validation.bin_rules import check_bins
 from mjsim.model.validation.compiled import Compiled
 from mjsim.model.validation.findings import Finding
 from mjsim.model.validation.floor import BODY_BAND, BORDER, WalkableFloor
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.person_parameters import PersonParameters
 
 USUAL = PersonParameters()  # a study may have others
 PASSAGE = 0.70  # m, width below which people squeeze through

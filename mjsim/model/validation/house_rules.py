@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
-from mjsim.errors import AssetError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import TIMESTEP
 from mjsim.model.rooms import PREFIX, RoomMap
@@ -19,6 +18,7 @@ from mjsim.model.validation.compiled import (
 )
 from mjsim.model.validation.findings import Finding
 from mjsim.model.validation.hull_rules import check_hulls
+from mjsim.values.errors import AssetError
 
 SIZE = (1.5, 150.0)  # m, sides of the rectangle around all rooms
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mjsim.episode import POINTS, Episode
-from mjsim.errors import AssetError, EpisodeError, PhysicsError, SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.house_ref import CATALOGUE
@@ -21,6 +19,8 @@ from mjsim.model.validation.object_rules import check_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
 from mjsim.model.validation.validate import check_house, require_usable
 from mjsim.model.validation.views import Drawing, floor_view, side_views
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, SamplingError
 
 
 @dataclass(frozen=True, eq=False)

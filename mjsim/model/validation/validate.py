@@ -8,8 +8,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import AssetError, MjsimError
-from mjsim.kernels import cache_base
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import CompiledHouse
 from mjsim.model.validation.compiled import Compiled, compile_model
@@ -19,7 +17,9 @@ from mjsim.model.validation.floor_rules import check_floor, nowhere_to_stand
 from mjsim.model.validation.house_rules import check_house_file
 from mjsim.model.validation.object_rules import check_compiled_object
 from mjsim.model.validation.receptacle_rules import check_receptacle
-from mjsim.sources import source_digest
+from mjsim.support.kernels import cache_base
+from mjsim.support.sources import source_digest
+from mjsim.values.errors import AssetError, MjsimError
 
 SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from mjsim.episode import Episode
-from mjsim.errors import AssetError
 from mjsim.model.footprint import outline_points
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.validation.compiled import Compiled
+from mjsim.values.episode import Episode
+from mjsim.values.errors import AssetError
 
 Point = tuple[float, float]
 _BAND = (0.05, 1.8)  # m, heights of what is drawn of a house

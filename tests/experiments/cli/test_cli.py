@@ -14,7 +14,7 @@ from glb_files import File
 
 from experiments.cli.main import COMMANDS, main, parser
 from experiments.cli.options import frame_size, int_list, seconds, text_list
-from mjsim.episode import Episode
+from mjsim.values.episode import Episode
 
 ROOT = Path(__file__).parents[3]
 PLAY = ["play", "--no-open", "--port", "0"]

@@ -28,8 +28,8 @@ from experiments.trials.setup import draw_person, prepare_session
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import compose
-from mjsim.options import FIDELITIES
-from mjsim.person_parameters import RANGES, PersonParameters
+from mjsim.values.options import FIDELITIES
+from mjsim.values.person_parameters import RANGES, PersonParameters
 
 PEOPLE = """{
     walking_speed = {normal = [1.2, 0.2], min = 0.8}, reading_time = {lognormal = [1.35, 0.35]},

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.participants.base import Percept
 from experiments.participants.frontier import Frontier, free_length
-from mjsim.observation import Observation
+from mjsim.values.observation import Observation
 
 
 def stands(position, heading):

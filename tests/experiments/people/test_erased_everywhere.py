@@ -20,7 +20,7 @@ from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.files import WORK
+from mjsim.support.files import WORK
 
 PEOPLE = ("anna", "bert", "cleo")
 SEEDS = (6112233, 6445566, 6778899)  # of people; no other number in the files is one of these

@@ -29,8 +29,8 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.house import compiled_house
 from mjsim.model.sight import FieldOfView, visible_receptacles
-from mjsim.person_parameters import PersonParameters
 from mjsim.render import CameraPose, Renderer
+from mjsim.values.person_parameters import PersonParameters
 
 SMALL = FilmConfig(320, 240, "draft")
 FIELD = FieldOfView.of(PersonParameters())

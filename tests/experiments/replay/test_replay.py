@@ -29,7 +29,7 @@ from experiments.session.film_config import FilmConfig
 from experiments.session.session import Session
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.errors import PhysicsError
+from mjsim.values.errors import PhysicsError
 
 pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 DT = 0.04

@@ -7,10 +7,10 @@ import pytest
 from sessions import Recorder, opened
 
 from experiments.session.session import INTERRUPTED
-from mjsim.actions import WAIT
 from mjsim.model.sight import visible_objects
-from mjsim.observation import ObjectStatus
 from mjsim.render import Renderer
+from mjsim.values.actions import WAIT
+from mjsim.values.observation import ObjectStatus
 
 
 class Spy:

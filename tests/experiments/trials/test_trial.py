@@ -15,8 +15,8 @@ from experiments.record.records import read_events
 from experiments.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.episode import Episode
-from mjsim.options import FIDELITIES
+from mjsim.values.episode import Episode
+from mjsim.values.options import FIDELITIES
 
 ASSISTANCE = ("none", "highlight", "optimal")
 

@@ -10,9 +10,9 @@ _SCRIPT = """
 import sys
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
-from mjsim.actions import Move
+from mjsim.values.actions import Move
 from mjsim.model.catalogue import Catalogue
-from mjsim.episode import Episode
+from mjsim.values.episode import Episode
 from mjsim.model.scene import compose
 from experiments.trials.warmup import compile_kernels
 from mjsim.world import World

@@ -19,7 +19,7 @@ import mjsim
 from mjsim.environments import gymnasium_environment, viewer
 from mjsim.environments.control import MOVES
 from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError, ViewerError
-from mjsim.errors import ActionError, PhysicsError
+from mjsim.values.errors import ActionError, PhysicsError
 from mjsim.world import World
 
 FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")

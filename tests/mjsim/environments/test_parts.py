@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from small_worlds import episode_of
 
 import mjsim
-from mjsim.actions import IDLE, Move, Pick, Place
 from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
-from mjsim.errors import ActionError, PhysicsError, SamplingError
 from mjsim.model import navigable
 from mjsim.model.navigable import installed_builder
-from mjsim.options import WorldOptions
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, Move, Pick, Place
+from mjsim.values.errors import ActionError, PhysicsError, SamplingError
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world import World
 from planner.navmesh import NavMesh
 

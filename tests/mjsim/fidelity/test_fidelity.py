@@ -12,8 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
-from mjsim.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
-from mjsim.errors import StateError
 from mjsim.fidelity import kinematics
 from mjsim.fidelity import trunk_contact as trunk
 from mjsim.fidelity.body_state import X, Y, standing
@@ -22,10 +20,12 @@ from mjsim.fidelity.trunk_contact import Floor
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sight import visible_objects
-from mjsim.observation import ObjectStatus
-from mjsim.options import FIDELITIES, WorldOptions
-from mjsim.person_parameters import PersonParameters
-from mjsim.steps import States
+from mjsim.values.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
+from mjsim.values.errors import StateError
+from mjsim.values.observation import ObjectStatus
+from mjsim.values.options import FIDELITIES, WorldOptions
+from mjsim.values.person_parameters import PersonParameters
+from mjsim.values.steps import States
 from mjsim.walking.walker import BACK_OFF
 from mjsim.world_state import WorldState
 

@@ -8,9 +8,9 @@ import pytest
 from small_worlds import do, scene_of, world_of
 
 from experiments.record.health import summarise_health
-from mjsim.actions import IDLE, EventKind, Pick
 from mjsim.health.scan import is_path_clear, static_boxes
 from mjsim.model.rays import first_hit, moving_geoms
+from mjsim.values.actions import IDLE, EventKind, Pick
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from houses_cases import BINS, PALETTE, flat, studio
 
-from mjsim.errors import HouseError
 from mjsim.houses.furnish import Home, furnish, furnished
 from mjsim.houses.furniture.piece import flattened, moved
 from mjsim.houses.space import Space
 from mjsim.houses.values import FloorPlan, Placement, Rectangle
+from mjsim.values.errors import HouseError
 
 CASES = [(flat(), BINS, seed) for seed in range(6)] + [(studio(), BINS[:3], seed) for seed in range(4)]
 

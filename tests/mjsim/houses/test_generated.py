@@ -9,7 +9,6 @@ import pytest
 from experiments.cli.main import main
 from experiments.errors import ConfigError
 from experiments.trials.design import read_design
-from mjsim.errors import HouseError
 from mjsim.houses.generated import generate, house_files
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.houses.recipe import read_recipe
@@ -17,6 +16,7 @@ from mjsim.model.assets import models_root
 from mjsim.model.generated_names import VERSION, generated_names, parse_name, split_of
 from mjsim.model.sampling import sample_episode
 from mjsim.model.validation.report import check_path
+from mjsim.values.errors import HouseError
 
 
 def files_of(seed: int, rooms: int) -> dict[str, bytes]:

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim.errors import HouseError
 from mjsim.houses.openings import open_up, portions
 from mjsim.houses.plan import draw_rooms
 from mjsim.houses.programme import NEEDS, draw_programme
 from mjsim.houses.values import ROOMS, SIDES, WALL, FloorPlan, Rectangle
+from mjsim.values.errors import HouseError
 
 CASES = given(seed=st.integers(0, 10**6), rooms=st.integers(1, 7))
 FEW = settings(max_examples=12, deadline=None, derandomize=True)

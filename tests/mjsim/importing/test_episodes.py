@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from experiments.cli import main as cli
-from mjsim.episode import Episode
-from mjsim.errors import EpisodeError
 from mjsim.importing.episodes import EpisodeObject, kind_of, read_episodes
 from mjsim.model.disorder import Disorder
+from mjsim.values.episode import Episode
+from mjsim.values.errors import EpisodeError
 
 
 def pose(name, x, y, z):

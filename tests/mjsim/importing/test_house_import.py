@@ -12,13 +12,13 @@ import trimesh
 from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_robocasa, write_sdf
 
 from experiments.cli import main as cli
-from mjsim.errors import AssetError
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.validation.compiled import Compiled
+from mjsim.values.errors import AssetError
 
 
 def imported(tmp_path, source, **options):

@@ -19,8 +19,6 @@ from small_worlds import dropped
 from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments.cli import main as cli
 from experiments.house import House
-from mjsim.errors import AssetError, RenderError
-from mjsim.files import remove_leftovers
 from mjsim.importing import house_extension
 from mjsim.importing.atlas import SIDE, Atlas
 from mjsim.importing.house_extension import Entry, HouseExtension, held_in
@@ -33,7 +31,9 @@ from mjsim.importing.weight import weigh
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
 from mjsim.model.validation.object_rules import check_object
-from mjsim.options import WorldOptions
+from mjsim.support.files import remove_leftovers
+from mjsim.values.errors import AssetError, RenderError
+from mjsim.values.options import WorldOptions
 
 MAKE = trimesh.creation
 

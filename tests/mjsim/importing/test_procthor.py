@@ -7,7 +7,6 @@ import pytest
 from house_scenes import write_procthor
 
 from experiments.cli import main as cli
-from mjsim.errors import AssetError
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.houses.recipe import floor_plan_of
 from mjsim.importing.houses.house_import import import_house
@@ -15,6 +14,7 @@ from mjsim.importing.houses.procthor_plan import read_plan
 from mjsim.importing.houses.values import HouseOptions
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
+from mjsim.values.errors import AssetError
 
 
 def area(room):

@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim.errors import AssetError
 from mjsim.model.footprint import footprint
+from mjsim.values.errors import AssetError
 from planner.navmesh import NavMesh
 from tools.authoring import __main__ as authoring
 from tools.authoring import textures

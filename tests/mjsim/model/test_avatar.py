@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from small_worlds import scene_of, world_of
 
-from mjsim.actions import Move
-from mjsim.errors import AssetError
 from mjsim.model import avatar
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import Move
+from mjsim.values.errors import AssetError
+from mjsim.values.person_parameters import PersonParameters
 
 START = (1.2, 0.9, 0.7)
 

@@ -7,10 +7,10 @@ import pytest
 
 import mjsim.model.assets
 from experiments.trials.trial_config import TrialConfig
-from mjsim.errors import AssetError
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house_ref import parse_house
+from mjsim.values.errors import AssetError
 
 SHIPPED = models_root() / "houses" / "apartment" / "catalogue.toml"
 

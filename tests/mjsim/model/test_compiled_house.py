@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from experiments.house import House
-from mjsim.actions import Move, Pick
-from mjsim.errors import AssetError
 from mjsim.model import house
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.drawn_state import drawn_state
@@ -20,6 +18,8 @@ from mjsim.model.model_files import content_hash, read_model
 from mjsim.model.object_model import VISUAL_BODY, separate_visuals
 from mjsim.model.scene import compose
 from mjsim.model.sight import visible_objects
+from mjsim.values.actions import Move, Pick
+from mjsim.values.errors import AssetError
 from mjsim.world import World
 from mjsim.world_state import model_fingerprint
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from mjsim.episode import StartPose
-from mjsim.errors import EpisodeError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import compose
 from mjsim.model.validation.findings import errors
 from mjsim.model.validation.report import check_path
+from mjsim.values.episode import StartPose
+from mjsim.values.errors import EpisodeError
 
 
 @pytest.fixture(scope="module")

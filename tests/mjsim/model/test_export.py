@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from small_worlds import scene_of
 
-from mjsim.errors import AssetError
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.export import export_house
 from mjsim.model.scene import compose
+from mjsim.values.errors import AssetError
 
 START = (1.5, 2.5, 0.0)
 STOCK = """

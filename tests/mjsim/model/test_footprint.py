@@ -9,9 +9,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim.errors import AssetError
 from mjsim.model.footprint import footprint
 from mjsim.model.house import compiled_house
+from mjsim.values.errors import AssetError
 
 ROOM = '<site name="room:r" type="box" pos="1 2 1" size="3 4 1"/>'
 WEDGE = '<asset><mesh name="wedge" vertex="0 0 0 .4 0 0 0 .3 0 0 0 .5"/></asset>'

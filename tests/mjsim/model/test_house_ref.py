@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from mjsim.errors import AssetError, HouseError
 from mjsim.houses.home_cache import ensured, load_catalogue
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house_ref import parse_house
+from mjsim.values.errors import AssetError, HouseError
 
 # name -> kind, name in records, which must never change
 RECORDED = {

@@ -3,12 +3,12 @@
 import pytest
 from small_worlds import edited
 
-from mjsim.errors import AssetError
 from mjsim.model.house import CompiledHouse, compiled_house
 from mjsim.model.sampling import sample_episode
 from mjsim.model.validation.findings import errors
 from mjsim.model.validation.report import check_path
 from mjsim.model.validation.validate import check_house, require_usable
+from mjsim.values.errors import AssetError
 
 DOOR = '<body name="door" pos="3 2 1"><joint name="hinge" axis="0 0 1"/><geom type="box" size=".02 .4 1"/></body>'
 END = "</worldbody>"

@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import episode_of
 
-from mjsim.errors import SamplingError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.sampling import sample_episode, sample_points
 from mjsim.model.settling import settle
+from mjsim.values.errors import SamplingError
 
 LEVELS = (6, 12, 18, 24)
 SEEDS = (0, 1, 2, 3)

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from shapely import affinity
 from small_worlds import edited, scene_of
 
-from mjsim.errors import AssetError, EpisodeError
 from mjsim.model import avatar
 from mjsim.model.house import compiled_house
 from mjsim.model.receptacles import ReceptacleGeometry
 from mjsim.model.rooms import RoomMap
 from mjsim.model.scene import SceneIndex, compose
+from mjsim.values.errors import AssetError, EpisodeError
 
 START = (1.5, 1.5, 0.5)
 turns = st.floats(-180, 180).map(lambda turn: round(turn, 2))  # MuJoCo takes 1e-4 degrees for none

@@ -10,8 +10,8 @@ from small_worlds import scene_of
 
 from mjsim.model.scene import compose
 from mjsim.model.sight import OFFSETS, FieldOfView, visible_objects
-from mjsim.person_parameters import PersonParameters
 from mjsim.render import CameraPose, Labels, Renderer
+from mjsim.values.person_parameters import PersonParameters
 
 EYE_HEIGHT = 1.6
 USUAL = FieldOfView.of(PersonParameters())

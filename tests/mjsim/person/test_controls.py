@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from experiments.house import House
 from experiments.web.controls import MAX_PITCH, MAX_PRESSES, PRESS_LIFE, Controls, Input, control_step
-from mjsim.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
+from mjsim.values.options import WorldOptions
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.world import World
 
 OPTIONS = WorldOptions(fidelity="event")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from small_worlds import scene_of, world_of
 
-from mjsim.actions import IDLE, EventKind, Move
 from mjsim.model import avatar
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import IDLE, EventKind, Move
+from mjsim.values.person_parameters import PersonParameters
 
 HALF = np.array([0.30, 0.10])  # of the box, m
 SQUEEZE = 60.0  # weights

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from small_worlds import do, scene_of, world_of
 
-from mjsim.actions import IDLE, EventKind, Move, Pick, Place
 from mjsim.model.clearance import ClearanceField, clearance_at
 from mjsim.model.house import compiled_house
-from mjsim.observation import ObjectStatus
 from mjsim.person.hand_path import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
 from mjsim.person.slots import object_corners
+from mjsim.values.actions import IDLE, EventKind, Move, Pick, Place
+from mjsim.values.observation import ObjectStatus
 
 
 def tidy(catalogue, start, models, spots):

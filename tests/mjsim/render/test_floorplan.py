@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim.errors import RenderError
 from mjsim.render import largest_scale, render_floorplan
+from mjsim.values.errors import RenderError
 
 # A red tile with its corners at whole centimetres, under a green ceiling; a tall blue post away from the centre.
 HOUSE = """<mujoco><worldbody>

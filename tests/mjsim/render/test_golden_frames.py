@@ -22,10 +22,10 @@ from hud.messages import message
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
 from hud.task import KnownPlan, TaskStep
-from mjsim.episode import Episode
 from mjsim.model.scene import compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
+from mjsim.values.episode import Episode
 from mjsim.world import World
 
 golden_frame = fixtures.golden_frame

@@ -14,9 +14,9 @@ from shapely import LineString, Point
 from small_worlds import scene_of
 
 from hud.markers import BREADCRUMB_RADIUS, CHEST, breadcrumbs
-from mjsim.episode import Episode
 from mjsim.model.scene import compose
 from mjsim.render import CameraPose, Labels, Renderer
+from mjsim.values.episode import Episode
 
 EPISODE = Path(__file__).parents[2] / "golden" / "episode.json"
 
@@ -185,7 +185,7 @@ from experiments.session.task_board import TaskBoard
 from experiments.house import House
 from hud.compose import Compositor
 from hud.conditions import condition
-from mjsim.episode import Episode
+from mjsim.values.episode import Episode
 from mjsim.render import Renderer, render_pictures
 from mjsim.model.scene import compose
 from mjsim.world import World

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mjsim.errors import AssetError, RenderError
 from mjsim.model.catalogue import Catalogue
 from mjsim.render import render_picture, render_pictures
+from mjsim.values.errors import AssetError, RenderError
 
 RED_BALL = """<mujoco><worldbody><body name="object">
   <geom type="sphere" size="{size}" pos="{x} 0 0.1" rgba="1 0 0 1"/>

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim.errors import RenderError
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, context
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.culling import outside
+from mjsim.values.errors import RenderError
 
 # A room seen along +x: back wall at x = 4, a low partition at x = 2 on the right (y < 0), a tilted camera as well.
 ROOM = """<mujoco>
@@ -395,7 +395,7 @@ def test_a_closed_renderer_and_foreign_data_are_refused(room):
 
 def test_a_forked_worker_is_told_instead_of_hanging():
     code = (
-        "import os; from mjsim.errors import RenderError; from mjsim.render import gl_info; gl_info()\n"
+        "import os; from mjsim.values.errors import RenderError; from mjsim.render import gl_info; gl_info()\n"
         "if os.fork() == 0:\n"
         "    try: gl_info()\n"
         "    except RenderError as e: os._exit(7 if 'spawn' in str(e) else 8)\n"

@@ -223,7 +223,7 @@ module.GLContext = GLContext
 import mujoco
 sys.modules["mujoco.egl"] = module
 from mjsim.diagnostics import environment_report
-from mjsim.errors import RenderError
+from mjsim.values.errors import RenderError
 from mjsim.render import gl_info
 try:
     gl_info()

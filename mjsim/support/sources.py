@@ -4,7 +4,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]  # folder of the packages
+ROOT = Path(__file__).parents[2]  # folder of the packages
 PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mjsim.errors import PersonError
-from mjsim.motion_parameters import (
+from mjsim.values.errors import PersonError
+from mjsim.values.motion_parameters import (
     GROUP_RANGES,
     GROUPS,
     CarryingParameters,

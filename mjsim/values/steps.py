@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.actions import StepAction
-from mjsim.observation import Observation
+from mjsim.values.actions import StepAction
+from mjsim.values.observation import Observation
 
 _HEALTH = 7  # numbers of a `HealthSample`
 

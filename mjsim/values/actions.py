@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.errors import ActionError
+from mjsim.values.errors import ActionError
 
 TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
 

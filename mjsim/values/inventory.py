@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from mjsim.episode import CAPACITY
-from mjsim.errors import ActionError
+from mjsim.values.episode import CAPACITY
+from mjsim.values.errors import ActionError
 
 LEFT, RIGHT = 0, 1
 

@@ -10,24 +10,25 @@ from pathlib import Path
 import pytest
 
 from experiments.trials.compile_notice import NOT_KEPT, NOTICE
-from mjsim import kernels, sources
+from mjsim.support import kernels, sources
 
-CALLEE = "from mjsim.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
+CALLEE = "from mjsim.support.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
 CALLER = (
-    "from mjsim.kernels import kernel\nfrom planner.callee import factor\nfrom planner.limits import OFFSET\n\n\n"
+    "from mjsim.support.kernels import kernel\n"
+    "from planner.callee import factor\nfrom planner.limits import OFFSET\n\n\n"
     "@kernel\ndef twice(x):\n    return 2 * factor() * x + OFFSET\n\n\n"
     "print(twice(1), sum(twice.stats.cache_hits.values()))\n"
 )
 
 
 def _project(root):
-    """A project of two packages with the real `mjsim.kernels` and two kernels."""
+    """A project of two packages with the real `mjsim.support.kernels` and two kernels."""
     for package in ("mjsim", "planner"):
         (root / package).mkdir()
         (root / package / "__init__.py").touch()
+    (root / "mjsim" / "support").mkdir()
     for module in (kernels, sources):
-        path = Path(module.__file__)
-        shutil.copy(path, root / "mjsim" / path.name)
+        shutil.copy(module.__file__, root / "mjsim" / "support")
     (root / "planner/caller.py").write_text(CALLER, encoding="utf-8")
     _set(root, factor=1, offset=0)
 
@@ -92,7 +93,7 @@ def test_compiling_is_announced_once(tmp_path, kept):
     source, cache = tmp_path / "script.py", tmp_path / "cache" if kept else Path("/proc/self/nowhere")
     source.write_text(
         "from experiments.trials.compile_notice import announce_compiling\n"
-        "from mjsim.kernels import kernel\n\n\n"
+        "from mjsim.support.kernels import kernel\n\n\n"
         "@kernel\ndef after(x):\n    return x + 1\n\n\n"
         "announce_compiling()\nprint(after(1), after(1.5))\n"
     )

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from mjsim.errors import EpisodeError, brief
-from mjsim.files import read_json, read_text, write_text_atomically
+from mjsim.support.files import read_json, read_text, write_text_atomically
+from mjsim.values.errors import EpisodeError, brief
 
 FORMAT_VERSION = 1
 CAPACITY = 2  # PAPER section 2: the knapsack of the study

@@ -9,7 +9,7 @@ PACKAGES = ("planner", "hud", "experiments")
 
 def hidden_package(name: str) -> str | None:
     """What to do about a package that Python would not import from beside mjsim; None if all is well."""
-    own = Path(__file__).resolve().parents[1] / name
+    own = Path(__file__).resolve().parents[2] / name
     spec = importlib.util.find_spec(name)
     folders = list(spec.submodule_search_locations or ()) if spec else []
     if not folders:

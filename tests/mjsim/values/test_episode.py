@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjsim.episode import Episode, PlacedObject, StartPose
-from mjsim.errors import EpisodeError
+from mjsim.values.episode import Episode, PlacedObject, StartPose
+from mjsim.values.errors import EpisodeError
 
 number = st.floats(allow_nan=False, allow_infinity=False)
 text = st.text(st.characters(codec="utf-8"), max_size=12)

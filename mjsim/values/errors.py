@@ -49,7 +49,7 @@ class PhysicsError(MjsimError):
     """MuJoCo warned, or a state is not finite.
 
     Attributes:
-        steps: The control steps of the action (`mjsim.steps.Steps`), the last of which failed; None before it.
+        steps: The control steps of the action (`mjsim.values.steps.Steps`), the last of which failed; None before it.
     """
 
     steps: Any = None

@@ -4,8 +4,8 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-from mjsim.episode import CAPACITY
-from mjsim.errors import ActionError
+from mjsim.values.episode import CAPACITY
+from mjsim.values.errors import ActionError
 
 FIDELITIES = ("full", "event")
 CAPACITIES = (1, 2)

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjsim.errors import ActionError
-from mjsim.inventory import LEFT, RIGHT, Inventory
+from mjsim.values.errors import ActionError
+from mjsim.values.inventory import LEFT, RIGHT, Inventory
 
 
 def test_take_and_release():

@@ -1,0 +1,1 @@
+"""Frozen values that cross the borders of packages, and errors."""
