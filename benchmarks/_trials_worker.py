@@ -26,7 +26,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.model.scene import Scene
 from mjsim.values.options import WorldOptions
-from mjsim.world import World
+from mjsim.world.world import World
 
 # Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
 PARTS = {
@@ -37,11 +37,11 @@ PARTS = {
     ),
     "shortest paths": ("planner.geodesics.Geodesics.shortest_path",),
     "looking": ("experiments.session.perception.visible_objects",),
-    "world": tuple(f"mjsim.world.World.{n}" for n in ("reset", "step", "state", "restore")),
+    "world": tuple(f"mjsim.world.world.World.{n}" for n in ("reset", "step", "state", "restore")),
     "house and scene": (
         "experiments.house.House.sample_episode",
         "experiments.trials.trial.compose",
-        "mjsim.world.World.__init__",
+        "mjsim.world.world.World.__init__",
     ),
     "recording": (
         "experiments.record.records.EventLog.append",

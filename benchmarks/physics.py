@@ -24,8 +24,8 @@ from experiments.house import House
 from mjsim.model.scene import Scene, compose
 from mjsim.values.actions import Move
 from mjsim.values.options import FIDELITIES
-from mjsim.world import World
-from mjsim.world_state import set_physics, take_physics
+from mjsim.world.state import set_physics, take_physics
+from mjsim.world.world import World
 
 OBJECTS = (6, 12, 18, 24, 48)
 DEFAULT_OBJECTS = 24

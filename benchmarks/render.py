@@ -33,7 +33,7 @@ from mjsim.render.cameras import ViewVolume
 from mjsim.render.context import current_context
 from mjsim.render.markers import add_markers
 from mjsim.render.scene_settings import buffer_settings
-from mjsim.world import World
+from mjsim.world.world import World
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}

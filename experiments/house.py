@@ -20,7 +20,7 @@ from mjsim.model.sampling import house_points, sample_episode
 from mjsim.model.validation.validate import require_usable
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.walking.path_following import ARRIVED_WITHIN
+from mjsim.world.walking.path_following import ARRIVED_WITHIN
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 

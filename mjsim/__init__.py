@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from mjsim.values.observation import Observation
     from mjsim.values.options import WorldOptions
     from mjsim.values.person_parameters import PersonParameters
-    from mjsim.world import StepResult, World
+    from mjsim.world.world import StepResult, World
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
         "values.actions": (
@@ -76,7 +76,7 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "values.observation": ("Observation",),
         "values.options": ("WorldOptions",),
         "values.person_parameters": ("PersonParameters",),
-        "world": ("StepResult", "World"),
+        "world.world": ("StepResult", "World"),
     }
 
     def __getattr__(name):

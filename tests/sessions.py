@@ -10,7 +10,7 @@ from experiments.trials.trial_config import TrialConfig
 from hud.state import HudState
 from mjsim.model.scene import compose
 from mjsim.values.observation import Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 SIZES = ((640, 480), (960, 720), (1920, 1080))
 

@@ -10,7 +10,7 @@ from mjsim.model.scene import compose
 from mjsim.values.actions import WAIT, Move
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.options import WorldOptions
-from mjsim.world import World
+from mjsim.world.world import World
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 FLOOR = """<mujoco><option timestep="0.004" integrator="implicitfast" cone="elliptic" impratio="10"/>

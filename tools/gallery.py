@@ -31,7 +31,7 @@ from mjsim.model.sight import visible_objects
 from mjsim.support.files import replacing
 from mjsim.values.errors import RenderError
 from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 Image = NDArray[np.uint8]
 

@@ -15,9 +15,9 @@ from experiments.house import House
 from mjsim.model.scene import compose
 from mjsim.values.actions import IDLE, WAIT, Action, EventKind, Move, Pick
 from mjsim.values.episode import Episode
-from mjsim.walking.path_following import wrap_angle
-from mjsim.walking.polyline import path_length, point_along, project
-from mjsim.world import World
+from mjsim.world.walking.path_following import wrap_angle
+from mjsim.world.walking.polyline import path_length, point_along, project
+from mjsim.world.world import World
 
 SEED = 2027
 SPEED = 1.4  # m/s

@@ -23,7 +23,7 @@ from mjsim.model.scene import compose
 from mjsim.render import render_house_map, render_pictures
 from mjsim.render.cameras import camera_pose
 from mjsim.values.observation import Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 SIZE = (640, 480)
 # Bytes written between two frames, as rendering does, so that no processor cache still holds the panels.

@@ -19,7 +19,7 @@ from mjsim.values.actions import IDLE, EventKind, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.errors import PhysicsError
 from mjsim.values.options import WorldOptions
-from mjsim.world import World
+from mjsim.world.world import World
 
 SEED = 2026
 LEVELS = 6  # the receptacle holds 0 to 5 objects before

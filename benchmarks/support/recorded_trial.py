@@ -18,8 +18,8 @@ from mjsim.values.actions import Action, Move
 from mjsim.values.episode import POINTS
 from mjsim.values.observation import Observation
 from mjsim.values.options import WorldOptions
-from mjsim.world import MAX_STEPS, StepResult, World
-from mjsim.world_state import WorldState
+from mjsim.world.state import WorldState
+from mjsim.world.world import MAX_STEPS, StepResult, World
 
 Call = tuple[str, Any]  # `step` with an action and a limit, or `restore`
 

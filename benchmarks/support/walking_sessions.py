@@ -20,8 +20,8 @@ from mjsim.values.actions import IDLE, Move
 from mjsim.values.episode import Episode
 from mjsim.values.errors import PhysicsError
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.walking.polyline import point_along
-from mjsim.world import World
+from mjsim.world.walking.polyline import point_along
+from mjsim.world.world import World
 from planner.errors import UnreachableError
 
 SEED = 2028

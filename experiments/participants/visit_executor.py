@@ -10,7 +10,7 @@ from experiments.participants.base import Guidance, Percept, Point
 from experiments.participants.bin_search import BinSearch
 from experiments.participants.distances import estimated_distances
 from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
-from mjsim.walking.polyline import project
+from mjsim.world.walking.polyline import project
 from planner.plan import Visit, VisitKind
 
 STOP_SHARE = 0.72  # of the reach, from the goal: near enough to reach, far enough not to kick it

@@ -14,7 +14,7 @@ from mjsim.values.actions import Move, Pick, Place, StepAction
 from mjsim.values.errors import ActionError
 from mjsim.values.observation import ObjectStatus
 from mjsim.values.steps import States
-from mjsim.world_state import WorldState
+from mjsim.world.state import WorldState
 
 OBJECTS = -1  # in a shape: the number of objects
 

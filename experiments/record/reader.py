@@ -32,7 +32,7 @@ from mjsim.values.episode import Episode
 from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world_state import WorldState
+from mjsim.world.state import WorldState
 
 
 @dataclass(frozen=True, eq=False)

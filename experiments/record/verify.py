@@ -17,7 +17,7 @@ from experiments.record.event_check import check_event
 from experiments.record.files import read_json
 from experiments.record.metrics import CIRCUMSTANCES, measure
 from experiments.record.reader import Record, read_log
-from mjsim.world_state import checkpoint_hash
+from mjsim.world.state import checkpoint_hash
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from experiments.record.columns import HEALTH, STATUSES, row_type, state_columns
 from experiments.record.journal import Checkpoint, Entry, Journal
 from experiments.record.reader import Record, assemble
 from experiments.record.records import EventLog
-from mjsim.health.values import HealthSample
 from mjsim.values.actions import Move, Pick, StepAction
 from mjsim.values.episode import Episode
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.steps import Steps
-from mjsim.world import World
-from mjsim.world_state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
+from mjsim.world.health.values import HealthSample
+from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
+from mjsim.world.world import World
 
 FIRST_CAPACITY = 4096  # rows; doubled when they are full
 

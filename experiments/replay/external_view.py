@@ -15,7 +15,7 @@ from mjsim.render import CameraPose, LayeredRenderer
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world import World
+from mjsim.world.world import World
 
 # Simulated time, s -> where the camera is.
 CameraPath = Callable[[float], CameraPose]

@@ -21,7 +21,7 @@ from mjsim.model.scene import compose
 from mjsim.values.errors import ActionError, PhysicsError, StateError
 from mjsim.values.options import WorldOptions
 from mjsim.values.steps import Steps
-from mjsim.world import World
+from mjsim.world.world import World
 from planner.regret import RegretEvaluator
 from planner.service import Planner
 

@@ -23,7 +23,7 @@ from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
 from mjsim.render.cameras import CameraPose
 from mjsim.values.errors import RenderError
 from mjsim.values.observation import Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 
 class FirstPersonRenderer:

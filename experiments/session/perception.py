@@ -21,7 +21,7 @@ from mjsim.model.sight import (
 )
 from mjsim.values.actions import ActionResult
 from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 
 class SessionPercept(Percept):

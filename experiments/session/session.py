@@ -19,7 +19,7 @@ from mjsim.values.actions import IDLE, Action, ActionResult, StepAction, WorldEv
 from mjsim.values.errors import PhysicsError
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.steps import Steps
-from mjsim.world import World
+from mjsim.world.world import World
 
 FINAL_HOLD = 1.6  # s that the session is shown after the last delivery
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.walking.polyline import first_off_path, rest_of
+from mjsim.world.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
 
 TOLERANCE = 0.6  # m the person may leave the path before a new one is shown

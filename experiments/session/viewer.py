@@ -7,7 +7,7 @@ from typing import Protocol
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.values.observation import Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 
 class Viewer(Protocol):

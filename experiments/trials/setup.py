@@ -28,7 +28,7 @@ from mjsim.model.scene import Scene
 from mjsim.values.episode import Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world import World
+from mjsim.world.world import World
 from planner.exact.solver import ExactSolver
 from planner.regret import RegretEvaluator
 from planner.route import TaskState

@@ -16,7 +16,7 @@ from mjsim.model.scene import Scene, compose
 from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.options import FIDELITIES, WorldOptions
-from mjsim.world import World
+from mjsim.world.world import World
 from planner.exact.solver import ExactSolver
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.problem import RoutingProblem, Shipment

@@ -201,7 +201,7 @@ class Frame(WireMessage, frozen=True):
 
 
 class Gait(msgspec.Struct, frozen=True):
-    """Limits and servos of walking, as the field of `mjsim.fidelity.kinematics.Gait`; SI units."""
+    """Limits and servos of walking, as the field of `mjsim.world.fidelity.kinematics.Gait`; SI units."""
 
     max_speed: float
     max_turn: float

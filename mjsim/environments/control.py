@@ -16,7 +16,7 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.values.actions import IDLE, Action, Move, Pick, Place
 from mjsim.values.errors import ActionError
 from mjsim.values.observation import Observation
-from mjsim.world import StepResult, World
+from mjsim.world.world import StepResult, World
 
 Steps = Generator[Action, StepResult, None]
 

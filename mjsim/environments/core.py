@@ -21,7 +21,7 @@ from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.values.actions import EventKind
 from mjsim.values.errors import ActionError, PhysicsError, SamplingError
 from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.world import StepResult, World
+from mjsim.world.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]
 MAX_SEED = 2**31 - 1

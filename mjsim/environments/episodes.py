@@ -17,7 +17,7 @@ from mjsim.render import Labels, Renderer
 from mjsim.values.episode import Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world import World
+from mjsim.world.world import World
 
 _COUNT_STREAM = 41  # draws the number of objects independently of what the seed decides in the house
 

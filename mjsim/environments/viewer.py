@@ -8,7 +8,7 @@ from typing import Any
 from mjsim.diagnostics import INSTALL_DM_CONTROL
 from mjsim.environments.episodes import dm_control_physics
 from mjsim.environments.errors import ViewerError
-from mjsim.world import World
+from mjsim.world.world import World
 
 _BACKEND = "MUJOCO_GL"
 _REMEDY = "run it where there is a display, or use render_mode='rgb_array', which needs none"

@@ -22,7 +22,9 @@ from mjsim.support.files import exchange, read_text, work_folder, write_text_ato
 from mjsim.values.errors import AssetError
 
 HELD = 4  # objects of a kind that a bin has room for, by their boxes
-_SLOTS = 2  # places along each side of a bin where a hand puts things beside each other (mjsim.person.slots)
+_SLOTS = (
+    2  # places along each side of a bin where a hand puts things beside each other (mjsim.world.body.slots)
+)
 MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
 _WALL_GAP = 0.02  # m, between an object and the walls of its bin

@@ -10,7 +10,6 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.model import avatar
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import compiled_house
@@ -27,6 +26,7 @@ from mjsim.scene_export.store import SCENE
 from mjsim.scene_export.surfaces import Surface, drawn_scene, surfaces
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
+from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
 _AWAY = -100.0  # m; where the object models stand, below the house

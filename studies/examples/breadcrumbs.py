@@ -7,7 +7,7 @@ from experiments.house import House
 from experiments.participants.base import Point
 from mjsim.environments.sensors import Sensor, SensorInput, unit_spec
 from mjsim.values.observation import ObjectStatus
-from mjsim.walking.polyline import path_length, point_along
+from mjsim.world.walking.polyline import path_length, point_along
 
 LOOK_AHEAD = 1.0  # m along the path
 

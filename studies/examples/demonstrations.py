@@ -16,7 +16,7 @@ from mjsim.model.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, StepAction
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.walking.walker import Walker
+from mjsim.world.walking.walker import Walker
 
 Policy = Callable[[ObservationDict], NDArray[np.float32]]
 

@@ -106,10 +106,11 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
     "name",
     [
         "mjsim.environments.dm_environment",
+        "mjsim.houses.home_cache",
         "mjsim.model.catalogue",
         "mjsim.model.sampling",
         "mjsim.values.person_parameters",
-        "mjsim.world",
+        "mjsim.world.world",
         "planner.geodesics",
         "planner.problem",
         "planner.solver",

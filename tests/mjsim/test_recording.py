@@ -12,8 +12,8 @@ from small_worlds import do, finish, scene_of
 from mjsim.model.scene import compose
 from mjsim.values.actions import Pick
 from mjsim.values.errors import StateError
-from mjsim.world import World
-from mjsim.world_state import StateHash, WorldState, engine_versions, model_fingerprint
+from mjsim.world.state import StateHash, WorldState, engine_versions, model_fingerprint
+from mjsim.world.world import World
 
 FEW = settings(
     max_examples=15,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import floyd_warshall
 
 import planner.geodesics
-from mjsim.walking.polyline import path_length
+from mjsim.world.walking.polyline import path_length
 from planner.errors import NotNavigableError, UnreachableError
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh

@@ -19,7 +19,7 @@ from experiments.participants.looking import FullTurn
 from experiments.participants.visit_executor import VisitExecutor
 from hud.markers import BREADCRUMB, FLAGPOLE
 from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
-from mjsim.walking.polyline import path_length, project
+from mjsim.world.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
 
 ARRIVED = 0.5  # m from a place on the way, or one to look around from

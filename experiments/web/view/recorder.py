@@ -14,7 +14,7 @@ from mjsim.model.scene import Scene
 from mjsim.render.cameras import camera_pose
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
-from mjsim.world import World
+from mjsim.world.world import World
 
 DECIMALS = 4  # of m, rad and quaternions
 HEIGHT = 480  # px of the picture in which pointers are found

@@ -16,7 +16,7 @@ from experiments.web.worker.frame_size import SIZES, FrameSize, pause_after
 from hud.state import HudState, Marker
 from mjsim.model.scene import Scene
 from mjsim.render import FAST, Renderer
-from mjsim.world import World
+from mjsim.world.world import World
 
 COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # of the smallest size
 MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown

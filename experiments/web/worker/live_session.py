@@ -37,7 +37,7 @@ from experiments.web.server.visits import JOURNALS
 from mjsim.model.scene import compose
 from mjsim.values.actions import Action
 from mjsim.values.options import WorldOptions
-from mjsim.world import World
+from mjsim.world.world import World
 from planner.service import Mode, Planner
 
 LOG = logging.getLogger("mjsim.play")

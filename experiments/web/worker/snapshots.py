@@ -7,10 +7,10 @@ import numpy as np
 from experiments.web.protocol import Gait, Scene, Snapshot, Speeds, View
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
-from mjsim.fidelity import kinematics
 from mjsim.model.foresight import Foresight
 from mjsim.values.errors import AssetError
 from mjsim.values.observation import Observation
+from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
 HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known

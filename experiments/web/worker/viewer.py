@@ -22,7 +22,7 @@ from mjsim.model.avatar import eye_position
 from mjsim.values.actions import Pick
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
-from mjsim.world import World
+from mjsim.world.world import World
 
 HUD_EVERY = (
     4  # control steps after which a client that draws gets the HUD anew; at once after a pick or place

@@ -14,7 +14,7 @@ from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.render import Frame
 from mjsim.values.episode import StartPose
 from mjsim.values.observation import Observation
-from mjsim.world import World
+from mjsim.world.world import World
 
 IMAGES = ("rgb", "depth", "segmentation")
 

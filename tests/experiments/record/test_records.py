@@ -18,11 +18,11 @@ from experiments.record.reader import read_journal
 from experiments.record.records import EPISODE, EVENTS, METRICS, EventLog, read_events
 from experiments.record.run_directory import run_directory
 from experiments.record.writer import RecordWriter
-from mjsim.health.values import HealthSample
 from mjsim.values.actions import Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.steps import States, Steps
+from mjsim.world.health.values import HealthSample
 
 
 def observation(time=0.0, hands=(None, "b")):

@@ -8,7 +8,7 @@ import pytest
 from experiments.replay.external_view import ExternalViewer, camera_path
 from experiments.session.film_config import FilmConfig
 from mjsim.model.footprint import Footprint
-from mjsim.world import World
+from mjsim.world.world import World
 
 BOUNDS = (-1.0, 2.0, 9.0, 8.0)
 CORNERS = np.array([[-1.0, 2.0, 0.0], [9.0, 2.0, 0.0], [9.0, 8.0, 0.0], [-1.0, 8.0, 0.0]])

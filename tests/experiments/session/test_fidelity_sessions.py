@@ -13,9 +13,9 @@ from experiments.record.records import read_events
 from experiments.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.health.monitor import HealthMonitor
 from mjsim.values.actions import WAIT, Move, Wait
 from mjsim.values.errors import PhysicsError
+from mjsim.world.health.monitor import HealthMonitor
 
 
 @pytest.fixture(scope="module", autouse=True)

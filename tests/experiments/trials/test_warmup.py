@@ -15,7 +15,7 @@ from mjsim.model.catalogue import Catalogue
 from mjsim.values.episode import Episode
 from mjsim.model.scene import compose
 from experiments.trials.warmup import compile_kernels
-from mjsim.world import World
+from mjsim.world.world import World
 
 def compiled():
     modules = [m for name, m in list(sys.modules.items()) if name.startswith(("mjsim.", "planner."))]

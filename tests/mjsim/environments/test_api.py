@@ -20,7 +20,7 @@ from mjsim.environments import gymnasium_environment, viewer
 from mjsim.environments.control import MOVES
 from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError, ViewerError
 from mjsim.values.errors import ActionError, PhysicsError
-from mjsim.world import World
+from mjsim.world.world import World
 
 FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")
 ID = "mjsim.environments:mjsim/Rearrange-v0"

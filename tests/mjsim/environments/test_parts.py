@@ -23,7 +23,7 @@ from mjsim.values.actions import IDLE, Move, Pick, Place
 from mjsim.values.errors import ActionError, PhysicsError, SamplingError
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.world import World
+from mjsim.world.world import World
 from planner.navmesh import NavMesh
 
 

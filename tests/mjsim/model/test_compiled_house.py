@@ -20,8 +20,8 @@ from mjsim.model.scene import compose
 from mjsim.model.sight import visible_objects
 from mjsim.values.actions import Move, Pick
 from mjsim.values.errors import AssetError
-from mjsim.world import World
-from mjsim.world_state import model_fingerprint
+from mjsim.world.state import model_fingerprint
+from mjsim.world.world import World
 
 _OBJECT = """
 <mujoco>

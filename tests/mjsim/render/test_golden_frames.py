@@ -26,7 +26,7 @@ from mjsim.model.scene import compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
 from mjsim.values.episode import Episode
-from mjsim.world import World
+from mjsim.world.world import World
 
 golden_frame = fixtures.golden_frame
 GOLDEN = Path(__file__).parents[2] / "golden"

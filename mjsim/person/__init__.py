@@ -1,4 +1,0 @@
-"""The person's body, hands and motions in the physics: picking, carrying, placing, and their rules.
-
-Serves the tiers of `mjsim.fidelity`, which decide when the physics moves the person.
-"""

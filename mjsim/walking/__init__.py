@@ -1,4 +1,0 @@
-"""How a person follows a path on the floor: looks ahead, slows down at corners, passes objects beside the feet.
-
-It serves `mjsim.world`, which carries out the action `FollowPath`, and participants that measure along paths.
-"""

@@ -1,0 +1,150 @@
+"""Carrying: the hands keep their postures and hold their loads clear of the house (`mjsim.world.body.postures`).
+
+A load that gets caught all the same slips out of the hand.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model import avatar
+from mjsim.model.clearance import ClearanceField
+from mjsim.model.house import compiled_house
+from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
+from mjsim.values.inventory import LEFT, RIGHT
+from mjsim.values.motion_parameters import CarryingParameters
+from mjsim.world.body.load_room import BodyMotion, drawn_in
+from mjsim.world.body.person import Person
+from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
+from mjsim.world.body.slots import object_corners
+from mjsim.world.body.strain import count_strain
+
+LOW, HIGH = 0.93, 1.60  # m, heights of carried objects
+
+_NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
+_HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object
+
+
+@dataclass(frozen=True, eq=False)
+class CarryingState:
+    """What carrying remembers between control steps."""
+
+    compliance: NDArray[np.float64]  # how far contact has pushed each hand off its posture, m, (2, 2)
+    strained: NDArray[np.int64]  # control steps for which each hand has been strained, (2,)
+
+
+class Carrying:
+    """Keeps both hands in posture; one instance per world."""
+
+    def __init__(self, person: Person) -> None:
+        scene, rig = person.scene, person.rig
+        self._person = person
+        self.clearance: ClearanceField = compiled_house(scene.catalogue).once(
+            "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
+        )
+        # how far each object reaches sideways and down about its grip, m, (n, 2)
+        self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
+        self._owners = _geom_owners(scene)
+        self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
+        eyes = person.parameters.eye_height
+        postures = avatar.CARRY, avatar.TUCKED, avatar.ASIDE
+        self._postures = {p: np.array(avatar.posture(LEFT, p, eyes)) for p in postures}
+        self._compliance = np.zeros((2, 2))
+        targets, rest = rig.hand_targets, np.array(avatar.posture(LEFT, avatar.REST, eyes))
+        self._body = (rig.pose, rig.motion, tuple(self.clearance))
+        self._hands = (
+            targets, person.hand_velocities, self._compliance, np.zeros((2, 3)), rest, self.loads,
+            person.posture_pace,
+        )  # fmt: skip
+        self._parameters = tuple(person.parameters.carrying)
+        self._strained = np.zeros(2, np.int64)
+
+    def reset(self) -> None:
+        """Forget all contacts."""
+        self._compliance[:] = 0.0
+        self._strained[:] = 0
+
+    def get_state(self) -> CarryingState:
+        """Compliance offsets and strain of the hands as a value."""
+        return CarryingState(self._compliance.copy(), self._strained.copy())
+
+    def set_state(self, state: CarryingState) -> None:
+        """Restore what `get_state` returned."""
+        self._compliance[:] = state.compliance
+        self._strained[:] = state.strained
+
+    def update(self, held_posture: tuple[float, float, float]) -> None:
+        """Set the targets of the hands that no motion moves, and keep the walking command off contacts."""
+        person = self._person
+        left, right = person.held
+        left, right = -1 if left is None else left, -1 if right is None else right
+        moving = -1 if person.moving_hand is None else person.moving_hand
+        holding = (left, right, moving, self._postures[held_posture])
+        contacts = self._contacts() if left >= 0 or right >= 0 else self._no_contacts
+        _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
+
+    def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
+        """Best position (3,), body frame, m, for a hand to carry object `item` clear of the house."""
+        radius, height = self.loads[item].tolist()
+        forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
+        rig, carrying = self._person.rig, self._person.parameters.carrying
+        body = body or BodyMotion(rig.pose, rig.motion, self.clearance)
+        point = drawn_in(forward, left, radius, body, carrying)
+        return np.array([*point, max(up, carrying.least_height + height)])
+
+    def _contacts(self) -> tuple[Any, ...]:
+        """All contacts of the physics, as `Contacts`."""
+        data = self._person.data
+        if not data.ncon:
+            return self._no_contacts
+        contact = data.contact
+        # Strides differ with the number of contacts, and kernels with the strides.
+        return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
+
+    def slipped(self) -> tuple[int, ...]:
+        """Hands whose loads have been strained for too long: stretched off the grip, or held back; counts this step."""
+        person, options = self._person, self._person.options
+        left, right = person.held
+        if left is None and right is None:
+            self._strained[:] = 0
+            return ()
+        found = count_strain(
+            person.rig.pose,
+            person.rig.hand_targets,
+            person.data.site_xpos,
+            person.grips.sites,
+            (left is not None, right is not None),
+            options.grip_error,
+            options.grip_patience / person.dt,
+            self._strained,
+        )
+        return tuple(hand for hand in (LEFT, RIGHT) if found & (1 << hand)) if found else ()
+
+
+@kernel
+def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: Any, dt: float) -> None:
+    """`update_hands` with plain tuples: numba takes them from Python in half the time of named ones."""
+    pose, command, clearance = body
+    motion = BodyMotion(pose, command, ClearanceField(*clearance))
+    update_hands(
+        motion, Hands(*hands), CarryingParameters(*carrying), Holding(*holding), Contacts(*contacts), dt
+    )
+
+
+def _load(person: Person, item: int) -> tuple[float, float]:
+    """How far an object reaches sideways and down about its grip, m."""
+    index = person.scene.index
+    corners = object_corners(person.scene.model, index.geoms(index.names[item]))
+    grip = person.scene.model.site(f"{index.names[item]}/grip_0").pos
+    about = corners - grip
+    return float(np.hypot(about[:, 0], about[:, 1]).max()), float(-about[:, 2].min())
+
+
+def _geom_owners(scene: Scene) -> NDArray[np.int32]:
+    """Object that each geom belongs to, `_HOUSE` or `_PERSON`, shape (ngeom,)."""
+    model, owner = scene.model, scene.index.geom_owner
+    static = model.body_weldid[model.geom_bodyid] == 0
+    return np.where(owner >= 0, owner, np.where(static, _HOUSE, _PERSON)).astype(np.int32)

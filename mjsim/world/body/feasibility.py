@@ -1,0 +1,104 @@
+"""Feasibility of pick and place: reach, sight, hands and targets (PAPER section 3.4)."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mjsim.model import avatar
+from mjsim.model.rays import receptacle_in_sight, sees
+from mjsim.values.actions import ActionResult, Pick, Place, Refusal
+from mjsim.values.inventory import Inventory
+from mjsim.values.observation import ObjectStatus
+from mjsim.world.body.person import Person
+
+_CHEST = 0.75  # of the eye's height
+
+
+def resolve_pick(
+    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
+) -> ActionResult:
+    """Answer to a pick; the state is not changed."""
+    names = person.scene.index.names
+    if busy:
+        return ActionResult(action, Refusal.BUSY, action.object)
+    if action.object is not None and action.object not in names:
+        return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
+    if action.object is None:
+        return _pick_nearest(person, action, inventory, status)
+    item = names.index(action.object)
+    target = person.scene.episode.targets[action.object]
+    answer = ActionResult(action, None, action.object, target)
+    if status[item] is ObjectStatus.CARRIED:
+        return replace(answer, refusal=Refusal.ALREADY_CARRIED)
+    if status[item] is ObjectStatus.DELIVERED:
+        return replace(answer, refusal=Refusal.ALREADY_DELIVERED)
+    if not inventory.free_hands:
+        return replace(answer, refusal=Refusal.HANDS_FULL)
+    if _object_distance(person, item) > person.parameters.reach or not _object_in_sight(person, item):
+        return replace(answer, refusal=Refusal.OUT_OF_REACH)
+    return answer
+
+
+def _pick_nearest(
+    person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus]
+) -> ActionResult:
+    if not inventory.free_hands:
+        return ActionResult(action, Refusal.HANDS_FULL)
+    loose = [i for i, s in enumerate(status) if s is ObjectStatus.LOOSE]
+    near = sorted((d, i) for i in loose if (d := _object_distance(person, i)) <= person.parameters.reach)
+    for _, item in near:
+        if _object_in_sight(person, item):
+            name = person.scene.index.names[item]
+            return ActionResult(action, None, name, person.scene.episode.targets[name])
+    return ActionResult(action, Refusal.NOTHING_IN_REACH)
+
+
+def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
+    """Answer to a place; the state is not changed."""
+    scene = person.scene
+    if busy:
+        return ActionResult(action, Refusal.BUSY, action.object)
+    if action.object is not None and action.object not in scene.index.names:
+        return ActionResult(action, Refusal.UNKNOWN_OBJECT, action.object)
+    if not inventory.carried:
+        return ActionResult(action, Refusal.HANDS_EMPTY, action.object)
+    if action.object is not None and action.object not in inventory.carried:
+        return ActionResult(action, Refusal.NOT_CARRIED, action.object)
+    choices = inventory.carried if action.object is None else (action.object,)
+    targets = scene.episode.targets
+    reachable = reachable_receptacles(person)
+    name = min(choices, key=lambda n: (targets[n] not in reachable, _distance(person, targets[n])))
+    if targets[name] in reachable:
+        return ActionResult(action, None, name, targets[name])
+    if reachable:
+        nearest = min(reachable, key=lambda key: _distance(person, key))
+        return ActionResult(action, Refusal.NOT_THE_RECEPTACLE, name, nearest)
+    return ActionResult(action, Refusal.RECEPTACLE_OUT_OF_REACH, name, targets[name])
+
+
+def reachable_receptacles(person: Person) -> tuple[str, ...]:
+    """Receptacles within reach and in sight, in the episode's order."""
+    near = (k for k in person.scene.receptacles if _distance(person, k) <= person.parameters.reach)
+    return tuple(k for k in near if _receptacle_in_sight(person, k))
+
+
+def _distance(person: Person, key: str) -> float:
+    return person.scene.receptacles[key].distance(person.rig.position)
+
+
+def _object_distance(person: Person, item: int) -> float:
+    return float(np.linalg.norm(person.center(item)[:2] - person.rig.position))
+
+
+def _object_in_sight(person: Person, item: int) -> bool:
+    """Whether the centre or a grip is visible from the eye or the chest; nothing is picked through a wall."""
+    viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
+    points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
+    model, data = person.scene.model, person.data
+    return any(sees(model, data, eye, point) for eye in viewpoints for point in points)
+
+
+def _receptacle_in_sight(person: Person, key: str) -> bool:
+    eye = np.array([*person.rig.position, person.parameters.eye_height])
+    return receptacle_in_sight(person.scene.model, person.data, eye, person.scene.receptacles[key])

@@ -1,0 +1,135 @@
+"""Placing as a motion: over a slot of the receptacle, down to the measured fill, release, wait for rest."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.support.kernels import kernel
+from mjsim.values.options import REST_STEPS
+from mjsim.world.body.hand_path import STRAIGHT
+from mjsim.world.body.person import Motion, Person, Steps, wrap
+from mjsim.world.body.slots import Slot, best_slot, load_extent, object_corners
+
+Vector = NDArray[np.float64]
+
+_TOUCH = 0.0005  # m of overlap at which the descent ends
+_OVERLAP = 0.001  # m of overlap below which the hand opens
+_RAISE = 0.003  # m per control step, until it is
+_RAISE_TIMEOUT = 0.6  # s
+
+
+def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
+    """Put the object of `hand` into its receptacle, look to `pitch`, rad; whether it then rests inside."""
+    heading = square_heading(person, receptacle)
+    yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
+    person.moving_hand = hand
+    corners = object_corners(person.scene.model, person.scene.index.geoms(person.scene.index.names[item]))
+    extent = load_extent(person, hand, item, receptacle, corners)
+    slot = best_slot(person, item, receptacle, extent)
+    hover = hover_height(person, receptacle, slot) - extent.low[2]
+    yield from _travel(person, hand, receptacle, np.array([*slot.hand, hover]))
+    low = float(load_extent(person, hand, item, receptacle, corners).low[2])
+    yield from _descend(person, hand, item, receptacle, slot, low)
+    person.grips.open(hand)
+    success = yield from _settle(person, hand, item, receptacle, pitch)
+    return success
+
+
+def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
+    """Heading along a side of the receptacle that is nearest to looking at it: held objects fit in squarely."""
+    rig = person.rig
+    towards = rig.heading + rig.bearing(receptacle.center)
+    side = math.atan2(receptacle.rotation[1, 0], receptacle.rotation[0, 0])
+    quarter = math.pi / 2
+    return rig.heading + wrap(side + quarter * round(wrap(towards - side) / quarter) - rig.heading)
+
+
+def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
+    """How high an object's lowest point crosses the receptacle, m above the centre of its volume."""
+    return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
+
+
+def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector) -> Vector:
+    return person.rig.to_body(receptacle.center + receptacle.rotation @ local)
+
+
+def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
+    """Up to the hover height, then across to the hover position (3,) in the receptacle's axes."""
+    target = person.rig.hand_targets[hand]
+
+    def above() -> Vector:
+        return _hand_in_body(person, receptacle, hover)
+
+    up = np.array([target[0], target[1], max(target[2], above()[2])])
+    for goal in (lambda: up, above):
+        steps = person.travel_steps(float(np.linalg.norm(goal() - target)))
+        for _ in person.swing(hand, goal, steps, STRAIGHT):
+            person.glance(receptacle.center)
+            yield
+    for _ in range(person.steps(person.motion.hover_time)):
+        yield
+
+
+def _descend(
+    person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, slot: Slot, low: float
+) -> Steps:
+    """Down until the object's lowest point, `low` m from the hand, is just above the fill.
+
+    On touching anything, stop and raise until the overlap is small.
+    """
+    rig = person.rig
+    release = slot.fill + person.motion.release_gap - low
+    goal = _hand_in_body(person, receptacle, np.array([*slot.hand, release]))
+    steps = person.descent_steps(abs(goal[2] - rig.hand_targets[hand, 2]))
+    for _ in person.swing(hand, lambda: goal, steps, STRAIGHT):
+        yield
+        if overlap(person, item) > _TOUCH:
+            rig.hand_targets[hand] = rig.hands[hand]
+            break
+    for _ in range(person.steps(_RAISE_TIMEOUT)):
+        yield
+        if overlap(person, item) < _OVERLAP:
+            break
+        rig.hand_targets[hand, 2] += _RAISE
+
+
+def overlap(person: Person, item: int) -> float:
+    """Deepest overlap of object `item` with anything but the person, m."""
+    data = person.data
+    if not data.ncon:
+        return 0.0
+    geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
+    return deepest_overlap(geoms, distances, person.scene.index.geom_owner, item, person.rig.foot)
+
+
+@kernel
+def deepest_overlap(
+    geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
+) -> float:
+    """Deepest overlap, m, of an object in contacts (k, 2) with distances (k,), m, but for the foot's; 0 without."""
+    deepest = 0.0
+    for c in range(len(distances)):
+        first, second = geoms[c, 0], geoms[c, 1]
+        if (owner[first] == item or owner[second] == item) and first != foot and second != foot:
+            deepest = max(deepest, -distances[c])
+    return deepest
+
+
+def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
+    """Withdraw the hand upwards and wait until the object rests."""
+    options, motion = person.options, person.motion
+    still = 0
+    for step in range(person.steps(options.settle_time)):
+        if step < motion.withdraw_steps:
+            person.rig.hand_targets[hand, 2] += motion.withdraw_step
+        else:
+            person.move_hand_to_rest(hand)
+        person.look_towards(pitch)
+        yield
+        quiet = person.speed(item) < options.settle_speed or person.asleep(item)
+        still = still + 1 if quiet else 0
+        if still >= REST_STEPS:
+            return receptacle.contains(person.center(item), options.volume_margin)
+    return False

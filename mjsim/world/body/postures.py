@@ -1,0 +1,185 @@
+"""One control step of the hands' postures, as numba kernels: how a target moves to where there is room.
+
+If a load touches something static all the same (`mjsim.world.body.load_room`), the hand gives way along the contact's
+normal, up to a limit. From there on the body does not walk or turn into the contact.
+
+Arrays belong to the `Rig` and to `Carrying`, and are changed in place.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import CarryingParameters, MotionParameters
+from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion, drawn_in
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
+
+_ARRIVED = 0.0005  # m
+
+
+class Hands(NamedTuple):
+    """Control of both hands; left before right, in the body frame."""
+
+    targets: Floats  # commanded positions, m, (2, 3)
+    velocities: Floats  # how fast the targets move, m/s, (2, 3)
+    compliance: Floats  # offsets by which the hands give way to contacts, m, (2, 2)
+    goals: Floats  # room for where the hands belong, m, (2, 3)
+    rest: Floats  # where an empty left hand belongs, m, (3,)
+    loads: Floats  # how far each object reaches sideways and down about its grip, m, (n, 2)
+    pace: Floats  # gain, 1/s, fastest, m/s, and acceleration, m/s^2, of a hand on its way to a posture, (3,)
+
+
+class Contacts(NamedTuple):
+    """What touches what."""
+
+    geoms: Ints  # geoms of each contact, (k, 2)
+    frames: Floats  # frame of each contact, the normal first, (k, 9)
+    owners: Ints  # object of each geom, -1 for the house, -2 for the person, (ngeom,)
+
+
+class Holding(NamedTuple):
+    """What the hands are doing."""
+
+    left: int  # object in the hand, or -1
+    right: int
+    moving: int  # hand that a motion moves, or -1
+    posture: Floats  # where a left hand that holds something belongs, m, (3,)
+
+
+def posture_pace(motion: MotionParameters) -> Floats:
+    """`Hands.pace` of a person, shape (3,)."""
+    return np.array([motion.posture_gain, motion.posture_speed, motion.posture_acceleration])
+
+
+@kernel
+def update_hands(
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    holding: Holding,
+    contacts: Contacts,
+    dt: float,
+) -> None:
+    """Set the targets of the hands that no motion moves, and keep the walking command off contacts; dt in s."""
+    for hand in range(2):
+        side = 1.0 - 2.0 * hand
+        hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt
+        hands.compliance[hand, 1] *= 1.0 - carrying.return_rate * dt
+        goal = hands.goals[hand]
+        goal[0], goal[1], goal[2] = hands.rest[0], side * hands.rest[1], hands.rest[2]
+        item = holding.left if hand == 0 else holding.right
+        if item < 0 or hand == holding.moving:
+            continue
+        _comply(hand, item, body, hands, carrying, contacts, dt)
+        radius, height = hands.loads[item, 0], hands.loads[item, 1]
+        forward, left = drawn_in(holding.posture[0], side * holding.posture[1], radius, body, carrying)
+        goal[0] = forward + hands.compliance[hand, 0]
+        goal[1] = left + hands.compliance[hand, 1]
+        goal[2] = max(holding.posture[2], carrying.least_height + height)
+    if holding.left >= 0 and holding.right >= 0 and holding.moving < 0:
+        loads, left, right = hands.loads, holding.left, holding.right
+        _raise_right(hands.goals, loads[left, 0] + loads[right, 0], loads[right, 1], carrying)
+    for hand in range(2):
+        if hand != holding.moving:
+            goal = hands.goals[hand]
+            move_hand(hands.targets, hands.velocities, hand, goal[0], goal[1], goal[2], hands.pace, dt)
+
+
+@kernel
+def move_hand(
+    targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
+) -> None:
+    """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, slower as it comes near.
+
+    `velocities` (2, 3), m/s, change with it; `pace` is that of `Hands`.
+    """
+    dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
+    gap = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if gap < _ARRIVED:
+        velocities[hand, 0] = velocities[hand, 1] = velocities[hand, 2] = 0.0
+        return
+    rate = min(pace[0] * gap, pace[1]) / gap
+    cx = dx * rate - velocities[hand, 0]
+    cy = dy * rate - velocities[hand, 1]
+    cz = dz * rate - velocities[hand, 2]
+    size = math.sqrt(cx * cx + cy * cy + cz * cz)
+    share = min(1.0, pace[2] * dt / size) if size > 0.0 else 0.0
+    velocities[hand, 0] += cx * share
+    velocities[hand, 1] += cy * share
+    velocities[hand, 2] += cz * share
+    for axis in range(3):
+        targets[hand, axis] += velocities[hand, axis] * dt
+
+
+@kernel
+def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
+    """Where two held objects would meet, pass the right one over the left one."""
+    apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
+    near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
+    over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]
+    goals[1, 2] += min(1.0, max(0.0, near)) * max(0.0, over)
+
+
+@kernel
+def _comply(
+    hand: int,
+    item: int,
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    contacts: Contacts,
+    dt: float,
+) -> None:
+    """Give way to everything static that a held object touches from the side."""
+    owners = contacts.owners
+    for contact in range(len(contacts.geoms)):
+        first, second = owners[contacts.geoms[contact, 0]], owners[contacts.geoms[contact, 1]]
+        if first == item and second == -1:
+            sign = -1.0
+        elif second == item and first == -1:
+            sign = 1.0
+        else:
+            continue
+        nx, ny = sign * contacts.frames[contact, 0], sign * contacts.frames[contact, 1]
+        size = math.sqrt(nx * nx + ny * ny)
+        if size > UPRIGHT:
+            _give_way(hand, nx / size, ny / size, body, hands, carrying, dt)
+
+
+@kernel
+def _give_way(
+    hand: int,
+    nx: float,
+    ny: float,
+    body: BodyMotion,
+    hands: Hands,
+    carrying: CarryingParameters,
+    dt: float,
+) -> None:
+    """Move a hand's offset along a contact's normal; at its limit, keep the body from moving into the contact."""
+    command, target, offset = body.command, hands.targets[hand], hands.compliance[hand]
+    c, s = math.cos(body.pose[HEADING]), math.sin(body.pose[HEADING])
+    away_f, away_l = c * nx + s * ny, c * ny - s * nx
+    swing = (away_l * target[0] - away_f * target[1]) * command[TURN]
+    approach = -(away_f * command[FORWARD] + away_l * command[LEFT] + swing)
+    push = (max(approach, 0.0) + carrying.push_back) * dt
+    offset[0] += away_f * push
+    offset[1] += away_l * push
+    size = math.sqrt(offset[0] ** 2 + offset[1] ** 2)
+    most = carrying.most_compliance
+    if size > most:
+        offset[0] *= most / size
+        offset[1] *= most / size
+        if swing < 0.0:
+            command[TURN] = 0.0
+        into = away_f * command[FORWARD] + away_l * command[LEFT]
+        if into < 0.0:
+            command[FORWARD] -= into * away_f
+            command[LEFT] -= into * away_l

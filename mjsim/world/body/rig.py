@@ -1,0 +1,206 @@
+"""The person as servos: poses, commands, and the physics steps of one control step."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model import avatar
+from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
+from mjsim.values.errors import AssetError
+
+Vector = NDArray[np.float64]
+
+# A position servo with damping lags a moving target by kv / kp seconds; the command leads by as much.
+_LEAD = avatar.HAND_KV / avatar.HAND_KP
+_SERVOS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class RigState:
+    """Commands of the person, as a value."""
+
+    motion: Vector  # see `Rig.motion`, (4,)
+    hand_targets: Vector  # see `Rig.hand_targets`, m, (2, 3)
+    previous_hand_targets: Vector  # those of the control step before, m, (2, 3)
+    command: (
+        Vector  # previous commands of the servos: velocities of x, y and yaw, pitch, hand positions, (10,)
+    )
+
+
+class Rig:
+    """Reads and commands the avatar of one simulation."""
+
+    def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
+        self.model, self.data = scene.model, data
+        self._eye_height = scene.person.eye_height
+        model = scene.model
+        self._substeps = round(control_timestep / model.opt.timestep)
+        self._dt = control_timestep
+        joints = [avatar.PREFIX + n for n in ("x", "y", "yaw", "pitch")]
+        joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
+        ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
+        actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
+        # x, y, yaw and pitch of the head, then both hands in the body frame; m and rad; a view of the state, (10,)
+        self.pose = _view(data.qpos, model.jnt_qposadr[ids])
+        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # their velocities, (10,)
+        self._activations = _view(data.act, model.actuator_actadr[actuators])
+        self._controls = _view(data.ctrl, actuators)
+        self.motion = np.zeros(4)  # commanded velocity forward and left, m/s, yaw rate, rad/s, and pitch, rad
+        self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, m
+        self._last_hand_targets = np.zeros((2, 3))
+        self._last_command = np.zeros(_SERVOS)
+        self.grip_sites = tuple(
+            find_id(model, mujoco.mjtObj.mjOBJ_SITE, f"{avatar.PREFIX}{hand}_grip") for hand in avatar.HANDS
+        )
+        self.trunk = find_id(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.TRUNK)
+        self.foot = find_id(model, mujoco.mjtObj.mjOBJ_GEOM, avatar.FOOT)
+        self.body = find_id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BODY)
+        self.reset()
+
+    def reset(self) -> None:
+        """Take the commands from the present state: standing still."""
+        self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
+        self.hand_targets[:] = self.pose[4:].reshape(2, 3)
+        self._last_hand_targets[:] = self.hand_targets
+        self._last_command[:3] = 0.0
+        self._last_command[3:] = self.pose[3:]
+        self._activations[:] = self._last_command
+        self._controls[:] = 0.0
+
+    @property
+    def body_state(self) -> Vector:
+        """Poses, rates, commands and servos as `mjsim.world.fidelity.body_state` lays them out, shape (BODY_SIZE,)."""
+        return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
+
+    def get_state(self) -> RigState:
+        """The commands as a value."""
+        arrays = (self.motion, self.hand_targets, self._last_hand_targets, self._last_command)
+        return RigState(*(array.copy() for array in arrays))
+
+    def set_state(self, state: RigState) -> None:
+        """Restore commands of `get_state`."""
+        self.motion[:] = state.motion
+        self.hand_targets[:] = state.hand_targets
+        self._last_hand_targets[:] = state.previous_hand_targets
+        self._last_command[:] = state.command
+
+    @property
+    def turn(self) -> float:
+        """Commanded yaw rate, rad/s."""
+        return float(self.motion[2])
+
+    @property
+    def pitch_target(self) -> float:
+        """Commanded pitch of the head, rad."""
+        return float(self.motion[3])
+
+    @property
+    def position(self) -> Vector:
+        """Body axis on the floor, m, shape (2,)."""
+        return self.pose[:2].copy()
+
+    @property
+    def heading(self) -> float:
+        """Yaw, rad, unwrapped."""
+        return float(self.pose[2])
+
+    @property
+    def pitch(self) -> float:
+        """Pitch of the head, rad, positive upwards."""
+        return float(self.pose[3])
+
+    @property
+    def speed(self) -> float:
+        """How fast the body walks, m/s."""
+        return math.hypot(self.rates[0], self.rates[1])
+
+    @property
+    def turn_rate(self) -> float:
+        """Yaw rate, rad/s."""
+        return float(self.rates[2])
+
+    @property
+    def hands(self) -> Vector:
+        """Hand positions in the body frame, m, shape (2, 3)."""
+        return self.pose[4:].reshape(2, 3).copy()
+
+    @property
+    def eye(self) -> Vector:
+        """Eye camera in the house frame, m, shape (3,)."""
+        x, y, heading, pitch = self.pose[:4].tolist()
+        return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
+
+    def to_body(self, point: Vector) -> Vector:
+        """A point of the house frame, (3,) m, in the body frame."""
+        x, y, heading = self.pose[:3].tolist()
+        px, py, pz = point.tolist()
+        c, s = math.cos(heading), math.sin(heading)
+        return np.array([c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), pz])
+
+    def bearing(self, point: Vector) -> float:
+        """Direction of a point, m, shape (2,) or (3,), relative to the heading, rad in [-pi, pi]."""
+        x, y, heading = self.pose[:3].tolist()
+        dx, dy = float(point[0]) - x, float(point[1]) - y
+        c, s = math.cos(heading), math.sin(heading)
+        return math.atan2(c * dy - s * dx, c * dx + s * dy)
+
+    def advance(self) -> None:
+        """Step the physics by one control step, ramping the servos from the last commands to the new ones."""
+        ramp_servos(
+            self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
+            self._activations, self._controls, self._dt,
+        )  # fmt: skip
+        mujoco.mj_step(self.model, self.data, self._substeps)
+
+
+@kernel
+def ramp_servos(
+    pose: Vector, motion: Vector, targets: Vector, last_targets: Vector, last_command: Vector,
+    activations: Vector, controls: Vector, dt: float,
+) -> None:  # fmt: skip
+    """Set where the servos' activations start and how fast they change, so that they arrive after one control step.
+
+    The hands ramp from `last_targets` (2, 3), with the lead applied at once. `last_command`, `activations` and
+    `controls` (10,) are those of `MjData.act` and `MjData.ctrl`; all four arrays are overwritten.
+    """
+    heading = pose[2] + 0.5 * motion[2] * dt
+    c, s = math.cos(heading), math.sin(heading)
+    end = np.empty(_SERVOS)
+    end[0] = c * motion[0] - s * motion[1]
+    end[1] = s * motion[0] + c * motion[1]
+    end[2], end[3] = motion[2], motion[3]
+    for hand in range(2):
+        for axis in range(3):
+            lead = (targets[hand, axis] - last_targets[hand, axis]) * (_LEAD / dt)
+            servo = 4 + 3 * hand + axis
+            end[servo] = targets[hand, axis] + lead
+            last_command[servo] = last_targets[hand, axis] + lead
+            last_targets[hand, axis] = targets[hand, axis]
+    for servo in range(_SERVOS):
+        activations[servo] = last_command[servo]
+        controls[servo] = (end[servo] - last_command[servo]) / dt
+        last_command[servo] = end[servo]
+
+
+def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
+    """A view of the values at consecutive addresses."""
+    first, count = int(addresses[0]), len(addresses)
+    if not np.array_equal(addresses, np.arange(first, first + count)):
+        raise AssetError(
+            f"the person's joints lie at {addresses.tolist()} in the state, expected one after another; "
+            "compose the scene with avatar=True"
+        )
+    return values[first : first + count]
+
+
+def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Number of a named part of the person; `AssetError` where the model has no such part."""
+    found = int(mujoco.mj_name2id(model, kind, name))
+    if found < 0:
+        raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")
+    return found

@@ -1,0 +1,131 @@
+"""How full a receptacle is, and where in it the next object goes: a height map by rays, and the best slot."""
+
+import itertools
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.support.kernels import kernel
+from mjsim.world.body.person import Person
+
+Vector = NDArray[np.float64]
+
+_WALL_GAP = 0.012  # m
+_SIDE_GAP = 0.006  # m around an object on its way down
+_MAX_SPACING = 0.02  # m between the points of the height map
+_RAYS_ABOVE = 0.2  # m above the receptacle's volume, where the rays start
+_SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
+_OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
+_SLOPE_COST = 2.0  # metres of fill that a metre of mean gap below the object counts for
+_MIN_GAIN = 0.015  # m of cost by which another place must be better to be taken instead of a slot
+
+
+@dataclass(frozen=True, eq=False)
+class LoadExtent:
+    """Extent of a held object about the hand, in the receptacle's axes."""
+
+    low: Vector  # least coordinates of its corners, m, (3,)
+    high: Vector  # largest coordinates, m, (3,)
+
+
+@dataclass(frozen=True, eq=False)
+class Slot:
+    """Where the hand releases an object."""
+
+    hand: Vector  # horizontal position of the hand in the receptacle's axes, m, (2,)
+    fill: float  # height of what is below the object there, m above the centre of the receptacle's volume
+    top: float  # height that everything in the receptacle stays below, likewise
+
+
+def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
+    """Points (k, 3) of an object's body frame, m, whose bounding box encloses its colliding geoms.
+
+    Mesh geoms give their vertices, others the corners of their bounding boxes.
+    """
+    points = []
+    for geom in geoms:
+        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+            continue
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+        points.append(_geom_points(model, int(geom)) @ rotation.reshape(3, 3).T + model.geom_pos[geom])
+    return np.concatenate(points)
+
+
+def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[geom])
+        first = int(model.mesh_vertadr[mesh])
+        return np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])], np.float64)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    box = model.geom_aabb[geom]
+    return np.asarray(box[:3] + signs * box[3:])
+
+
+def load_extent(
+    person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
+) -> LoadExtent:
+    """Extent of an object as `hand` holds it now; its `corners`, (k, 3) m, are in its own frame."""
+    body = int(person.scene.index.bodies[item])
+    world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
+    local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
+    return LoadExtent(low=local.min(axis=0), high=local.max(axis=0))
+
+
+def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent: LoadExtent) -> Slot:
+    """Where the object comes to lie lowest and most level.
+
+    That is one of 2 x 2 slots; among equals, the one nearest to the person. Another place is taken only if it is
+    better by more than `_MIN_GAIN`. All are chosen such that the object clears the walls, if it can.
+    """
+    half = receptacle.half_size[:2]
+    middle = 0.5 * (extent.low + extent.high)[:2]
+    half_extent = 0.5 * (extent.high - extent.low)[:2]
+    room = np.maximum(half - half_extent - _WALL_GAP, 0.0)
+    points, heights = _height_map(person, item, receptacle)
+    slots, others = np.clip(half * _SLOTS, -room, room), room * _OTHER_PLACES
+    places = np.concatenate((slots, others))
+    fills, costs = _fill_below(places, half_extent, points, heights)
+    me = (np.array([*person.rig.position, 0.0]) - receptacle.center) @ receptacle.rotation
+    far = np.hypot(*(slots - me[:2]).T)
+    count = len(slots)
+    best = int(np.lexsort((far, costs[:count].round(3)))[0])
+    other = count + int(costs[count:].round(3).argmin())
+    if costs[other] < costs[best] - _MIN_GAIN:
+        best = other
+    return Slot(hand=places[best] - middle, fill=float(fills[best]), top=float(heights.max()))
+
+
+def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
+    """Points (k, 2) all over the receptacle, in its axes, and the height of what lies there without `item`, m."""
+    half = receptacle.half_size
+    axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _MAX_SPACING))) for h in half[:2]]
+    local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = receptacle.center[:2] + local @ receptacle.rotation[:2, :2].T
+    ignore = np.array([*person.carried_bodies(), person.scene.index.bodies[item]], np.int32)
+    top = float(receptacle.center[2] + half[2]) + _RAYS_ABOVE
+    heights = person.receptacle_heights.heights(person.data, receptacle, points, top, ignore)
+    return local, np.asarray(np.maximum(heights - receptacle.center[2], -half[2]))
+
+
+@kernel
+def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
+    """Fill height under an object at each centre (k, 2), m, and its cost, m, both (k,).
+
+    Objects tip over on a slope, so the mean gap below the highest point adds to the cost.
+    """
+    fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
+    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)  # at least one point of the map
+    for k in range(len(centres)):
+        total, count = 0.0, 0
+        for p in range(len(points)):
+            dx, dy = abs(points[p, 0] - centres[k, 0]), abs(points[p, 1] - centres[k, 1])
+            if dx <= reach[0] and dy <= reach[1]:
+                fills[k] = max(fills[k], heights[p])
+                total += heights[p]
+                count += 1
+        costs[k] = fills[k] + _SLOPE_COST * (fills[k] - total / count)
+    return fills, costs

@@ -1,0 +1,196 @@
+"""Kernels of control steps without physics: the body walks, the hands keep their posture, held objects move along."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.clearance import ClearanceField
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import CarryingParameters
+from mjsim.values.steps import States
+from mjsim.world.body.load_room import BodyMotion
+from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
+from mjsim.world.fidelity import kinematics
+from mjsim.world.fidelity.body_state import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
+from mjsim.world.fidelity.kinematics import Gait
+from mjsim.world.fidelity.trunk_contact import Floor
+from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, later_step, next_step
+
+Floats = NDArray[np.float64]
+
+# Layout of `KinematicState.vector`.
+TIME = 0  # s
+BODY = 1  # the body of `mjsim.world.fidelity.kinematics`
+HANDS = BODY + BODY_SIZE  # both hands in the body frame, m
+HAND_SPEEDS = HANDS + 6  # m/s
+GRASPS = HAND_SPEEDS + 6  # per hand: 2 * object + grip, or -1
+STATE_SIZE = GRASPS + 2
+
+REST, CARRY, TUCKED, ASIDE = 0, 1, 2, 3  # rows of `KinematicModel.postures`
+
+_PRIME = np.uint64(0x9E3779B97F4A7C15)
+_SHIFT = np.uint64(29)
+_NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9)), np.zeros(0, np.int32)
+
+
+class KinematicState(NamedTuple):
+    """Everything that changes from control step to control step; kernels change it in place."""
+
+    vector: Floats  # time, body, hands and grasps, shape (STATE_SIZE,)
+    poses: Floats  # poses of the objects, m and wxyz, shape (n, 7)
+
+
+class KinematicModel(NamedTuple):
+    """Everything that stays the same."""
+
+    gait: Gait  # limits and servos of the body
+    floor: Floor  # outlines that the trunk meets
+    grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7)
+    loads: Floats  # how far each object reaches sideways and down about its grip, m, shape (n, 2)
+    posture_pace: Floats  # as `Hands.pace`, shape (3,)
+    carrying: CarryingParameters  # how the person carries
+    # where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
+    # turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3)
+    postures: Floats
+    clearance: ClearanceField  # clearance at the heights of carried objects
+    timestep: float  # of the physics, s
+    compliance: Floats  # compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2)
+    goals: Floats  # scratch space for the goals of the hands, m, shape (2, 3)
+
+
+@kernel
+def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: States) -> None:
+    """One control step per row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
+    body = state.vector[BODY:HANDS]
+    for row in range(len(moves)):
+        kinematics.command(body, moves[row, 0], moves[row, 1], moves[row, 2], moves[row, 3], model.gait)
+        control_step(state, CARRY, -1, model)
+        write_row(row, state, rows)
+
+
+@kernel
+def follow_rows(
+    walk: Walk, progress: Floats, state: KinematicState, model: KinematicModel, moves: Floats, rows: States
+) -> tuple[int, int]:
+    """Walk along a path until the walk has to stop; fills moves (n, 4) and rows.
+
+    Returns the number of control steps made, n at most, and the latest phase of the walk.
+    """
+    body, count = state.vector[BODY:HANDS], 0
+    while True:
+        x, y, heading, time = body[X], body[Y], body[HEADING], state.vector[TIME]
+        if count == 0:
+            phase, forward, left, turn = next_step(walk, x, y, heading, time, progress)
+        else:
+            phase, forward, left, turn = later_step(walk, x, y, heading, time, progress)
+        if phase in (ARRIVED, CHANGED):
+            return count, phase
+        moves[count, 0], moves[count, 1], moves[count, 2], moves[count, 3] = forward, left, turn, 0.0
+        kinematics.command(body, forward, left, turn, 0.0, model.gait)
+        control_step(state, CARRY, -1, model)
+        write_row(count, state, rows)
+        count += 1
+        if phase == BLOCKED or count == len(moves):
+            return count, phase
+
+
+@kernel
+def control_step(state: KinematicState, posture: int, moving: int, model: KinematicModel) -> None:
+    """One control step with the present commands, which changes `state`.
+
+    `posture` is the row of `KinematicModel.postures` for hands that hold something; `moving` is the hand that stays
+    where it was put, or -1.
+    """
+    vector = state.vector
+    body = vector[BODY:HANDS]
+    targets, speeds = vector[HANDS:HAND_SPEEDS].reshape(2, 3), vector[HAND_SPEEDS:GRASPS].reshape(2, 3)
+    update_hands(
+        BodyMotion(body, body[FORWARD:], model.clearance),
+        Hands(
+            targets,
+            speeds,
+            model.compliance,
+            model.goals,
+            model.postures[REST],
+            model.loads,
+            model.posture_pace,
+        ),
+        model.carrying,
+        Holding(held_in(vector, 0), held_in(vector, 1), moving, model.postures[posture]),
+        Contacts(_NO_GEOMS, _NO_FRAMES, _NO_OWNERS),
+        model.gait.dt,
+    )
+    kinematics.advance(body, model.gait, model.floor)
+    for _ in range(model.gait.substeps):  # the sum that the physics forms, to the last bit
+        vector[TIME] += model.timestep
+    carry(state, model)
+
+
+@kernel
+def held_in(vector: Floats, hand: int) -> int:
+    """Object in a hand, or -1; the vector is that of a `KinematicState`, shape (STATE_SIZE,)."""
+    grasp = int(vector[GRASPS + hand])
+    return grasp // 2 if grasp >= 0 else -1
+
+
+@kernel
+def carry(state: KinematicState, model: KinematicModel) -> None:
+    """Put the held objects where the hands are."""
+    vector = state.vector
+    heading = vector[BODY + HEADING]
+    half = 0.5 * heading
+    c, s = math.cos(heading), math.sin(heading)
+    ch, sh = math.cos(half), math.sin(half)
+    for hand in range(2):
+        grasp = int(vector[GRASPS + hand])
+        if grasp < 0:
+            continue
+        grip = model.grips[grasp // 2, grasp % 2]
+        pose = state.poses[grasp // 2]
+        first = HANDS + 3 * hand
+        forward, left = vector[first] + grip[0], vector[first + 1] + grip[1]
+        pose[0] = vector[BODY + X] + c * forward - s * left
+        pose[1] = vector[BODY + Y] + s * forward + c * left
+        pose[2] = vector[first + 2] + grip[2]
+        pose[3] = ch * grip[3] - sh * grip[6]
+        pose[4] = ch * grip[4] - sh * grip[5]
+        pose[5] = ch * grip[5] + sh * grip[4]
+        pose[6] = ch * grip[6] + sh * grip[3]
+
+
+@kernel
+def write_row(row: int, state: KinematicState, rows: States) -> None:
+    """Write the present state into a row."""
+    vector = state.vector
+    rows.time[row] = vector[TIME]
+    rows.position[row, 0], rows.position[row, 1] = vector[BODY + X], vector[BODY + Y]
+    rows.heading[row], rows.pitch[row] = vector[BODY + HEADING], vector[BODY + PITCH]
+    rows.object_position[row] = state.poses[:, :3]
+    rows.object_quaternion[row] = state.poses[:, 3:]
+    rows.state_hash[row] = state_hash(state)
+    # Held objects are in line with their hands, and nothing else touches anything.
+    rows.health[row, :2], rows.health[row, 6] = 0.0, math.nan
+    for hand in range(2):
+        error = 0.0 if vector[GRASPS + hand] >= 0.0 else math.nan
+        rows.health[row, 2 + hand] = rows.health[row, 4 + hand] = error
+
+
+@kernel
+def state_hash(state: KinematicState) -> np.uint64:
+    """64 bits over everything that changes."""
+    digest = np.uint64(0)
+    for word in state.vector.view(np.uint64):
+        digest = (digest ^ word) * _PRIME
+        digest ^= digest >> _SHIFT
+    # Four chains side by side, which a processor works on at once.
+    words = state.poses.reshape(state.poses.size).view(np.uint64)
+    lanes = np.array([1, 2, 3, 4], np.uint64)
+    for i in range(len(words)):
+        lanes[i % 4] = (lanes[i % 4] ^ words[i]) * _PRIME
+        lanes[i % 4] ^= lanes[i % 4] >> _SHIFT
+    for lane in lanes:
+        digest = (digest ^ lane) * _PRIME
+        digest ^= digest >> _SHIFT
+    return digest

@@ -1,0 +1,208 @@
+"""Person and objects without physics: their state, walking, and the data that a renderer or a ray needs."""
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model import avatar
+from mjsim.model.house import compiled_house
+from mjsim.model.scene import Scene
+from mjsim.values.errors import StateError
+from mjsim.values.inventory import LEFT
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import States
+from mjsim.world.body.grips import AWAKE
+from mjsim.world.fidelity.body_state import LOOK
+from mjsim.world.fidelity.full import Full
+from mjsim.world.fidelity.kinematic_steps import (
+    BODY,
+    GRASPS,
+    HAND_SPEEDS,
+    HANDS,
+    STATE_SIZE,
+    TIME,
+    KinematicModel,
+    KinematicState,
+    carry,
+    follow_rows,
+    state_hash,
+    walk_rows,
+)
+from mjsim.world.fidelity.kinematics import Gait
+from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
+from mjsim.world.fidelity.trunk_contact import Floor
+from mjsim.world.walking.path_following import Walk
+
+# An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
+_REST_ACCELERATION = 3.0
+MAX_ROWS = 256  # control steps in one call
+
+
+class KinematicWorld:
+    """One person and all objects, moved by `mjsim.world.fidelity.kinematic_steps`.
+
+    `state` is all that changes from step to step, `model` all that stays the same; `asleep` is the sleep state of each
+    kinematic tree, as in `MjData.tree_asleep`, where physics left it at rest.
+    """
+
+    def __init__(self, full: Full, options: WorldOptions) -> None:
+        scene, carrying = full.scene, full.carrying
+        self._model, self._index, self._rig = scene.model, scene.index, full.person.rig
+        self._qpos = (scene.index.qpos[:, None] + np.arange(7)).ravel()
+        self.person_tree = int(scene.model.body_treeid[self._rig.body])
+        self.state = KinematicState(np.zeros(STATE_SIZE), np.zeros((len(scene.index.names), 7)))
+        self.asleep = np.zeros(scene.model.ntree, np.int32)
+        self.model = KinematicModel(
+            gait=Gait.of(scene, options),
+            floor=_floor(scene),
+            grips=_grip_poses(scene),
+            loads=carrying.loads,
+            posture_pace=full.person.posture_pace,
+            carrying=scene.person.carrying,
+            postures=np.array(
+                [
+                    avatar.posture(LEFT, place, scene.person.eye_height)
+                    for place in (avatar.REST, avatar.CARRY, avatar.TUCKED, avatar.ASIDE)
+                ]
+            ),
+            clearance=carrying.clearance,
+            timestep=float(scene.model.opt.timestep),
+            compliance=np.zeros((2, 2)),
+            goals=np.zeros((2, 3)),
+        )
+        self._body = self.state.vector[BODY:HANDS]
+        self._rows = States.empty(MAX_ROWS, len(scene.index.names))
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return float(self.state.vector[TIME])
+
+    @property
+    def body(self) -> NDArray[np.float64]:
+        """The person's body as in `mjsim.world.fidelity.kinematics`; a view of the state, shape (BODY_SIZE,)."""
+        return self._body
+
+    @property
+    def hands(self) -> NDArray[np.float64]:
+        """Where the hands are in the body's frame, m; a view of the state, shape (2, 3)."""
+        return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
+
+    @property
+    def pitch_target(self) -> float:
+        """Commanded pitch of the head, rad."""
+        return float(self._body[LOOK])
+
+    @property
+    def grasps(self) -> list[tuple[int, int] | None]:
+        """Object and grip that each hand holds."""
+        return [None if grasp < 0 else divmod(int(grasp), 2) for grasp in self.state.vector[GRASPS:]]
+
+    def grasp(self, hand: int, item: int, grip: int) -> None:
+        """Put an object into a hand, in line with it."""
+        self.wake(item)
+        self.state.vector[GRASPS + hand] = 2 * item + grip
+        carry(self.state, self.model)
+
+    def release(self, hand: int) -> None:
+        """Empty a hand."""
+        self.state.vector[GRASPS + hand] = -1
+
+    def wake(self, item: int) -> None:
+        """Wake an object and all that came to rest together with it."""
+        tree = int(self._index.trees[item])
+        while self.asleep[tree] >= 0:
+            self.asleep[tree], tree = AWAKE, int(self.asleep[tree])
+
+    def reset(self, data: mujoco.MjData) -> None:
+        """Start from physics that was just reset and brought up to date (`mj_forward`)."""
+        rig, vector = self._rig, self.state.vector
+        vector[TIME] = data.time
+        self._body[:] = rig.body_state
+        vector[HANDS:HAND_SPEEDS] = rig.hand_targets.ravel()
+        vector[HAND_SPEEDS:GRASPS], vector[GRASPS:] = 0.0, -1.0
+        self.state.poses[:] = data.qpos[self._qpos].reshape(-1, 7)
+        self.asleep[:] = data.tree_asleep
+        acceleration = np.abs(data.qacc) * self._model.dof_length
+        trees = self._model.body_treeid[self._model.dof_bodyid]
+        fastest = np.zeros(self._model.ntree)
+        np.maximum.at(fastest, trees, acceleration)
+        at_rest = (fastest < _REST_ACCELERATION) & (np.arange(len(fastest)) != self.person_tree)
+        self.asleep[at_rest] = np.flatnonzero(at_rest)
+
+    def write(self, data: mujoco.MjData) -> None:
+        """Bring poses of bodies, geoms, sites and cameras in step, for rendering and rays."""
+        model, vector = self._model, self.state.vector
+        if data.ntree_awake < model.ntree:
+            mujoco.mj_resetData(model, data)  # bodies that sleep do not follow their coordinates
+        data.time = vector[TIME]
+        data.qpos[self._qpos] = self.state.poses.ravel()
+        self._rig.pose[:4] = vector[BODY : BODY + 4]
+        self._rig.pose[4:] = vector[HANDS:HAND_SPEEDS]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+
+    def walk(self, moves: NDArray[np.float64]) -> States | None:
+        """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s; the states between them."""
+        walk_rows(moves, self.state, self.model, self._rows)
+        return self._passed(len(moves))
+
+    def follow(
+        self, walk: Walk, progress: NDArray[np.float64], limit: int
+    ) -> tuple[int, NDArray[np.float64], States | None]:
+        """Walk along a path: the latest phase, the moves made, shape (n, 4), and the states between them."""
+        moves = np.empty((min(limit, MAX_ROWS), 4))
+        count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
+        return phase, moves[:count], self._passed(count)
+
+    def play(self, trajectory: MotionTrajectory, start: int, end: int) -> States | None:
+        """Go through the control steps `start` to `end` of a trajectory; the states between them."""
+        play_rows(trajectory, start, end, self.state, self._rows)
+        return self._passed(end - start)
+
+    def _passed(self, count: int) -> States | None:
+        """The states between `count` control steps that were just taken."""
+        return None if count < 2 else States._make(column[: count - 1].copy() for column in self._rows)
+
+    def state_hash(self) -> int:
+        """64 bits that differ whenever the state differs (up to chance)."""
+        return int(state_hash(self.state))
+
+    def pack(self) -> NDArray[np.float64]:
+        """The whole state, shape (STATE_SIZE + 7 n + trees,)."""
+        return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
+
+    def unpack(self, values: NDArray[np.float64]) -> None:
+        """Continue from what `pack` gave, shape (STATE_SIZE + 7 n + trees,); `StateError` where it does not fit."""
+        vector, poses = self.state
+        sizes = (STATE_SIZE, poses.size, len(self.asleep))
+        if values.shape != (sum(sizes),) or not np.isfinite(values).all():
+            raise StateError(
+                f"a state of {values.size} numbers does not fit, {sum(sizes)} finite ones do; take it from a world of "
+                "the same house, objects and fidelity"
+            )
+        new_vector, new_poses, asleep = np.split(values, np.cumsum(sizes)[:2])
+        sleepers = np.flatnonzero(asleep >= 0)
+        if not np.array_equal(np.sort(asleep[sleepers]), sleepers):
+            raise StateError("the state's sleeping objects do not form rings; take it from a world's `state`")
+        vector[:], poses[:], self.asleep[:] = new_vector, new_poses.reshape(-1, 7), asleep
+
+
+def _floor(scene: Scene) -> Floor:
+    """Outlines that the trunk meets, worked out once per house and radius."""
+    radius = scene.person.body_radius
+    house = compiled_house(scene.catalogue)
+    return house.once(("floor", radius), lambda: Floor.of(scene.model, radius))
+
+
+def _grip_poses(scene: Scene) -> NDArray[np.float64]:
+    """Pose of each object in the frame of a hand that is in line with its grip 0 or 1, shape (n, 2, 7)."""
+    model, names = scene.model, scene.index.names
+    poses = np.zeros((len(names), 2, 7))
+    for item, name in enumerate(names):
+        for grip in avatar.GRIPS:
+            site = model.site(f"{name}/grip_{grip}")
+            pose = poses[item, grip]
+            mujoco.mju_negPose(pose[:3], pose[3:], site.pos, site.quat)
+    return poses

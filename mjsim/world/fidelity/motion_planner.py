@@ -1,0 +1,211 @@
+"""Picks and places computed without physics, with the times and speeds of `mjsim.values.person_parameters`.
+
+Only the fall of a released object is physics. Success is decided by the same test as in `mjsim.world.body.placing`.
+"""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.values.actions import ActionResult, EventKind, Place
+from mjsim.world.body.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
+from mjsim.world.body.load_room import BodyMotion
+from mjsim.world.body.placing import hover_height, square_heading
+from mjsim.world.body.slots import LoadExtent, Slot, best_slot, object_corners
+from mjsim.world.fidelity import motion_primitives
+from mjsim.world.fidelity.body_state import FORWARD, HEADING, X, Y
+from mjsim.world.fidelity.fall import Fall, drop
+from mjsim.world.fidelity.full import Full
+from mjsim.world.fidelity.kinematic_steps import HANDS
+from mjsim.world.fidelity.kinematic_world import KinematicWorld
+from mjsim.world.fidelity.motion_primitives import HandMovement, MotionTrajectory
+
+Vector = NDArray[np.float64]
+
+_USUAL_STEPS = 200  # control steps of a motion; room for more is made when it is needed
+_REACH_LAG = 2  # control steps that a hand lags behind at the end of a reach
+_SEATING = 1  # control step in which a load is drawn into a hand that closes firmly
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMotion:
+    """A pick or place, computed in advance."""
+
+    trajectory: MotionTrajectory  # the state after each control step
+    success: bool = True  # whether the hand holds the object, or it rests in its receptacle
+    incidents: tuple[tuple[int, EventKind, int], ...] = ()  # other events: control step, kind and object
+
+    @property
+    def length(self) -> int:
+        """Number of control steps."""
+        return int(self.trajectory.length[0])
+
+
+class MotionPlanner:
+    """Computes motions from the present state of a kinematic world, which is left as it was.
+
+    The data of the physics must be up to date with it.
+    """
+
+    def __init__(self, full: Full, kinematic: KinematicWorld) -> None:
+        self._full, self._kinematic, self._person = full, kinematic, full.person
+        self._times, self._steps = full.person.motion, full.person.steps
+        self._corners: dict[tuple[int, int], Vector] = {}
+
+    def plan(self, result: ActionResult, hand: int, item: int) -> PlannedMotion:
+        """The whole pick or place."""
+        state = self._kinematic.state
+        before = state.vector.copy(), state.poses.copy()
+        self._hand, self._trajectory = hand, MotionTrajectory.empty(_USUAL_STEPS, len(state.poses))
+        if isinstance(result.action, Place):
+            planned = self._place(item, self._full.scene.receptacles[str(result.receptacle)])
+        else:
+            planned = self._pick(item)
+        state.vector[:], state.poses[:] = before
+        return planned
+
+    def _pick(self, item: int) -> PlannedMotion:
+        kinematic, pitch = self._kinematic, self._kinematic.pitch_target
+        kinematic.grasp(self._hand, item, self._reach(item))
+        self._move(self._hand_position, self._steps(self._times.align_time))
+        body_motion = BodyMotion(kinematic.body, kinematic.body[FORWARD:], kinematic.model.clearance)
+        goal = self._full.carrying.carry_position(self._hand, item, body_motion)
+        self._move(goal, self._steps(self._times.lift_time), UP_FIRST, _towards(pitch))
+        self._move(self._hand_position, _SEATING)
+        self._end()
+        return PlannedMotion(self._trajectory)
+
+    def _place(self, item: int, receptacle: ReceptacleGeometry) -> PlannedMotion:
+        pitch = self._kinematic.pitch_target
+        slot, low = self._bring_over(item, receptacle)
+        self._move(self._hand_position, self._steps(self._times.hover_time))
+        self._descend(receptacle, _over(slot, slot.fill + self._times.release_gap - low))
+        fall = drop(self._full, self._kinematic, self._hand, item, receptacle)
+        released = int(self._trajectory.length[0])
+        self._withdraw(fall, pitch)
+        self._end()
+        incidents = tuple((released + step, kind, item) for step, kind, item in fall.incidents)
+        return PlannedMotion(self._trajectory, fall.success, incidents)
+
+    def _reach(self, item: int) -> int:
+        """Turn to an object and reach for it; the grip that is nearest then."""
+        grips, center = self._person.grips, self._person.center(item)
+        self._face(center, math.nan, self._times.object_tolerance)
+        heading = float(self._kinematic.body[HEADING])
+        grip = grips.grip_along(item, np.array([math.cos(heading), math.sin(heading), 0.0]))
+        steps = self._steps(self._times.reach_time)
+        self._move(grips.point(item, grip), steps, ACROSS_FIRST, center, in_house=True)
+        self._move(self._hand_position, _REACH_LAG)
+        return grip
+
+    def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
+        """Turn to a receptacle and bring the load over it; the slot, and how far below the hand the load ends, m."""
+        heading = square_heading(self._person, receptacle)
+        self._face(receptacle.center, heading, self._times.receptacle_tolerance)
+        extent = self._load_extent(receptacle)
+        low = float(extent.low[2])
+        slot = best_slot(self._person, item, receptacle, extent)
+        self._travel(receptacle, _over(slot, hover_height(self._person, receptacle, slot) - low))
+        return slot, low
+
+    def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
+        """Extent of a load about the hand that holds it, in the receptacle's axes."""
+        grasp = self._kinematic.grasps[self._hand]
+        if grasp is None:  # a place begins only with something in the hand
+            return LoadExtent(np.zeros(3), np.zeros(3))
+        if grasp not in self._corners:
+            self._corners[grasp] = self._corners_about_hand(*grasp)
+        heading = float(self._kinematic.body[HEADING])
+        c, s = math.cos(heading), math.sin(heading)
+        turned = self._corners[grasp] @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        local = turned @ receptacle.rotation
+        return LoadExtent(low=local.min(axis=0), high=local.max(axis=0))
+
+    def _corners_about_hand(self, item: int, grip: int) -> Vector:
+        index, model = self._full.scene.index, self._full.scene.model
+        corners = object_corners(model, index.geoms(index.names[item]))
+        pose = self._kinematic.model.grips[item, grip]
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, pose[3:])
+        return np.asarray(corners @ rotation.reshape(3, 3).T + pose[:3])
+
+    @property
+    def _hand_position(self) -> Vector:
+        """The hand in the body frame, m, shape (3,)."""
+        first = HANDS + 3 * self._hand
+        return self._kinematic.state.vector[first : first + 3].copy()
+
+    def _face(self, point: Vector, heading: float, tolerance: float) -> None:
+        """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad."""
+        kinematic, steps = self._kinematic, self._steps(self._times.turn_timeout)
+        room = self._room(steps)
+        motion_primitives.face(
+            kinematic.state, room, point, heading, tolerance, steps, self._times, kinematic.model
+        )
+
+    def _move(
+        self,
+        goal: Vector,
+        steps: int,
+        order: int = STRAIGHT,
+        gaze: Vector | None = None,
+        *,
+        in_house: bool = False,
+    ) -> None:
+        """Move the hand to a goal (3,) m; see `HandMovement`. Without a gaze the head stays as it is."""
+        kinematic, room = self._kinematic, self._room(steps)
+        gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
+        movement = HandMovement(self._hand, goal, in_house, steps, order, gaze)
+        motion_primitives.move_hand(kinematic.state, room, movement, self._times, kinematic.model)
+
+    def _travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
+        """Up to the hover height, then across to the hover position (3,) in the receptacle's axes, m."""
+        goal, person = receptacle.center + receptacle.rotation @ hover, self._person
+        start, above = self._hand_position, self._in_body(goal)
+        up = np.array([start[0], start[1], max(start[2], above[2])])
+        self._move(up, person.travel_steps(float(np.linalg.norm(up - start))), gaze=receptacle.center)
+        distance = float(np.linalg.norm(self._in_body(goal) - self._hand_position))
+        self._move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
+
+    def _descend(self, receptacle: ReceptacleGeometry, release: Vector) -> None:
+        """Down to the release position (3,) in the receptacle's axes, m, and one step more to see what it touches."""
+        goal = self._in_body(receptacle.center + receptacle.rotation @ release)
+        self._move(goal, self._person.descent_steps(abs(float(goal[2] - self._hand_position[2]))))
+        self._move(self._hand_position, 1)
+
+    def _withdraw(self, fall: Fall, pitch: float) -> None:
+        """Withdraw the hand while the released object falls; the head looks to `pitch`, rad."""
+        kinematic, room = self._kinematic, self._room(len(fall.poses))
+        motion_primitives.withdraw(
+            kinematic.state, room, self._hand, fall.poses, pitch, self._times, kinematic.model
+        )
+        kinematic.state.poses[:] = fall.rest
+
+    def _end(self) -> None:
+        """The control step in which the motion has ended."""
+        motion_primitives.end(self._kinematic.state, self._room(1), self._kinematic.model)
+
+    def _room(self, steps: int) -> MotionTrajectory:
+        """The trajectory, with room for more control steps."""
+        if int(self._trajectory.length[0]) + steps > len(self._trajectory.vectors):
+            self._trajectory = self._trajectory.longer(steps)
+        return self._trajectory
+
+    def _in_body(self, point: Vector) -> Vector:
+        body = self._kinematic.body
+        c, s = math.cos(body[HEADING]), math.sin(body[HEADING])
+        dx, dy = point[0] - body[X], point[1] - body[Y]
+        return np.array([c * dx + s * dy, c * dy - s * dx, point[2]])
+
+
+def _over(slot: Slot, height: float) -> Vector:
+    return np.array([slot.hand[0], slot.hand[1], height])
+
+
+def _towards(pitch: float) -> Vector:
+    """The gaze of a `HandMovement` that only looks to a pitch, rad."""
+    return np.array([math.nan, math.nan, pitch])

@@ -1,0 +1,221 @@
+"""Kernels of the movements of picking and placing without physics, timed as in `mjsim.world.body`."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.support.kernels import kernel
+from mjsim.values.motion_parameters import MotionParameters
+from mjsim.values.steps import States
+from mjsim.world.body.hand_path import progress
+from mjsim.world.fidelity import kinematics
+from mjsim.world.fidelity.body_state import (
+    FORWARD,
+    HEADING,
+    LEFT,
+    LOOK,
+    PITCH,
+    TURN,
+    TURN_RATE,
+    VX,
+    VY,
+    X,
+    Y,
+)
+from mjsim.world.fidelity.kinematic_steps import (
+    ASIDE,
+    BODY,
+    CARRY,
+    HAND_SPEEDS,
+    HANDS,
+    STATE_SIZE,
+    TUCKED,
+    KinematicModel,
+    KinematicState,
+    control_step,
+    write_row,
+)
+from mjsim.world.fidelity.kinematics import Gait
+
+Floats = NDArray[np.float64]
+
+
+class MotionTrajectory(NamedTuple):
+    """States of a motion that was worked out before it is played, one per control step."""
+
+    vectors: Floats  # `KinematicState.vector` after each step, shape (max, STATE_SIZE)
+    poses: Floats  # poses of the objects, m and wxyz, shape (max, n, 7)
+    length: NDArray[np.int64]  # number of control steps so far, shape (1,)
+
+    @classmethod
+    def empty(cls, max_steps: int, objects: int) -> "MotionTrajectory":
+        """Room for `max_steps` control steps."""
+        return cls(
+            np.empty((max_steps, STATE_SIZE)), np.empty((max_steps, objects, 7)), np.zeros(1, np.int64)
+        )
+
+    def longer(self, steps: int) -> "MotionTrajectory":
+        """The same with room for this many more control steps at least."""
+        size, objects = len(self.vectors) + max(steps, len(self.vectors)), self.poses.shape[1]
+        longer, length = MotionTrajectory.empty(size, objects), int(self.length[0])
+        longer.vectors[:length], longer.poses[:length] = self.vectors[:length], self.poses[:length]
+        longer.length[0] = length
+        return longer
+
+
+class HandMovement(NamedTuple):
+    """Where a hand goes, and how."""
+
+    hand: int  # the hand
+    goal: Floats  # where it ends, m, shape (3,)
+    in_house: bool  # whether the goal is in the frame of the house, else in that of the body
+    steps: int  # control steps that it takes
+    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.world.body.hand_path`
+    gaze: Floats  # point of the house to glance at, m, shape (3,); or NaN, NaN and the pitch to look to, rad
+
+
+@kernel
+def _append(trajectory: MotionTrajectory, state: KinematicState) -> None:
+    row = trajectory.length[0]
+    trajectory.vectors[row] = state.vector
+    trajectory.poses[row] = state.poses
+    trajectory.length[0] = row + 1
+
+
+@kernel
+def play_rows(
+    trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: States
+) -> None:
+    """Take the state through the control steps `start` to `end` of a trajectory."""
+    for row in range(start, end):
+        state.vector[:] = trajectory.vectors[row]
+        state.poses[:] = trajectory.poses[row]
+        write_row(row - start, state, rows)
+
+
+@kernel
+def face(
+    state: KinematicState,
+    trajectory: MotionTrajectory,
+    point: Floats,
+    heading: float,
+    tolerance: float,
+    max_steps: int,
+    motion: MotionParameters,
+    model: KinematicModel,
+) -> None:
+    """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad, as `Person.face`."""
+    body = state.vector[BODY:HANDS]
+    for _ in range(max_steps):
+        if _turn(body, point, heading, tolerance, motion, model.gait):
+            return
+        control_step(state, TUCKED, -1, model)
+        _append(trajectory, state)
+    body[FORWARD] = body[LEFT] = body[TURN] = 0.0
+
+
+@kernel
+def _turn(
+    body: Floats, point: Floats, heading: float, tolerance: float, motion: MotionParameters, gait: Gait
+) -> bool:
+    """Set the commands for the next control step of a turn; whether the person stands and the turn is complete."""
+    towards = math.atan2(point[1] - body[Y], point[0] - body[X]) if math.isnan(heading) else heading
+    error = towards - body[HEADING]
+    error = (error + math.pi) % (2.0 * math.pi) - math.pi
+    speed = math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
+    standing = speed < motion.standing_speed and abs(body[TURN_RATE]) < motion.standing_turn_rate
+    if abs(error) < tolerance and standing:
+        body[FORWARD] = body[LEFT] = body[TURN] = 0.0
+        return True
+    kinematics.brake(body, motion.turn_gain * error if abs(error) > 0.5 * tolerance else 0.0, gait)
+    _glance(body, point, motion, gait)
+    return False
+
+
+@kernel
+def _glance(body: Floats, point: Floats, motion: MotionParameters, gait: Gait) -> None:
+    """Move the head's pitch towards a point of the house."""
+    out = gait.eye_forward * math.cos(body[PITCH])
+    dx = point[0] - body[X] - out * math.cos(body[HEADING])
+    dy = point[1] - body[Y] - out * math.sin(body[HEADING])
+    dz = point[2] - gait.eye_height - gait.eye_forward * math.sin(body[PITCH])
+    _look_towards(body, math.atan2(dz, math.sqrt(dx * dx + dy * dy)), motion, gait)
+
+
+@kernel
+def _look_towards(body: Floats, pitch: float, motion: MotionParameters, gait: Gait) -> None:
+    """Move the head's pitch towards an angle, rad, at the pace of a glance."""
+    limit = motion.look_speed * gait.dt
+    change = min(limit, max(-limit, motion.look_gain * (pitch - body[LOOK])))
+    kinematics.look_at(body, body[LOOK] + change, gait)
+
+
+@kernel
+def move_hand(
+    state: KinematicState,
+    trajectory: MotionTrajectory,
+    movement: HandMovement,
+    motion: MotionParameters,
+    model: KinematicModel,
+) -> None:
+    """Move a hand from where it is, at rest, to a goal."""
+    vector, goal = state.vector, movement.goal
+    body, first = vector[BODY:HANDS], HANDS + 3 * movement.hand
+    start_f, start_l, start_u = vector[first], vector[first + 1], vector[first + 2]
+    goal_f, goal_l, goal_u = goal[0], goal[1], goal[2]
+    speeds = HAND_SPEEDS + 3 * movement.hand
+    vector[speeds : speeds + 3] = 0.0
+    for k in range(1, movement.steps + 1):
+        if movement.in_house:
+            c, s = math.cos(body[HEADING]), math.sin(body[HEADING])
+            dx, dy = goal[0] - body[X], goal[1] - body[Y]
+            goal_f, goal_l = c * dx + s * dy, c * dy - s * dx
+        across, up = progress(k / movement.steps, movement.order, motion.lead)
+        vector[first] = start_f + across * (goal_f - start_f)
+        vector[first + 1] = start_l + across * (goal_l - start_l)
+        vector[first + 2] = start_u + up * (goal_u - start_u)
+        if math.isnan(movement.gaze[0]):
+            _look_towards(body, movement.gaze[2], motion, model.gait)
+        else:
+            _glance(body, movement.gaze, motion, model.gait)
+        control_step(state, ASIDE, movement.hand, model)
+        _append(trajectory, state)
+
+
+@kernel
+def withdraw(
+    state: KinematicState,
+    trajectory: MotionTrajectory,
+    hand: int,
+    poses: Floats,
+    pitch: float,
+    motion: MotionParameters,
+    model: KinematicModel,
+) -> None:
+    """Move a hand up and then to its rest, while the objects go through `poses`, m and wxyz, (k, n, 7).
+
+    The head looks to `pitch`, rad.
+    """
+    first = HANDS + 3 * hand
+    for k in range(len(poses)):
+        goal = state.vector[first : first + 3].copy()
+        if k < motion.withdraw_steps:
+            goal[2] += motion.withdraw_step
+        state.poses[:] = poses[k]
+        _look_towards(state.vector[BODY:HANDS], pitch, motion, model.gait)
+        if k < motion.withdraw_steps:
+            state.vector[first : first + 3] = goal
+            control_step(state, ASIDE, hand, model)
+        else:
+            control_step(state, ASIDE, -1, model)
+        _append(trajectory, state)
+
+
+@kernel
+def end(state: KinematicState, trajectory: MotionTrajectory, model: KinematicModel) -> None:
+    """The control step in which a motion has ended: the hands go to their postures."""
+    state.vector[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
+    control_step(state, CARRY, -1, model)
+    _append(trajectory, state)

@@ -1,0 +1,171 @@
+"""The trunk against the house: a disc that slides along outlines and never enters them, as numba kernels."""
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from mjsim.model.footprint import footprint
+from mjsim.support.kernels import kernel
+from mjsim.world.fidelity.body_state import VX, VY, X, Y
+
+_TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
+_MAX_STEP = 0.05  # m; a disc of 0.20 m cannot jump over a wall in steps of this length
+CELL = 0.25  # m
+MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
+_MAX_ROUNDS = 12
+_TOUCHING = 1e-7  # m
+
+
+class Floor(NamedTuple):
+    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels."""
+
+    # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
+    edges: NDArray[np.float64]
+    first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
+    boxes: NDArray[np.float64]  # each polygon's smallest and largest x, and smallest and largest y, m, (p, 4)
+    near: NDArray[np.int64]  # polygons that may touch the trunk, cell by cell
+    near_first: NDArray[np.int64]  # cell i, j has `near` from `near_first[i * columns + j]`, (cells + 1,)
+    origin_x: float  # corner of cell 0, 0, m
+    origin_y: float
+    rows: int  # cells along x
+    columns: int  # cells along y
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
+        """Outlines of the static geoms at the heights of a trunk of this radius, m."""
+        low, high = _TRUNK_BAND
+        return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
+
+    @classmethod
+    def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
+        """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
+        reach = radius + MARGIN
+        boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
+        low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
+        high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
+        rows, columns = (int(n) for n in np.ceil((high - low) / CELL))
+        i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
+        x, y = low[0] + CELL * i, low[1] + CELL * j
+        cells = shapely.box(x, y, x + CELL, y + CELL)
+        tree = shapely.STRtree([shapely.Polygon(polygon) for polygon in polygons])
+        cell, near = tree.query(cells, predicate="dwithin", distance=reach)
+        order = np.lexsort((near, cell))
+        edges = [_edges(polygon) for polygon in polygons]
+        counts = np.bincount(cell, minlength=rows * columns)
+        return cls(
+            edges=np.concatenate([np.zeros((0, 5)), *edges]),
+            first=np.cumsum([0, *(len(sides) for sides in edges)], dtype=np.int64),
+            boxes=np.ascontiguousarray(boxes[:, [0, 2, 1, 3]]),
+            near=np.ascontiguousarray(near[order].astype(np.int64)),
+            near_first=np.concatenate(([0], np.cumsum(counts))).astype(np.int64),
+            origin_x=float(low[0]),
+            origin_y=float(low[1]),
+            rows=rows,
+            columns=columns,
+        )
+
+
+def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Start, direction and length of the sides of a polygon (k, 2), shape (k, 5); none of length 0."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    keep = lengths > 0.0
+    return np.column_stack((polygon[keep], sides[keep] / lengths[keep, None], lengths[keep]))
+
+
+@kernel
+def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
+    """Whether no outline comes within these distances along x and y."""
+    if max(reach_x, reach_y) > radius + MARGIN:
+        return False  # farther than a cell covers
+    start, end = _near(x, y, floor)
+    for entry in range(start, end):
+        box = floor.boxes[floor.near[entry]]
+        if box[0] - reach_x < x < box[1] + reach_x and box[2] - reach_y < y < box[3] + reach_y:
+            return False
+    return True
+
+
+@kernel
+def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
+    """First and last entry of `Floor.near` for the cell of a point."""
+    i, j = math.floor((x - floor.origin_x) / CELL), math.floor((y - floor.origin_y) / CELL)
+    if not (0 <= i < floor.rows and 0 <= j < floor.columns):
+        return 0, 0
+    cell = i * floor.columns + j
+    return floor.near_first[cell], floor.near_first[cell + 1]
+
+
+@kernel
+def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
+    """Move the trunk of a body, shape (BODY_SIZE,), by its velocity for `h` s, sliding along what it meets."""
+    length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
+    parts = 1 + int(length / _MAX_STEP)
+    for _ in range(parts):
+        x, y = body[X], body[Y]
+        body[X] += body[VX] * (h / parts)
+        body[Y] += body[VY] * (h / parts)
+        start, end = _near(x, y, floor)
+        if start < end and not _push_out(body, radius, floor, start, end):
+            # Wedged between walls: stay where it was.
+            body[X], body[Y], body[VX], body[VY] = x, y, 0.0, 0.0
+
+
+@kernel
+def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int, end: int) -> bool:
+    """Move the disc out of the polygons near[start:end], and turn its velocity along them; whether that is possible."""
+    for _ in range(_MAX_ROUNDS):
+        free = True
+        for entry in range(start, end):
+            polygon = floor.near[entry]
+            box = floor.boxes[polygon]
+            if not (
+                box[0] - radius < body[X] < box[1] + radius and box[2] - radius < body[Y] < box[3] + radius
+            ):
+                continue
+            gap, nx, ny = gap_to(
+                body[X], body[Y], floor.edges, floor.first[polygon], floor.first[polygon + 1]
+            )
+            if gap >= radius - _TOUCHING:
+                continue
+            free = False
+            body[X] += nx * (radius - gap)
+            body[Y] += ny * (radius - gap)
+            into = nx * body[VX] + ny * body[VY]
+            if into < 0.0:
+                body[VX] -= into * nx
+                body[VY] -= into * ny
+        if free:
+            return True
+    return False
+
+
+@kernel
+def gap_to(
+    x: float, y: float, edges: NDArray[np.float64], first: int, last: int
+) -> tuple[float, float, float]:
+    """Signed distance of a point, m, to a convex polygon, m, negative inside, and the unit vector away from it.
+
+    `edges` are those of `Floor`, (e, 5), of which the polygon has `first` to `last`, exclusive.
+    """
+    nearest, near_x, near_y = math.inf, 0.0, 0.0
+    depth, out_x, out_y = -math.inf, 0.0, 0.0
+    for edge in range(first, last):
+        dx, dy = x - edges[edge, 0], y - edges[edge, 1]
+        ex, ey = edges[edge, 2], edges[edge, 3]
+        beside = dx * ey - dy * ex  # positive outside, to the right of the edge
+        if beside > depth:
+            depth, out_x, out_y = beside, ey, -ex
+        along = min(edges[edge, 4], max(0.0, dx * ex + dy * ey))
+        dx, dy = dx - along * ex, dy - along * ey
+        distance = dx * dx + dy * dy
+        if distance < nearest:
+            nearest, near_x, near_y = distance, dx, dy
+    nearest = math.sqrt(nearest)
+    if depth <= 0.0 or nearest < 1e-12:
+        return depth, out_x, out_y
+    return nearest, near_x / nearest, near_y / nearest

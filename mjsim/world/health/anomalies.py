@@ -1,0 +1,109 @@
+"""Objects that move as nothing should: ejections and tunnelling, which `docs/health.md` defines."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.rays import first_hit, moving_geoms
+from mjsim.model.scene import Scene
+from mjsim.values.actions import EventKind
+from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
+from mjsim.world.health.settle_times import SettlingObject
+
+CHECK_DISTANCE = 0.02  # m from its anchor, beyond which an object's path is checked
+
+MAX_FLIGHT = 1.0  # m from the release, horizontally
+_MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # m
+
+
+@dataclass(frozen=True, eq=False)
+class AnomalyState:
+    """What an `AnomalyDetector` remembers, as a value."""
+
+    anchors: NDArray[np.float64]  # where each object's centre was when its path was last checked, m, (n, 3)
+    ejected: tuple[int, ...]  # objects that count as ejected until a hand holds them again
+    ejections: int  # number so far
+    tunnellings: int  # number so far
+
+
+class AnomalyDetector:
+    """Finds and counts ejections and tunnelling of objects.
+
+    Attributes:
+        anchors: Where each object's centre was when its path was last checked, m, shape (n, 3).
+        ejections: How many so far.
+        tunnellings: How many so far.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._model, self._rooms, self._bodies = scene.model, scene.rooms, scene.index.bodies
+        self.anchors = np.zeros((len(self._bodies), 3))
+
+    def reset(self, data: mujoco.MjData) -> None:
+        """Start from the present state, with nothing counted."""
+        self.move_anchors(data)
+        self._ejected: set[int] = set()
+        self.ejections = self.tunnellings = 0
+
+    def move_anchors(self, data: mujoco.MjData) -> None:
+        """Check no paths up to the present state."""
+        self.anchors[:] = data.xipos[self._bodies]
+
+    def find(
+        self,
+        data: mujoco.MjData,
+        flags: NDArray[np.uint8],
+        settling: Mapping[int, SettlingObject],
+        gripped: Collection[int],
+    ) -> list[tuple[EventKind, int]]:
+        """Ejections and tunnelling in this control step, each with the number of the object."""
+        found = []
+        self._ejected.difference_update(gripped)
+        far = {item for item, release in settling.items() if self._flew_off(data, item, release)}
+        for item in np.flatnonzero(flags & (DISPLACED | FAST)).tolist():
+            if flags[item] & DISPLACED:
+                if self._passed_through(data, item):
+                    found.append((EventKind.TUNNELLED, item))
+                self.anchors[item] = data.xipos[self._bodies[item]]
+                if self._is_outside(item):
+                    far.add(item)
+            if flags[item] & FAST and item not in gripped:
+                far.add(item)
+        self.tunnellings += len(found)
+        ejected = sorted(far - self._ejected)
+        self._ejected.update(ejected)
+        self.ejections += len(ejected)
+        return found + [(EventKind.EJECTED, item) for item in ejected]
+
+    def get_state(self) -> AnomalyState:
+        """Everything, as a value."""
+        return AnomalyState(
+            self.anchors.copy(), tuple(sorted(self._ejected)), self.ejections, self.tunnellings
+        )
+
+    def set_state(self, state: AnomalyState) -> None:
+        """Restore what `get_state` returned."""
+        self.anchors[:] = state.anchors.reshape(self.anchors.shape)
+        self._ejected = set(state.ejected)
+        self.ejections, self.tunnellings = state.ejections, state.tunnellings
+
+    def _flew_off(self, data: mujoco.MjData, item: int, release: SettlingObject) -> bool:
+        x, y = data.xipos[self._bodies[item], :2].tolist()
+        return bool(np.hypot(x - release.x, y - release.y) > MAX_FLIGHT)
+
+    def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
+        """Whether something static that collides lies between the object's anchor and its centre."""
+        body = int(self._bodies[item])
+        start = self.anchors[item]
+        path = data.xipos[body] - start
+        distance, geom = first_hit(
+            self._model, data, start, path, through=moving_geoms(self._model), reach=1.0
+        )
+        return distance < 1.0 and bool(self._model.geom_contype[geom] or self._model.geom_conaffinity[geom])
+
+    def _is_outside(self, item: int) -> bool:
+        x, y, z = self.anchors[item].tolist()
+        return not (_MIN_HEIGHT < z < _MAX_HEIGHT and self._rooms.contains((x, y), OUTSIDE))

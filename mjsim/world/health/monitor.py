@@ -1,0 +1,177 @@
+"""Checks the physics after every control step: warnings, penetration, weld errors, settling times and anomalies.
+
+`docs/health.md` defines every term. A state that cannot be trusted any further is a `PhysicsError`; anything less is
+counted, and reported as an event.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.scene import Scene
+from mjsim.values.actions import EventKind
+from mjsim.values.errors import PhysicsError
+from mjsim.values.options import WorldOptions
+from mjsim.world.body.grips import Grips
+from mjsim.world.body.rig import Rig
+from mjsim.world.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
+from mjsim.world.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
+from mjsim.world.health.settle_times import SettleTimer, SettleTimerState
+from mjsim.world.health.values import QUIET, Health, HealthSample
+
+_KICK = 2.0  # times the walking speed: a light object that bounces off a walking person
+_FALL = 5.6  # m/s, from the height at which objects are carried
+_NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False)
+class HealthState:
+    """What a `HealthMonitor` has accumulated, as a value."""
+
+    # Deepest overlap of an object and of the trunk, m; largest weld error, m and rad; shape (4,).
+    extremes: NDArray[np.float64]
+    settle_times: tuple[float, ...]  # see `Health.settle_times`
+    sample: HealthSample  # the latest control step
+    anomalies: AnomalyState  # objects that flew off or passed through something
+    settling: SettleTimerState  # objects between release and rest
+
+
+class HealthMonitor:
+    """Accumulates `Health` over control steps.
+
+    Attributes:
+        sample: What the latest control step was like.
+    """
+
+    def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
+        index, data = scene.index, rig.data
+        self._rig, self._grips = rig, grips
+        self._anomalies = AnomalyDetector(scene)
+        self._settling = SettleTimer(scene)
+        self._flags, self._sample = np.zeros(len(index.names), np.uint8), np.zeros(6)
+        self._extremes = np.zeros(4)
+        limits = (
+            np.array([CHECK_DISTANCE, _FALL + _KICK * scene.person.fastest_walk, options.settle_speed]) ** 2
+        )
+        arrays = ScanArrays(
+            qpos=data.qpos,
+            qvel=data.qvel,
+            xipos=data.xipos,
+            site_xpos=data.site_xpos,
+            site_xmat=data.site_xmat,
+            warnings=data.warning.number,
+            bodies=index.bodies,
+            dofs=index.dofs,
+            geom_owner=index.geom_owner,
+            trunk=rig.trunk,
+            foot=rig.foot,
+            limits=limits,
+            boxes=static_boxes(scene),
+            rooms=scene.rooms.rectangles,
+            grip_sites=grips.sites,
+            anchors=self._anomalies.anchors,
+            flags=self._flags,
+            sample=self._sample,
+            extremes=self._extremes,
+        )
+        self._arrays = tuple(arrays)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; the state is that of the episode's beginning."""
+        self._extremes[:] = 0.0
+        self._settle_times: list[float] = []
+        self.sample = QUIET
+        self._anomalies.reset(self._rig.data)
+        self._settling.reset()
+
+    def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
+        """Take the latest control step into account; ejections and tunnelling, each with the object's number.
+
+        Raises:
+            PhysicsError: MuJoCo warned, or a position or velocity is not finite.
+        """
+        data = self._rig.data
+        suspect = self._scan(data, held)
+        deepest, trunk, left, right, left_angle, right_angle = self._sample.tolist()
+        gripped, settling = self._grips.gripped, self._settling
+        settled = settling.update(data, gripped, self._flags)
+        self._settle_times += settled
+        settle = max(settled, default=math.nan)
+        self.sample = HealthSample(deepest, trunk, (left, right), (left_angle, right_angle), settle)
+        if not suspect and not settling.objects:
+            return ()
+        return self._anomalies.find(data, self._flags, settling.objects, gripped)
+
+    def resume(self) -> None:
+        """Continue after the person and held objects were moved without physics."""
+        self._anomalies.move_anchors(self._rig.data)
+
+    def get_state(self) -> HealthState:
+        """Everything accumulated, as a value."""
+        return HealthState(
+            extremes=self._extremes.copy(),
+            settle_times=tuple(self._settle_times),
+            sample=self.sample,
+            anomalies=self._anomalies.get_state(),
+            settling=self._settling.get_state(),
+        )
+
+    def set_state(self, state: HealthState) -> None:
+        """Restore what `get_state` returned."""
+        self._extremes[:] = state.extremes
+        self._settle_times = list(state.settle_times)
+        self.sample = state.sample
+        self._anomalies.set_state(state.anomalies)
+        self._settling.set_state(state.settling)
+
+    def snapshot(self) -> Health:
+        """Extremes and counts since the last reset."""
+        deepest, deepest_trunk, stretched, twisted = self._extremes.tolist()
+        return Health(
+            max_penetration_m=deepest,
+            max_trunk_penetration_m=deepest_trunk,
+            max_weld_error_m=stretched,
+            max_weld_error_rad=twisted,
+            settle_times=tuple(self._settle_times),
+            ejections=self._anomalies.ejections,
+            tunnellings=self._anomalies.tunnellings,
+            warnings=int(self._rig.data.warning.number.sum()),
+        )
+
+    def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
+        """Fill sample and flags; whether any object may be ejected or have tunnelled."""
+        geoms, distances = _NO_GEOMS, _NO_DISTANCES
+        if data.ncon:
+            # Strides differ with the number of contacts, and kernels with the strides.
+            geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
+        found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
+        if found == WARNED:
+            raise PhysicsError(_warning_text(data))
+        if found == NOT_FINITE:
+            raise PhysicsError(_not_finite_text(self._rig.model, data))
+        return bool(found == SUSPECT)
+
+
+def _warning_text(data: mujoco.MjData) -> str:
+    kinds = np.flatnonzero(data.warning.number)
+    found = ", ".join(
+        f"{mujoco.mjtWarning(int(k)).name} (detail {int(data.warning.lastinfo[k])})" for k in kinds
+    )
+    return (
+        f"MuJoCo warned at t = {data.time:.3f} s: {found}. The state is no longer trustworthy; reset the world, and "
+        "replay the recorded actions up to this time to look at the cause"
+    )
+
+
+def _not_finite_text(model: mujoco.MjModel, data: mujoco.MjData) -> str:
+    bad = np.flatnonzero(~np.isfinite(data.qvel))
+    where = model.body(int(model.dof_bodyid[bad[0]])).name if bad.size else "a position"
+    return (
+        f"the state is not finite at t = {data.time:.3f} s, first at {where!r}; reset the world, and replay the "
+        "recorded actions up to this time to look at the cause"
+    )

@@ -1,0 +1,168 @@
+"""One pass over the state, the objects, the hands and the contacts after a control step, as a numba kernel."""
+
+import math
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.house import compiled_house
+from mjsim.model.rooms import nearest_rectangle
+from mjsim.model.scene import Scene
+from mjsim.support.kernels import kernel
+from mjsim.world.body.grips import site_angle, site_gap
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+OUTSIDE = 0.3  # m; rooms end at their walls, and doorways lie in between
+
+_TOLERANCE = 1e-6  # m
+
+# What a scan finds.
+NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
+# Flags of an object: farther than a distance from its anchor, faster than a speed, slower than another, and touched
+# by the person's foot.
+DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
+
+
+def static_boxes(scene: Scene) -> Floats:
+    """Lowest and highest corner of a box around each colliding geom of the house, m, shape (k, 6)."""
+    return compiled_house(scene.catalogue).once(("static boxes",), lambda: _static_boxes(scene.model))
+
+
+def _static_boxes(model: mujoco.MjModel) -> Floats:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    static = model.body_weldid[model.geom_bodyid] == 0
+    geoms = np.flatnonzero(static & ((model.geom_contype | model.geom_conaffinity) > 0))
+    rotations, boxes = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms]
+    centers = data.geom_xpos[geoms] + np.einsum("kij,kj->ki", rotations, boxes[:, :3])
+    half_sizes = np.einsum("kij,kj->ki", np.abs(rotations), boxes[:, 3:]) + _TOLERANCE
+    return np.hstack((centers - half_sizes, centers + half_sizes))
+
+
+class ScanArrays(NamedTuple):
+    """What a scan reads and writes, for one simulation: views of its state, its model, and the results."""
+
+    qpos: Floats  # positions, (nq,)
+    qvel: Floats  # velocities, (nv,)
+    xipos: Floats  # centres of mass of all bodies, m, (nbody, 3)
+    site_xpos: Floats  # positions of all sites, m, (nsite, 3)
+    site_xmat: Floats  # their frames, (nsite, 9)
+    warnings: Ints  # how often MuJoCo has warned, by kind, (nwarning,)
+    bodies: Ints  # body of each object, (n,)
+    dofs: Ints  # first degree of freedom of each object, (n,)
+    geom_owner: Ints  # object of each geom, or -1, (ngeom,)
+    trunk: int  # the person's trunk and foot, geoms
+    foot: int
+    # Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s, beyond
+    # which it is `FAST`, and of the speed below which it is `SLOW`, (3,).
+    limits: Floats
+    boxes: Floats  # `static_boxes`
+    rooms: tuple[Floats, Floats, Floats]  # `RoomMap.rectangles`
+    grip_sites: NDArray[np.intp]  # `Grips.sites`
+    # Where each object was when its path was last checked, m, (n, 3); moved along where `boxes` show the path to be
+    # clear.
+    anchors: Floats
+    flags: NDArray[np.uint8]  # flags of each object, (n,); overwritten
+    # The deepest overlap of an object with anything but the person, and that of the trunk with the house, both in m
+    # and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a hand that carries
+    # nothing; shape (6,), overwritten.
+    sample: Floats
+    extremes: (
+        Floats  # largest sample so far: overlaps, m, weld error of either hand, m and rad, (4,); changed
+    )
+
+
+@kernel
+def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
+    """Scan the state, objects, hands and contacts once: `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
+
+    Takes the fields of `ScanArrays` as a plain tuple, which numba accepts from Python in half the time, geoms (ncon, 2)
+    and distances (ncon,), m, of the contacts, and which hands carry something.
+    """
+    arrays = ScanArrays(*fields)
+    for count in arrays.warnings:
+        if count:
+            return WARNED
+    total = 0.0
+    for value in arrays.qpos:
+        total += value
+    for value in arrays.qvel:
+        total += value
+    if not math.isfinite(total):
+        return NOT_FINITE
+    state = _flag_objects(arrays)
+    sample, sites = arrays.sample, arrays.grip_sites
+    sample[0], sample[1] = _overlaps(arrays, geoms, distances)
+    for hand in range(2):
+        sample[2 + hand] = sample[4 + hand] = math.nan
+        if (left if hand == 0 else right) and sites[hand, 0] >= 0:
+            sample[2 + hand] = site_gap(arrays.site_xpos, sites[hand, 0], sites[hand, 1])
+            sample[4 + hand] = site_angle(arrays.site_xmat, sites[hand, 0], sites[hand, 1])
+    for k in range(6):
+        extreme = k if k < 2 else k // 2 + 1
+        if sample[k] > arrays.extremes[extreme]:  # not if it is NaN
+            arrays.extremes[extreme] = sample[k]
+    return state
+
+
+@kernel
+def _flag_objects(arrays: ScanArrays) -> int:
+    state, anchors, limits, rooms = NORMAL, arrays.anchors, arrays.limits, arrays.rooms
+    for item in range(len(arrays.bodies)):
+        center, dof, flags = arrays.xipos[arrays.bodies[item]], arrays.dofs[item], 0
+        gap = speed = 0.0
+        for k in range(3):
+            gap += (center[k] - anchors[item, k]) ** 2
+            speed += arrays.qvel[dof + k] ** 2
+        if gap > limits[0]:
+            clear = is_path_clear(anchors[item], center, arrays.boxes)
+            if clear and nearest_rectangle(center[0], center[1], rooms[0], rooms[1], rooms[2]) <= OUTSIDE:
+                anchors[item, 0], anchors[item, 1], anchors[item, 2] = center[0], center[1], center[2]
+            else:
+                flags |= DISPLACED
+        if speed > limits[1]:
+            flags |= FAST
+        if flags:
+            state = SUSPECT
+        if speed < limits[2]:
+            flags |= SLOW
+        arrays.flags[item] = flags
+    return state
+
+
+@kernel
+def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
+    """Whether the box around two points (3,), m, overlaps none of some boxes."""
+    low_x, high_x = min(start[0], end[0]), max(start[0], end[0])
+    low_y, high_y = min(start[1], end[1]), max(start[1], end[1])
+    low_z, high_z = min(start[2], end[2]), max(start[2], end[2])
+    for box in boxes:
+        if (
+            low_x <= box[3] and high_x >= box[0]
+            and low_y <= box[4] and high_y >= box[1]
+            and low_z <= box[5] and high_z >= box[2]
+        ):  # fmt: skip
+            return False
+    return True
+
+
+@kernel
+def _overlaps(arrays: ScanArrays, geoms: Ints, distances: Floats) -> tuple[float, float]:
+    """Deepest overlap of an object and of the trunk, m; flags what the foot touches."""
+    trunk, foot, owner = arrays.trunk, arrays.foot, arrays.geom_owner
+    deepest = deepest_trunk = 0.0
+    for c in range(len(distances)):
+        first, second = geoms[c, 0], geoms[c, 1]
+        if first == trunk or second == trunk:
+            deepest_trunk = max(deepest_trunk, -distances[c])
+        elif first == foot or second == foot:
+            item = owner[second] if first == foot else owner[first]
+            if item >= 0 and distances[c] < 0.0:
+                arrays.flags[item] |= PUSHED
+        else:
+            deepest = max(deepest, -distances[c])
+    return deepest, deepest_trunk

@@ -1,0 +1,80 @@
+"""Released objects, until they are at rest; `docs/health.md` defines release, rest and settle time."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.model.scene import Scene
+from mjsim.values.options import REST_STEPS
+from mjsim.world.health.scan import PUSHED, SLOW
+
+
+@dataclass
+class SettlingObject:
+    """An object between its release and rest."""
+
+    time: float  # when a hand last held it, s
+    x: float  # where its centre was then, m
+    y: float
+    still_steps: int = 0  # control steps in a row for which it has been slow or asleep
+    still_since: float = 0.0  # when the first of them ended, s
+
+
+@dataclass(frozen=True)
+class SettleTimerState:
+    """What a `SettleTimer` remembers, as a value."""
+
+    objects: tuple[
+        tuple[int, SettlingObject], ...
+    ]  # number and state of each released object that is not at rest
+    # Number of each held object, when it was last seen in the hand, s, and where its centre was, m, (3,).
+    gripped: tuple[tuple[int, float, list[float]], ...]
+
+
+class SettleTimer:
+    """Follows objects from their release until they rest, a hand grips them again, or the person's foot pushes them."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._bodies, self._trees = scene.index.bodies.tolist(), scene.index.trees
+        self.reset()
+
+    def reset(self) -> None:
+        """Start with empty hands and everything at rest."""
+        self.objects: dict[int, SettlingObject] = {}
+        self._gripped: dict[int, tuple[float, list[float]]] = {}  # when and where, last
+
+    def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
+        """Settle times, s, of objects that come to rest with this step; `gripped` ones are welded to a hand."""
+        if not (gripped or self._gripped or self.objects):
+            return []
+        for item, (last, (x, y, _)) in self._gripped.items():
+            if item not in gripped:
+                self.objects[item] = SettlingObject(last, x, y)
+        time = float(data.time)
+        self._gripped = {item: (time, data.xipos[self._bodies[item]].tolist()) for item in gripped}
+        settled = []
+        for item, settling in list(self.objects.items()):
+            if item in gripped or flags[item] & PUSHED:
+                del self.objects[item]
+                continue
+            still = bool(flags[item] & SLOW) or not data.tree_awake[self._trees[item]]
+            if still and settling.still_steps == 0:
+                settling.still_since = time
+            settling.still_steps = settling.still_steps + 1 if still else 0
+            if settling.still_steps == REST_STEPS:
+                settled.append(settling.still_since - settling.time)
+                del self.objects[item]
+        return settled
+
+    def get_state(self) -> SettleTimerState:
+        """Everything, as a value."""
+        objects = tuple((item, replace(settling)) for item, settling in self.objects.items())
+        return SettleTimerState(objects, tuple((item, *last) for item, last in self._gripped.items()))
+
+    def set_state(self, state: SettleTimerState) -> None:
+        """Restore what `get_state` returned."""
+        self.objects = {item: replace(settling) for item, settling in state.objects}
+        self._gripped = {item: (time, center) for item, time, center in state.gripped}

@@ -1,0 +1,94 @@
+"""The memory of a walk from one action to the next: its progress, and backing off where there is none."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.values.actions import IDLE, FollowPath, Move, Pick, Place, StepAction
+from mjsim.values.observation import ObjectStatus, Observation
+from mjsim.values.person_parameters import PersonParameters
+from mjsim.world.walking.path_following import (
+    ARRIVED,
+    BLOCKED,
+    Obstacles,
+    Pace,
+    Walk,
+    plain,
+    step_from_python,
+)
+
+BACK_OFF = Move(forward=-0.4, left=0.3)
+BACK_OFF_TIME = 0.6  # s
+
+
+class Walker:
+    """Walks for a person who follows paths one after the other.
+
+    A walk that leads to another pick or place starts afresh; one without counts as part of the one before. `walls`
+    are the edges x, y, x, y of the floor on which objects may be passed, m, (e, 4); none where all of it is free.
+    """
+
+    def __init__(self, person: PersonParameters, walls: NDArray[np.float64]) -> None:
+        self._pace, self._walls = Pace.of(person), walls
+        self._status: tuple[ObjectStatus, ...] = ()
+        self._is_loose = np.zeros(0, np.bool_)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all walks."""
+        self._visit: Pick | Place | None = None
+        self._back_off_until = -math.inf
+        self.progress = np.array([np.inf, 0.0])
+        self.blocked = False
+
+    def walk(self, action: FollowPath, seen: Observation) -> Walk | None:
+        """The walk for kernels; None while the person backs off.
+
+        Only on the way to a pick or place: a participant that is blocked elsewhere takes another path at once.
+        """
+        if action.then is not None and action.then != self._visit:
+            self._visit = action.then
+            self.progress[:] = np.inf, seen.time
+        if action.then is not None and seen.time < self._back_off_until:
+            return None
+        goal = float(action.goal[0]), float(action.goal[1])
+        faces, obstacles = action.then is not None, self._obstacles(seen)
+        return Walk(
+            action.points,
+            goal,
+            action.stop_distance,
+            faces,
+            action.shown,
+            action.tolerance,
+            self._pace,
+            obstacles,
+        )
+
+    def note(self, phase: int, time: float) -> None:
+        """Take note of how the first control step of a walk went, taken at `time`, s."""
+        self.blocked = phase == BLOCKED
+        if self.blocked:
+            self._back_off_until = time + BACK_OFF_TIME
+            self.progress[:] = np.inf, self._back_off_until
+
+    def step(self, action: FollowPath, seen: Observation) -> StepAction:
+        """The next control step of a walk, for worlds that are stepped by others."""
+        walk = self.walk(action, seen)
+        if walk is None:
+            return BACK_OFF
+        phase, *velocities = step_from_python(
+            plain(walk), seen.position, seen.heading, seen.time, self.progress, seen.object_positions, True
+        )
+        self.note(phase, seen.time)
+        return action.then or IDLE if phase == ARRIVED else Move(*velocities)
+
+    def _obstacles(self, seen: Observation) -> Obstacles:
+        """The objects on the floor, but for the one that the present or last pick or place is about."""
+        if seen.object_status != self._status:
+            self._status = seen.object_status
+            self._is_loose = np.array([s is ObjectStatus.LOOSE for s in seen.object_status], np.bool_)
+        name = None if self._visit is None else self._visit.object
+        target = seen.object_names.index(name) if name in seen.object_names else -1
+        positions = np.ascontiguousarray(seen.object_positions)
+        return Obstacles(positions, self._is_loose, target, self._walls)
