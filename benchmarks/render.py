@@ -249,7 +249,7 @@ def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any
     """Milliseconds of laying the HUD over a frame of 640 x 480, for every frame of a whole trial."""
     states = session_states(subject.house, trial)
     times = hud_milliseconds(
-        Compositor(render_pictures(subject.house.catalogue)), states, clock=subject.clock
+        Compositor(render_pictures(subject.house.catalogue), subject.house.texts), states, clock=subject.clock
     )
     return summary(times)
 

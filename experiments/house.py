@@ -4,11 +4,15 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
+from hud.texts import HudTexts
 from mjsim.houses.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.disorder import Disorder
@@ -24,6 +28,7 @@ from mjsim.world.walking.path_following import ARRIVED_WITHIN
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
+TEXTS = Path(__file__).with_name("texts")  # one file for each language
 VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
 VIEWPOINT_CANDIDATES = 3000
 WALL_GAP = 0.05  # m that planned paths keep from walls beyond the body's radius, so that corners can be cut
@@ -44,6 +49,7 @@ class House:
         receptacles: Receptacle key -> geometry.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
         person: Whose size and reach count.
+        texts: Words of the HUD, in the language of the catalogue's labels.
         seen: Receptacles that a participant has seen; None for all of them.
     """
 
@@ -55,6 +61,7 @@ class House:
     receptacles: Mapping[str, ReceptacleGeometry]
     bounds: tuple[float, float, float, float]
     person: PersonParameters
+    texts: HudTexts
     seen: frozenset[str] | None = None
 
     @classmethod
@@ -81,8 +88,28 @@ class House:
         navmesh = _navmesh(floor, person.body_radius + WALL_GAP)
         geodesics = Geodesics(navmesh, person.reach)
         return cls(
-            catalogue, navmesh, navmesh, geodesics, house.rooms, house.receptacles, floor.bounds, person
+            catalogue,
+            navmesh,
+            navmesh,
+            geodesics,
+            house.rooms,
+            house.receptacles,
+            floor.bounds,
+            person,
+            HudTexts(**read_words()["hud"]),
         )
+
+    def in_language(self, language: str, texts: HudTexts | None = None) -> "House":
+        """The same house with labels and words of the HUD in a language; `texts` replace its usual words.
+
+        Raises:
+            ConfigError: There are no texts in the language.
+            AssetError: A file of labels cannot be used.
+        """
+        texts = texts or HudTexts(**read_words(language)["hud"])
+        catalogue = self.catalogue.in_language(language)
+        rooms = dataclasses.replace(self.rooms, labels=catalogue.rooms)
+        return dataclasses.replace(self, catalogue=catalogue, rooms=rooms, texts=texts)
 
     def for_person(self, person: PersonParameters) -> "House":
         """The same house, with the same episodes, for a person of another size or reach.
@@ -150,6 +177,19 @@ class House:
             SamplingError: The house is too small for them.
         """
         return house_points(self.catalogue, self.sampling_floor, seed=seed, points=points)
+
+
+def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
+    """All texts in a language, by section and name.
+
+    Raises:
+        ConfigError: There is no such language.
+    """
+    path = TEXTS / f"{language}.toml"
+    if not path.is_file():
+        known = ", ".join(sorted(file.stem for file in TEXTS.glob("*.toml")))
+        raise ConfigError(f"no texts in language {language!r}; there are {known}")
+    return msgspec.toml.decode(path.read_bytes(), type=dict[str, dict[str, Any]])
 
 
 def _navmesh(floor: Footprint, radius: float) -> NavMesh:

@@ -5,14 +5,25 @@ from hud.canvas import Canvas, Patch, Rect
 from hud.layout import ListRow
 from hud.state import ChecklistItem
 from hud.stencils import Stencils
+from hud.texts import HudTexts, filled
 
 
-def count_text(items: tuple[ChecklistItem, ...]) -> str:
+def count_text(items: tuple[ChecklistItem, ...], texts: HudTexts) -> str:
     """What is left of a list, or which step of a numbered one is next."""
     left = sum(not item.done for item in items)
     if any(item.number is not None for item in items):
-        return f"step {len(items) - left + 1} / {len(items)}" if left else "done"
-    return f"{left} left" if left else "none left"
+        number = len(items) - left + 1
+        return filled(texts.next_step, number=number, count=len(items)) if left else texts.done
+    return filled(texts.left, count=left) if left else texts.none_left
+
+
+def hidden_text(above: int, more: int, texts: HudTexts) -> str:
+    """How many items of a list are hidden before and after those that are shown."""
+    notes = (
+        filled(texts.above, count=above) if above else "",
+        filled(texts.more, count=more) if more else "",
+    )
+    return " · ".join(note for note in notes if note)
 
 
 def draw_checklist(
@@ -21,9 +32,9 @@ def draw_checklist(
     header: tuple[str, str],
     items: tuple[ChecklistItem, ...],
     rows: tuple[ListRow, ...],
-    hidden: tuple[int, int],
+    hidden: str,
 ) -> Patch:
-    """The task list: a title, a count, the items that fit, and how many are `hidden` before and after."""
+    """The task list: a title, a count, the items that fit, and a note about hidden ones."""
     canvas = Canvas.panel(stencils, rect)
     px, width = canvas.px, canvas.typeface.width
     title, count = header
@@ -37,8 +48,7 @@ def draw_checklist(
     for item, row in zip(items, rows, strict=True):
         _draw_row(canvas, item, row, top)
         top += row.height
-    notes = (f"{hidden[0]} above" if hidden[0] else "", f"+{hidden[1]} more" if hidden[1] else "")
-    text = canvas.typeface.fit(" · ".join(note for note in notes if note), theme.DETAIL, right - x)
+    text = canvas.typeface.fit(hidden, theme.DETAIL, right - x)
     canvas.text(x, canvas.height - px(theme.PADDING), text, theme.DETAIL, theme.QUIET)
     return canvas.patch()
 

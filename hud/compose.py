@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from hud import minimap as maps
 from hud import panels
 from hud.canvas import Patch, Rect
-from hud.checklist import count_text, draw_checklist
+from hud.checklist import count_text, draw_checklist, hidden_text
 from hud.errors import FrameError
 from hud.layout import Layout, arrange, pointer_rect, unit_of
 from hud.options.minimap import FLOORPLAN
 from hud.state import HudState, MiniMap
 from hud.stencils import Pictures, Stencils
+from hud.texts import HudTexts, filled
 from hud.theme import POINTER
 
 Draw = Callable[..., Patch]
@@ -30,12 +31,13 @@ class Compositor:
     Args:
         pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by the keys of states; the floor plan may be any
             rectangle. Must not change.
+        texts: Words of the HUD.
 
     Raises:
         FrameError: A picture has another shape or type.
     """
 
-    def __init__(self, pictures: Pictures) -> None:
+    def __init__(self, pictures: Pictures, texts: HudTexts) -> None:
         for key, picture in pictures.items():
             sized = picture.ndim == 3 and min(picture.shape) > 0 and picture.shape[2] == 4
             square = sized and (picture.shape[0] == picture.shape[1] or key == FLOORPLAN)
@@ -44,6 +46,7 @@ class Compositor:
                     f"picture {key!r} must be uint8 (s, s, 4), got {picture.dtype} {picture.shape}"
                 )
         self._stencils = Stencils(dict(pictures), 1.0)
+        self._texts = texts
         self._layout: tuple[object, Layout] | None = None
         self._patches: dict[str, tuple[object, Patch]] = {}
 
@@ -63,7 +66,7 @@ class Compositor:
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
             raise FrameError(f"frame must be uint8 (H, W, 3), got {frame.dtype} {frame.shape}")
         layout = self.layout(state, frame.shape[1], frame.shape[0])
-        contents = _contents(state, layout)
+        contents = _contents(state, layout, self._texts)
         out = np.array(frame, dtype=np.uint8, order="C", copy=True)
         for name, rect in layout.panels.items():
             draw, *what = contents[name]
@@ -100,18 +103,21 @@ class Compositor:
         return known[1]
 
 
-def compose(frame: NDArray[np.uint8], state: HudState, pictures: Pictures) -> NDArray[np.uint8]:
+def compose(
+    frame: NDArray[np.uint8], state: HudState, pictures: Pictures, texts: HudTexts
+) -> NDArray[np.uint8]:
     """One frame with the HUD on top; for many frames keep a `Compositor`.
 
     Args:
         frame: RGB, uint8, shape (H, W, 3), at least 320 x 240; not changed.
         state: What to show.
         pictures: RGBA pictures, uint8 (s, s, 4), by the keys that the state uses.
+        texts: Words of the HUD.
 
     Raises:
         FrameError: The frame or a picture has another shape or type, or the frame is too small.
     """
-    return Compositor(pictures).compose(frame, state)
+    return Compositor(pictures, texts).compose(frame, state)
 
 
 def _without_what_moves(state: HudState) -> HudState:
@@ -131,11 +137,13 @@ def _without_what_moves(state: HudState) -> HudState:
     )
 
 
-def _contents(state: HudState, layout: Layout) -> dict[str, tuple[Any, ...]]:
+def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tuple[Any, ...]]:
     """By panel: the function that draws it, and what it takes besides stencils and rectangle."""
-    hidden = (layout.first, len(state.checklist) - layout.stop)
-    header = (state.checklist_title, count_text(state.checklist))
+    hidden = hidden_text(layout.first, len(state.checklist) - layout.stop, texts)
+    header = (state.checklist_title, count_text(state.checklist, texts))
     bins = state.bins[: len(layout.bin_rows)]
+    more = len(state.bins) - len(bins)
+    title = filled(texts.more_bins, count=more) if more else texts.bins
     found: dict[str, tuple[Any, ...]] = {
         "progress": (panels.draw_progress, state.delivered, state.total),
         "checklist": (
@@ -145,8 +153,13 @@ def _contents(state: HudState, layout: Layout) -> dict[str, tuple[Any, ...]]:
             layout.rows,
             hidden,
         ),
-        "bins": (panels.draw_bins, bins, layout.bin_rows, len(state.bins) - len(bins)),
-        "inventory": (panels.draw_inventory, state.inventory),
+        "bins": (panels.draw_bins, title, bins, layout.bin_rows),
+        "inventory": (
+            panels.draw_inventory,
+            state.inventory,
+            (texts.left_hand, texts.right_hand),
+            texts.empty,
+        ),
     }
     if state.message is not None:
         found["message"] = (panels.draw_message, state.message.kind, layout.message_lines)

@@ -13,13 +13,13 @@ POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
 
 
 def draw_bins(
-    stencils: Stencils, rect: Rect, bins: tuple[BinEntry, ...], rows: tuple[ListRow, ...], hidden: int
+    stencils: Stencils, rect: Rect, title: str, bins: tuple[BinEntry, ...], rows: tuple[ListRow, ...]
 ) -> Patch:
-    """The list of bins: picture, name and place; the title says how many are hidden."""
+    """The list of bins: a title, and picture, name and place of each."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
     x = px(theme.PADDING + 2)
-    canvas.text(x, px(17), f"Bins (+{hidden})" if hidden else "Bins", theme.TITLE, theme.TEXT)
+    canvas.text(x, px(17), title, theme.TITLE, theme.TEXT)
     top = px(theme.HEADER)
     text_x = x + px(theme.BIN_TILE + theme.GAP)
     for entry, row in zip(bins, rows, strict=False):
@@ -39,17 +39,21 @@ def draw_bins(
 
 
 def draw_inventory(
-    stencils: Stencils, rect: Rect, slots: tuple[InventorySlot | None, InventorySlot]
+    stencils: Stencils,
+    rect: Rect,
+    slots: tuple[InventorySlot | None, InventorySlot],
+    hands: tuple[str, str],
+    empty: str,
 ) -> Patch:
     """The hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
     canvas = Canvas(stencils, rect.width, rect.height)
-    for slot, hand, at_the_left in zip(slots, ("Left hand", "Right hand"), (True, False), strict=True):
+    for slot, hand, at_the_left in zip(slots, hands, (True, False), strict=True):
         if slot is not None:
-            _draw_hand(canvas, slot, hand, at_the_left)
+            _draw_hand(canvas, slot, (hand, empty), at_the_left)
     return canvas.patch()
 
 
-def _draw_hand(canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool) -> None:
+def _draw_hand(canvas: Canvas, slot: InventorySlot, when_empty: tuple[str, str], at_the_left: bool) -> None:
     px = canvas.px
     held = slot.label is not None
     side = canvas.height - 2 * px(5)
@@ -60,7 +64,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, hand: str, at_the_left: bool
     for size in (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY,):
         width = min(px(size), (canvas.width - px(theme.GAP)) // 2)
         room = width - px(theme.PADDING) - inset
-        lines = (hand, "empty") if slot.label is None else canvas.typeface.wrap(slot.label, face, room, 2)
+        lines = when_empty if slot.label is None else canvas.typeface.wrap(slot.label, face, room, 2)
         if not any(line.endswith(ELLIPSIS) for line in lines):
             break
     left = 0 if at_the_left else canvas.width - width

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hud.errors import TaskViewError
 from hud.projection import CameraView
 from hud.state import Message, Vec3
+from hud.texts import HudTexts
 
 Status = Literal["loose", "carried", "delivered"]
 StepKind = Literal["pick", "place"]
@@ -118,6 +119,7 @@ class TaskView:
         objects: All objects of the task.
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
+        texts: Words of the HUD.
         hands: Object name in the left and in the right hand, or None.
         capacity: How many objects are carried at most.
         steps_done: Successful picks and places so far, in order.
@@ -141,6 +143,7 @@ class TaskView:
     objects: tuple[TaskObject, ...]
     receptacles: tuple[TaskReceptacle, ...]
     order: tuple[str, ...]
+    texts: HudTexts
     hands: tuple[str | None, str | None] = (None, None)
     capacity: int = 2
     steps_done: tuple[TaskStep, ...] = ()

@@ -1,12 +1,17 @@
 """A made-up tidying task with drawn pictures, to look at the HUD without a simulator."""
 
+import tomllib
+from pathlib import Path
+
 import cv2
 import numpy as np
 
 from hud.projection import CameraView
 from hud.task import KnownPlan, TaskObject, TaskReceptacle, TaskStep, TaskView
+from hud.texts import HudTexts
 
 EYE = (0.0, 0.0, 1.6)
+TEXT_FILES = Path(__file__).parents[1] / "experiments/texts"
 ROOMS = ("Kitchen", "Living room", "Bedroom", "Office", "Hallway")
 
 _BINS = (
@@ -25,6 +30,13 @@ _LABELS = (
     ("Stapler", "Tape dispenser", "Calculator", "Pencil case"),
     ("Cardboard box", "Plastic bottle", "Drink can", "Newspaper"),
 )
+
+
+def texts(language="en"):
+    return HudTexts(**tomllib.loads((TEXT_FILES / f"{language}.toml").read_text("utf-8"))["hud"])
+
+
+TEXTS = texts()
 
 
 def receptacles():
@@ -73,6 +85,7 @@ def task(count, *, steps=0, message=None, clock=83.0):
         objects=items,
         receptacles=receptacles(),
         order=tuple(o.name for o in sorted(items, key=lambda o: (int(o.name[-2:]) * 7) % 25)),
+        texts=TEXTS,
         hands=(carried[0] if carried else None, carried[1] if len(carried) > 1 else None),
         steps_done=tuple(done),
         ahead=KnownPlan(left, segment=way, path=way, goal=goal),

@@ -108,7 +108,7 @@ def main() -> None:
     )
     pictures = render_pictures(house.catalogue)
     pictures[FLOORPLAN] = render_house_map(house.catalogue, house.bounds)
-    found = summary(hud_milliseconds(Compositor(pictures), states, (given.width, given.height)))
+    found = summary(hud_milliseconds(Compositor(pictures, house.texts), states, (given.width, given.height)))
     for name, value in found.items():
         Console().print(f"{name:10} {value:8.2f}" if name != "frames" else f"{name:10} {value:5.0f}")
 

@@ -49,7 +49,7 @@ class FirstPersonRenderer:
         self._renderer = Renderer(scene.model, width=film.width, height=film.height, profile=film.profile)
         self._house = house
         self._pictures = render_pictures(house.catalogue) if pictures is None else pictures
-        self._compositor = Compositor(self._pictures)
+        self._compositor = Compositor(self._pictures, house.texts)
         self._film = film
 
     def camera_view(self, data: Any) -> CameraView:
@@ -73,7 +73,7 @@ class FirstPersonRenderer:
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
-            self._compositor = Compositor(self._pictures)
+            self._compositor = Compositor(self._pictures, self._house.texts)
         picture = self._renderer.rgb(data, self._camera(data), state.markers)
         if self._film.beside:
             top, below, left, right = self._film.margins

@@ -154,6 +154,7 @@ class TaskBoard:
             objects=self._task_objects(observation),
             receptacles=self._receptacles,
             order=self._order,
+            texts=self.house.texts,
             hands=observation.hands,
             capacity=capacity,
             steps_done=tuple(self._done),
@@ -179,9 +180,15 @@ class TaskBoard:
         if opacity <= 0:
             return None
         if name is None or name not in self.episode.targets:
-            return message(key, opacity=opacity)
+            return message(key, self.house.texts, opacity=opacity)
         receptacle = self.house.catalogue.receptacles[self.episode.targets[name]]
-        return message(key, object=self._label(name), receptacle=receptacle.label, opacity=opacity)
+        return message(
+            key,
+            self.house.texts,
+            object=self._label(name),
+            receptacle=receptacle.label,
+            opacity=opacity,
+        )
 
     def _shown(self, time: float) -> "_Shown":
         """The message that the bar shows at a time, fresh or faded."""

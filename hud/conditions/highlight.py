@@ -12,4 +12,4 @@ def hud_state(view: TaskView) -> HudState:
         target = f"→ {view.receptacle(item.receptacle).label}"
         return f"{item.room}\n{target}" if item.status == "loose" else target
 
-    return assemble(view, "To put away", random_order_rows(view, detail), misplaced_flagpoles(view))
+    return assemble(view, view.texts.to_put_away, random_order_rows(view, detail), misplaced_flagpoles(view))

@@ -11,4 +11,4 @@ def hud_state(view: TaskView) -> HudState:
     def detail(item: TaskObject) -> str:
         return f"→ {view.receptacle(item.receptacle).label}"
 
-    return assemble(view, "To put away", random_order_rows(view, detail))
+    return assemble(view, view.texts.to_put_away, random_order_rows(view, detail))

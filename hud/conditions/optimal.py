@@ -4,6 +4,7 @@ from hud.lists import assemble, misplaced_flagpoles
 from hud.markers import breadcrumbs
 from hud.state import ChecklistItem, HudState
 from hud.task import TaskView
+from hud.texts import filled
 
 
 def hud_state(view: TaskView) -> HudState:
@@ -12,13 +13,15 @@ def hud_state(view: TaskView) -> HudState:
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
     crumbs = () if view.segment is None else breadcrumbs(view.segment, view.eye_height)
-    return assemble(view, "Your plan", checklist, (*crumbs, *misplaced_flagpoles(view)))
+    return assemble(view, view.texts.your_plan, checklist, (*crumbs, *misplaced_flagpoles(view)))
 
 
 def _row(view: TaskView, index: int, kind: str, name: str, done: int) -> ChecklistItem:
     item = view.object(name)
     target = view.receptacle(item.receptacle)
-    action, room = ("Pick up", item.room) if kind == "pick" else (f"Put in {target.label}", target.room)
+    picked, texts = kind == "pick", view.texts
+    action = texts.pick_up if picked else filled(texts.put_in, Receptacle=target.label)
+    room = item.room if picked else target.room
     return ChecklistItem(
         text=item.label,
         detail=action if index < done else f"{action} ·\n{room}",

@@ -1,7 +1,7 @@
 """What a house offers: its rooms, categories, receptacles and object models, read from `catalogue.toml`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -10,6 +10,7 @@ import msgspec
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue_files import catalogue_file, read_tables
 from mjsim.model.house_ref import HouseRef, parse_house
+from mjsim.model.labels import Label, read_labels
 from mjsim.model.model_files import content_hash
 from mjsim.support.files import is_file
 from mjsim.values.episode import POINTS
@@ -66,6 +67,7 @@ class Catalogue:
         objects: Object model key -> object model.
         points: How many points for objects the house is meant to have at most; None where it does not say.
         content: Hash over the catalogue and every model, mesh and texture file that it leads to.
+        folder: Folder of the catalogue.
     """
 
     ref: HouseRef
@@ -76,6 +78,7 @@ class Catalogue:
     receptacles: Mapping[str, Receptacle]
     objects: Mapping[str, ObjectModel]
     content: str
+    folder: Path
     points: int | None = None
 
     def __eq__(self, other: object) -> bool:
@@ -88,6 +91,28 @@ class Catalogue:
     def name(self) -> str:
         """Name of the house in records."""
         return self.ref.name
+
+    def in_language(self, language: str) -> "Catalogue":
+        """The same catalogue with labels and places in a language, in English where there is no translation.
+
+        Raises:
+            AssetError: A file of labels cannot be used.
+        """
+        labels = read_labels(language, (models_root(), self.folder))
+
+        def said(text: str) -> str:
+            return labels.get(text, text)
+
+        return replace(
+            self,
+            label=said(self.label),
+            rooms={key: said(label) for key, label in self.rooms.items()},
+            categories={k: replace(c, label=said(c.label)) for k, c in self.categories.items()},
+            receptacles={
+                k: replace(r, label=said(r.label), place=said(r.place)) for k, r in self.receptacles.items()
+            },
+            objects={k: replace(o, label=said(o.label)) for k, o in self.objects.items()},
+        )
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
@@ -120,10 +145,6 @@ class Catalogue:
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
-_SHOWN = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]*"
-_Label = Annotated[
-    str, msgspec.Meta(pattern=rf"^{_SHOWN}\S{_SHOWN}\Z", max_length=80)
-]  # a line of text, not blank
 _Table = Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
 
 
@@ -138,7 +159,7 @@ class _Tables(msgspec.Struct, forbid_unknown_fields=True):
 class _ModelEntry(msgspec.Struct):
     """An entry that names a model, such as [house]."""
 
-    label: _Label
+    label: Label
     model: _Text
 
 
@@ -151,12 +172,12 @@ class _ObjectEntry(_ModelEntry):
 
 
 class _ReceptacleEntry(_ModelEntry):
-    place: _Label
+    place: Label
     room: _Text
 
 
 class _CategoryEntry(msgspec.Struct):
-    label: _Label
+    label: Label
     receptacle: _Text
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)]
 
@@ -168,7 +189,7 @@ class _Reader:
         self._path = path
         tables = self._convert(raw, _Tables, "catalogue")
         self._house = self._convert(tables.house, _HouseEntry, "house")
-        self._rooms = {k: self._convert(v, _Label, f"rooms.{k}") for k, v in tables.rooms.items()}
+        self._rooms = {k: self._convert(v, Label, f"rooms.{k}") for k, v in tables.rooms.items()}
         self._categories = self._entries(tables.categories, _CategoryEntry, "categories")
         self._receptacles = self._entries(tables.receptacles, _ReceptacleEntry, "receptacles")
         self._objects = self._entries(tables.objects, _ObjectEntry, "objects")
@@ -190,6 +211,7 @@ class _Reader:
             receptacles=receptacles,
             objects=objects,
             content=content_hash(text, models),
+            folder=self._path.parent,
             points=self._house.points,
         )
 

@@ -22,7 +22,7 @@ SIZES = ((640, 480), (1280, 720), (1920, 1080))
 
 
 def optimal(count=6, steps=3):
-    return condition("optimal")(sample.task(count, steps=steps, message=message("replanned")))
+    return condition("optimal")(sample.task(count, steps=steps, message=message("replanned", sample.TEXTS)))
 
 
 def plain(size, level):
@@ -31,7 +31,9 @@ def plain(size, level):
 
 def ink(state, other, size, level=0):
     """Where two states look clearly different."""
-    a, b = (compose(plain(size, level), s, sample.pictures()).astype(int) for s in (state, other))
+    a, b = (
+        compose(plain(size, level), s, sample.pictures(), sample.TEXTS).astype(int) for s in (state, other)
+    )
     return np.asarray(np.abs(a - b).max(axis=2) > 100)
 
 
@@ -44,23 +46,27 @@ def test_the_frame_given_is_left_alone_be_it_read_only_or_strided():
     frame = sample.backdrop(640, 480)
     before = frame.copy()
     frame.setflags(write=False)
-    drawn = compose(frame, optimal(), sample.pictures())
+    drawn = compose(frame, optimal(), sample.pictures(), sample.TEXTS)
     assert np.array_equal(frame, before) and drawn.shape == frame.shape and drawn.dtype == np.uint8
     assert not np.array_equal(drawn, frame)
     strided = np.ascontiguousarray(frame[::-1])[::-1]
-    assert np.array_equal(compose(strided, optimal(), sample.pictures()), drawn)
+    assert np.array_equal(compose(strided, optimal(), sample.pictures(), sample.TEXTS), drawn)
 
 
 def test_what_a_compositor_drew_before_does_not_matter():
     pictures = sample.pictures()
-    kept = Compositor(pictures)
+    kept = Compositor(pictures, sample.TEXTS)
     for size in (SIZES[0], SIZES[1], (1366, 768), SIZES[0]):
         frame = sample.backdrop(*size)
         for count, steps in ((6, 3), (24, 9), (6, 4), (6, 3)):
             for name in ("none", "highlight", "optimal"):
-                view = sample.task(count, steps=steps, message=message("hands_full", opacity=0.2 * steps))
+                view = sample.task(
+                    count, steps=steps, message=message("hands_full", sample.TEXTS, opacity=0.2 * steps)
+                )
                 state = condition(name)(dataclasses.replace(view, clock=float(steps)))
-                assert np.array_equal(kept.compose(frame, state), compose(frame, state, pictures))
+                assert np.array_equal(
+                    kept.compose(frame, state), compose(frame, state, pictures, sample.TEXTS)
+                )
 
 
 def test_a_panel_is_drawn_again_only_when_it_says_something_else(monkeypatch):
@@ -72,7 +78,7 @@ def test_a_panel_is_drawn_again_only_when_it_says_something_else(monkeypatch):
         return panel(stencils, rect)
 
     monkeypatch.setattr(Canvas, "panel", spy)
-    kept = Compositor(sample.pictures())
+    kept = Compositor(sample.pictures(), sample.TEXTS)
     frame = sample.backdrop(640, 480)
     kept.compose(frame, optimal(24, 20))
     panels = kept.layout(optimal(24, 20), 640, 480).panels
@@ -89,8 +95,8 @@ PARTS = {
     "bins": {"bins": ()},
     "hands": {"inventory": (InventorySlot("Spoon"), InventorySlot())},
     "message": {"message": Message("Other", MessageKind.INFO)},
-    "tone": {"message": Message(message("replanned").text, MessageKind.REFUSAL)},
-    "fade": {"message": message("replanned", opacity=0.5)},
+    "tone": {"message": Message(message("replanned", sample.TEXTS).text, MessageKind.REFUSAL)},
+    "fade": {"message": message("replanned", sample.TEXTS, opacity=0.5)},
     "delivered": {"delivered": 5},
     "total": {"total": 7},
     "clock": {"clock": 90.0},
@@ -100,7 +106,7 @@ PARTS = {
 
 @pytest.mark.parametrize("part", sorted(PARTS))
 def test_every_part_of_the_state_shows(part):
-    kept = Compositor(sample.pictures())
+    kept = Compositor(sample.pictures(), sample.TEXTS)
     frame = sample.backdrop(640, 480)
     before = kept.compose(frame, optimal())
     assert not np.array_equal(before, kept.compose(frame, dataclasses.replace(optimal(), **PARTS[part])))
@@ -137,9 +143,9 @@ def test_text_contrast_holds_over_any_background(level, done):
     for text, detail, rest in (("HHHHHH", "x", "x"), ("", "HHHHHHH", "")):
         blank = HudState("", (ChecklistItem("", rest, done=done),), (), (InventorySlot(), InventorySlot()))
         state = dataclasses.replace(blank, checklist=(ChecklistItem(text, detail, done=done),))
-        drawn = compose(plain(size, level), state, {})
+        drawn = compose(plain(size, level), state, {}, sample.TEXTS)
         covered = ink(state, blank, size, level)
-        panel = compose(plain(size, level), blank, {})[covered]
+        panel = compose(plain(size, level), blank, {}, sample.TEXTS)[covered]
         brightest = luminance(drawn[covered]).max()
         ratio = (brightest + 0.05) / (luminance(panel).max() + 0.05)
         assert ratio >= 4.5
@@ -195,8 +201,10 @@ def test_tones_differ_by_more_than_their_colour():
     shapes = []
     for kind in MessageKind:
         state = dataclasses.replace(optimal(), message=Message("Same text", kind))
-        rect = Compositor({}).layout(state, 640, 480).panels["message"]
-        patch = compose(frame, state, {})[rect.y : rect.bottom, rect.x : rect.x + 32].astype(np.float64)
+        rect = Compositor({}, sample.TEXTS).layout(state, 640, 480).panels["message"]
+        patch = compose(frame, state, {}, sample.TEXTS)[rect.y : rect.bottom, rect.x : rect.x + 32].astype(
+            np.float64
+        )
         tone = np.array(theme.TONES[kind], dtype=np.float64)
         shapes.append(np.abs(patch - tone).max(axis=2) < 12)
     assert all((shapes[i] ^ shapes[j]).sum() > 15 for i in range(3) for j in range(i))
@@ -212,7 +220,7 @@ def test_names_of_what_the_hands_hold_are_never_cut(size, monkeypatch):
         return text(canvas, x, baseline, line, *rest)
 
     monkeypatch.setattr(Canvas, "text", spy)
-    compositor = Compositor({})
+    compositor = Compositor({}, sample.TEXTS)
     for label in sorted({model.label for model in Catalogue.load().objects.values()}):
         state = HudState("", (), (), (InventorySlot(label), InventorySlot(label)))
         written.clear()
@@ -222,7 +230,9 @@ def test_names_of_what_the_hands_hold_are_never_cut(size, monkeypatch):
 
 @pytest.mark.parametrize("angle", [0.0, 1.5707963, 3.1415926, -1.5707963])
 def test_the_pointer_sits_at_the_edge_it_points_to(angle):
-    layout = Compositor({}).layout(dataclasses.replace(optimal(), pointer=Pointer(angle)), 640, 480)
+    layout = Compositor({}, sample.TEXTS).layout(
+        dataclasses.replace(optimal(), pointer=Pointer(angle)), 640, 480
+    )
     free, rect = layout.free, layout.panels["pointer"]
     dx = rect.x + rect.width / 2 - (free.x + free.width / 2)
     dy = rect.y + rect.height / 2 - (free.y + free.height / 2)
@@ -251,4 +261,4 @@ FRAME = np.zeros((480, 640, 3), np.uint8)
 )
 def test_unusable_frames_and_pictures_are_refused(frame, pictures, named):
     with pytest.raises(FrameError, match=named):
-        compose(frame, optimal(), pictures)
+        compose(frame, optimal(), pictures, sample.TEXTS)

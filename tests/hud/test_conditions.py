@@ -11,7 +11,7 @@ from hud.conditions import condition, condition_names
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
 from hud.markers import breadcrumbs, flagpoles
-from hud.messages import FADE, SHOWN, TEXTS, fade, message
+from hud.messages import FADE, KINDS, SHOWN, fade, message
 from hud.options import option_names
 from hud.options.reroute import CLEARANCE
 from hud.schema import from_dict, to_dict
@@ -61,7 +61,7 @@ def test_an_unknown_name_is_refused_with_the_choices(name, named):
 
 @pytest.mark.parametrize("name", condition_names())
 def test_all_conditions_show_bins_hands_progress_clock_and_message(name):
-    text = message("hands_full")
+    text = message("hands_full", sample.TEXTS)
     view = sample.task(12, steps=6, message=text, clock=12.5)
     state = shown(name, view)
     assert [(b.label, b.picture, b.place) for b in state.bins] == [
@@ -77,8 +77,8 @@ def test_who_carries_one_object_has_one_hand_on_show():
     assert state.inventory == (None, InventorySlot())
     assert from_dict(to_dict(state)) == state
     frame, two = sample.backdrop(640, 480), shown("none", sample.task(6))
-    rect = Compositor({}).layout(state, 640, 480).panels["inventory"]
-    drawn, other = (compose(frame, s, {}) for s in (state, two))
+    rect = Compositor({}, sample.TEXTS).layout(state, 640, 480).panels["inventory"]
+    drawn, other = (compose(frame, s, {}, sample.TEXTS) for s in (state, two))
     middle = rect.x + rect.width // 2
     assert np.array_equal(drawn[rect.y :, rect.x : middle], frame[rect.y :, rect.x : middle])
     assert np.array_equal(drawn[:, middle:], other[:, middle:])
@@ -199,14 +199,19 @@ def test_an_inconsistent_view_is_refused_by_name(change, named):
 
 
 def test_all_that_is_reported_has_a_message_that_is_a_sentence_with_and_without_labels():
-    assert set(TEXTS) >= {reported.value for reported in (*Refusal, *EventKind)}
-    for key in TEXTS:
-        for bar in (message(key), message(key, object="Blue mug", receptacle="Office supply box")):
+    assert set(KINDS) >= {reported.value for reported in (*Refusal, *EventKind)}
+    for key in KINDS:
+        for bar in (
+            message(key, sample.TEXTS),
+            message(key, sample.TEXTS, object="Blue mug", receptacle="Office supply box"),
+        ):
             assert bar.text[0].isupper() and bar.text.endswith(".") and "{" not in bar.text
             assert "Blue mug" not in bar.text, "labels read as part of the sentence"
-        assert (message(key).kind is MessageKind.SUCCESS) is (key in ("picked", "placed", "finished"))
+        assert (message(key, sample.TEXTS).kind is MessageKind.SUCCESS) is (
+            key in ("picked", "placed", "finished")
+        )
     with pytest.raises(MessageError, match=r"'oops'.*hands_full"):
-        message("oops")
+        message("oops", sample.TEXTS)
 
 
 @pytest.mark.parametrize(

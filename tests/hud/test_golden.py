@@ -21,7 +21,7 @@ SIZE = (640, 480)
 
 def states():
     def state(name, count, steps, key, **labels):
-        bar = None if key is None else message(key, **labels)
+        bar = None if key is None else message(key, sample.TEXTS, **labels)
         return condition(name)(sample.task(count, steps=steps, message=bar))
 
     return {
@@ -31,7 +31,9 @@ def states():
         "hands_empty": state("none", 6, 0, None),
         "hands_full": state("none", 6, 2, "nothing_in_reach"),
         "finished": state("optimal", 6, 12, "finished"),
-        "fading": dataclasses.replace(state("optimal", 12, 3, None), message=message("placed", opacity=0.4)),
+        "fading": dataclasses.replace(
+            state("optimal", 12, 3, None), message=message("placed", sample.TEXTS, opacity=0.4)
+        ),
         "map_and_pointer": dataclasses.replace(
             condition("optimal-minimap")(
                 dataclasses.replace(sample.task(12, steps=1), bounds=(-4.0, -1.0, 4.0, 7.0), heading=1.2)
@@ -60,7 +62,9 @@ def with_markers(frame, markers, dots=5):
 
 
 def draw(state):
-    return compose(with_markers(sample.backdrop(*SIZE), state.markers), state, sample.pictures())
+    return compose(
+        with_markers(sample.backdrop(*SIZE), state.markers), state, sample.pictures(), sample.TEXTS
+    )
 
 
 @pytest.mark.parametrize("name", sorted(states()))

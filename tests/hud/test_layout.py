@@ -16,7 +16,7 @@ from hud.compose import Compositor
 from hud.conditions import condition
 from hud.errors import FrameError
 from hud.layout import margins, scrolled, unit_of, visible_rows
-from hud.messages import TEXTS, message
+from hud.messages import KINDS, message
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Message, MessageKind, MiniMap, Pointer
 from hud.task import Alternative
 from hud.text import Typeface
@@ -84,7 +84,7 @@ def overlap(a, b):
 
 
 def layout(state, size):
-    return Compositor({}).layout(state, *size)
+    return Compositor({}, sample.TEXTS).layout(state, *size)
 
 
 @pytest.mark.slow
@@ -173,7 +173,7 @@ def test_the_current_row_is_shown_and_texts_stay_in_their_rows(state, size):
 @given(states(), st.sampled_from(FRAMES[:2]))
 def test_every_state_can_be_drawn_and_changes_only_its_panels(state, size):
     frame = sample.backdrop(*size)
-    compositor = Compositor(sample.pictures(48))
+    compositor = Compositor(sample.pictures(48), sample.TEXTS)
     outside = np.ones(frame.shape[:2], dtype=bool)
     for rect in compositor.layout(state, *size).panels.values():
         outside[rect.y : rect.bottom, rect.x : rect.right] = False
@@ -220,16 +220,18 @@ def test_a_list_of_48_steps_can_be_read_whole_and_is_never_cut():
 @pytest.mark.parametrize(("size", "share"), [((640, 480), 0.49), ((1280, 720), 0.42), ((1920, 1080), 0.42)])
 @pytest.mark.parametrize("name", ["none", "highlight", "optimal"])
 def test_the_view_stays_mostly_free_and_no_text_is_cut_at_the_hardest_level(name, size, share):
-    found = layout(condition(name)(sample.task(24, steps=21, message=message("hands_full"))), size)
+    found = layout(
+        condition(name)(sample.task(24, steps=21, message=message("hands_full", sample.TEXTS))), size
+    )
     assert sum(r.width * r.height for r in found.panels.values()) <= share * size[0] * size[1]
     lines = [line for row in (*found.rows, *found.bin_rows) for line in row.detail]
     assert lines and not any("…" in line for line in lines)
 
 
-@pytest.mark.parametrize("key", sorted(TEXTS))
+@pytest.mark.parametrize("key", sorted(KINDS))
 @pytest.mark.parametrize("size", FRAMES[:3])
 def test_messages_are_never_cut(key, size):
-    bar = message(key, object="Stack of picture books", receptacle="Office-supply box")
+    bar = message(key, sample.TEXTS, object="Stack of picture books", receptacle="Office-supply box")
     state = HudState("", (), condition("none")(sample.task(6)).bins, (InventorySlot(), InventorySlot()), bar)
     assert " ".join(layout(state, size).message_lines) == bar.text
 

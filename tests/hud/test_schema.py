@@ -25,7 +25,9 @@ CONFORMS = Draft202012Validator(json.loads(json.dumps(json_schema()))).is_valid
 )
 def test_states_survive_json_and_fit_the_schema(name, count, data):
     steps = data.draw(st.integers(0, 2 * count))
-    view = sample.task(count, steps=steps, message=message("picked", object="Novel", opacity=0.25))
+    view = sample.task(
+        count, steps=steps, message=message("picked", sample.TEXTS, object="Novel", opacity=0.25)
+    )
     state = condition(name)(dataclasses.replace(view, bounds=(0.0, 0.0, 9.0, 7.5)))
     written = to_dict(state)
     read = json.loads(json.dumps(written))
@@ -35,7 +37,7 @@ def test_states_survive_json_and_fit_the_schema(name, count, data):
 
 
 def a_state():
-    view = sample.task(6, steps=1, message=message("picked"))
+    view = sample.task(6, steps=1, message=message("picked", sample.TEXTS))
     state = condition("optimal")(view)
     return to_dict(state)
 

@@ -91,14 +91,14 @@ def test_every_refusal_is_caused_in_a_session(refused):
 def test_the_message_bar_says_why_an_attempt_is_infeasible(refused, refusal, house, pictures):
     """Its pixels are those of this refusal's text over the same frame; without it, and for others, they differ."""
     tried, pictured, _ = refused
-    result, compositor = tried[refusal], Compositor(pictures)
+    result, compositor = tried[refusal], Compositor(pictures, house.texts)
     state, frame, without = pictured[refusal]
     rect = compositor.layout(state, *SIZES[0]).panels["message"]
     bar = slice(rect.y, rect.bottom), slice(rect.x, rect.right)
     labels = _labels(house, result)
 
     def saying(other):
-        words = dataclasses.replace(state, message=message(other.value, **labels))
+        words = dataclasses.replace(state, message=message(other.value, house.texts, **labels))
         return compositor.compose(without, words)[bar]
 
     assert (frame[bar] != without[bar]).any()

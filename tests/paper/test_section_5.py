@@ -37,9 +37,9 @@ def highlighted(house):
     return play(house, "highlight")
 
 
-def tiles(state, pictures, size, panel):
+def tiles(state, texts, pictures, size, panel):
     """The entries of a list, and the pictures in its rows of a frame, in order, each (s, s, 3)."""
-    compositor, (width, height) = Compositor(pictures), size
+    compositor, (width, height) = Compositor(pictures, texts), size
     frame = compositor.compose(np.full((height, width, 3), 90, np.uint8), state)
     layout = compositor.layout(state, width, height)
     rect, unit = layout.panels[panel], compositor._stencils.unit
@@ -79,9 +79,9 @@ def test_all_conditions_show_the_bins_with_picture_room_and_place(starts, house,
     assert [(b.label, b.place) for b in state.bins] == [
         (r.label, f"{house.rooms.label(r.room)}, {r.place}") for r in catalogue.receptacles.values()
     ]
-    rows = Compositor(pictures).layout(state, *size).bin_rows
+    rows = Compositor(pictures, house.texts).layout(state, *size).bin_rows
     assert [" ".join(row.detail) for row in rows] == [b.place for b in state.bins], "read whole"
-    found = list(tiles(state, pictures, size, "bins"))
+    found = list(tiles(state, house.texts, pictures, size, "bins"))
     assert len(found) == 6
     assert all(likest(tile, pictures, "receptacle:") == entry.picture for entry, tile in found)
 

@@ -1,4 +1,4 @@
-"""Texts that participants read: one TOML file for each language, and its story in `story.LANGUAGE.md`."""
+"""Texts that participants read, from the files in `experiments/texts`: one for each language, and its story."""
 
 import re
 from collections.abc import Mapping
@@ -11,10 +11,8 @@ from experiments.errors import ConfigError
 from experiments.people.items import Item
 from mjsim.support.files import read_bytes
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[2] / "texts"
 _PLACE = re.compile(r"\{(\w+)\}")
-# Places of texts that pages fill in themselves.
-_LATER = frozenset({"step", "steps", "place", "wait"})
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -59,7 +57,8 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
         raise ConfigError(
             f"no texts in language {language!r}; there are {', '.join(languages())}, or name a file with all `texts`"
         )
-    usual = _tables(FOLDER / f"{language if known else 'en'}.toml")
+    english = _tables(FOLDER / "en.toml")
+    usual = _tables(FOLDER / f"{language}.toml") if known else english
     own = _tables(path) if path else {}
     for name, table in {} if known else usual.items():
         if missing := sorted(set(table) - set(own.get(name, {}))):
@@ -73,7 +72,7 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
             )
     tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
     values = {"pay": tables["common"]["no_payment"], **values}
-    return {name: _section(name, table, values, path) for name, table in tables.items()}
+    return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
 
 
 def story_file(language: str) -> Path | None:
@@ -97,7 +96,9 @@ def _tables(path: Path) -> dict[str, dict[str, Any]]:
         raise ConfigError(f"{path}: {error}") from error
 
 
-def _section(name: str, table: dict[str, Any], values: Mapping[str, str], path: Path | None) -> Section:
+def _section(
+    name: str, table: dict[str, Any], english: dict[str, Any], values: Mapping[str, str], path: Path | None
+) -> Section:
     where = f"{path}: " if path else ""
     try:
         form = msgspec.convert({key: table[key] for key in ("item", "scale") if key in table}, _Items)
@@ -113,16 +114,21 @@ def _section(name: str, table: dict[str, Any], values: Mapping[str, str], path: 
             raise ConfigError(
                 f"{where}[{name}] item {item.name}: right is {item.right!r}, no point of the scale"
             )
-    filled = {key: _filled(text, values, f"{where}[{name}] {key}") for key, text in words.items()}
+    filled = {
+        key: _filled(text, values, str(english.get(key, "")), f"{where}[{name}] {key}")
+        for key, text in words.items()
+    }
     return Section(filled, tuple(form.item), tuple(form.scale or ()))
 
 
-def _filled(text: str, values: Mapping[str, str], where: str) -> str:
+def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
+    """Fill in the values of a study; the other places of the English text stay."""
+    places = _PLACE.findall(english)
+    later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
+
     def value(found: re.Match[str]) -> str:
-        if found[1] in values or found[1] in _LATER:
+        if found[1] in values or found[1] in later:
             return values.get(found[1], found[0])
-        raise ConfigError(
-            f"{where} has a place {found[0]}; there are {', '.join(sorted({*values, *_LATER}))}"
-        )
+        raise ConfigError(f"{where} has a place {found[0]}; there are {', '.join(sorted({*values, *later}))}")
 
     return _PLACE.sub(value, text)

@@ -63,11 +63,11 @@ def studio():
         ahead=KnownPlan(steps, segment=path, path=path, goal=goal),
         camera=CameraView(pose.position, pose.rotation, pose.fovy, 640, 480),
     )
-    view = dataclasses.replace(view, message=message("started"), clock=83.0)
+    view = dataclasses.replace(view, message=message("started", house.texts), clock=83.0)
     pictures = render_pictures(house.catalogue)
     pictures[FLOORPLAN] = render_house_map(house.catalogue, house.bounds)
     with Renderer(scene.model) as large, Renderer(scene.model, width=320, height=240) as small:
-        compositor = Compositor(pictures)
+        compositor = Compositor(pictures, house.texts)
 
         def glasses(state):
             """640 x 480, with the HUD."""

@@ -199,7 +199,7 @@ names = list(seen.object_names)
 path = house.geodesics.shortest_path(seen.position, seen.object_positions[9, :2]).points
 ahead = KnownPlan((TaskStep("pick", names[9]),), path=path, goal=tuple(seen.object_positions[9]))
 view = TaskBoard(house, scene.episode, names).view(seen, ahead=ahead)
-compositor = Compositor(render_pictures(house.catalogue, 48))
+compositor = Compositor(render_pictures(house.catalogue, 48), house.texts)
 for name, profile in (("none", "draft"), ("highlight-xray", "fast"), ("optimal", "quality")):
     state = condition(name)(view)
     with Renderer(scene.model, width=320, height=240, profile=profile) as renderer:

@@ -83,10 +83,10 @@ def test_page_and_film_say_the_same(page, drawn):
     for name, steps in itertools.product(CONDITIONS, (0, 3)):
         drawn.clear()
         view = sample.task(
-            4, steps=steps, message=message("picked", object="Blue mug", receptacle="Dish bin")
+            4, steps=steps, message=message("picked", sample.TEXTS, object="Blue mug", receptacle="Dish bin")
         )
         state = condition(name)(view)
-        compose(np.zeros((1080, 1920, 3), np.uint8), state, sample.pictures())
+        compose(np.zeros((1080, 1920, 3), np.uint8), state, sample.pictures(), sample.TEXTS)
         shown = page.evaluate(SHOW, msgspec.to_builtins(page_hud(state).state) | {"clock": state.clock})
         film, on_page = words(drawn), words(shown["parts"])
         assert on_page - film <= PAGE_ALONE, name

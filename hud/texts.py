@@ -1,0 +1,65 @@
+"""Words of the HUD in one language. The caller reads them from a file, so that `hud` holds none itself."""
+
+import re
+from dataclasses import dataclass
+
+_PLACE = re.compile(r"\{(\w+)\}")
+
+
+@dataclass(frozen=True)
+class HudTexts:
+    """All words that the HUD draws.
+
+    In `{object}` and `{receptacle}` stands a label as it reads within an English sentence ("blue mug"), in `{Object}`
+    and `{Receptacle}` the label itself ("Blue mug").
+    """
+
+    # Task list, bins and hands
+    to_put_away: str
+    your_plan: str
+    pick_up: str
+    put_in: str  # {Receptacle}
+    at_least: str  # {metres}
+    decimal: str  # the decimal separator
+    left: str  # {count}
+    none_left: str
+    next_step: str  # {number}, {count}
+    done: str
+    above: str  # {count}
+    more: str  # {count}
+    bins: str
+    more_bins: str  # {count}
+    left_hand: str
+    right_hand: str
+    empty: str
+    # Stand-ins for labels in messages
+    object: str
+    receptacle: str
+    # Messages about events and refusals
+    picked: str
+    placed: str
+    finished: str
+    replanned: str
+    started: str
+    pick_failed: str
+    place_failed: str
+    grip_lost: str
+    ejected: str
+    tunnelled: str
+    dislodged: str
+    busy: str
+    nothing_in_reach: str
+    out_of_reach: str
+    hands_full: str
+    hands_empty: str
+    not_carried: str
+    already_carried: str
+    already_delivered: str
+    not_the_receptacle: str
+    receptacle_out_of_reach: str
+    unknown_object: str
+
+
+def filled(text: str, **values: object) -> str:
+    """Replace each `{name}` in a text by its value; places without a value stay."""
+    return _PLACE.sub(lambda place: str(values.get(place[1], place[0])), text)
