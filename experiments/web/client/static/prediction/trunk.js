@@ -1,4 +1,4 @@
-// The trunk against the house: mjsim/world/world/fidelity/trunk_contact.py in JavaScript, the same operations in the same order.
+// The trunk against the house: mjsim/world/fidelity/trunk_contact.py in JavaScript, the same operations in the same order.
 
 /** @typedef {{ edges: ArrayLike<number>, first: ArrayLike<number>, boxes: ArrayLike<number>, near: ArrayLike<number>, near_first: ArrayLike<number>, origin_x: number, origin_y: number, rows: number, columns: number, cell: number, margin: number }} Floor Outlines of the obstacles as in `Floor` of Python, row by row, with the size of its cells and how far they reach, m */
 

@@ -1,4 +1,4 @@
-// Walking and looking: mjsim/world/world/fidelity/kinematics.py in JavaScript, the same operations in the same order.
+// Walking and looking: mjsim/world/fidelity/kinematics.py in JavaScript, the same operations in the same order.
 // Where the host's `hypot`, `sin` or `cos` differ in the last bit, the server's next state sets that right.
 
 /** @import { Floor } from "./trunk.js" */
