@@ -20,7 +20,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - every subcommand takes them
-    from mjsim.diagnostics import environment_report
+    from mjsim.render.diagnostics import environment_report
 
     report = environment_report()
     for line in report.lines():

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from mjsim.diagnostics import INSTALL_DM_CONTROL
 from mjsim.environments.errors import ViewerError
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.navigable import NavigablePoints
 from mjsim.model.sampling import sample_episode
 from mjsim.model.scene import compose
 from mjsim.render import Labels, Renderer
+from mjsim.render.diagnostics import INSTALL_DM_CONTROL
 from mjsim.values.episode import Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters

@@ -5,9 +5,9 @@ import time
 import warnings
 from typing import Any
 
-from mjsim.diagnostics import INSTALL_DM_CONTROL
 from mjsim.environments.episodes import dm_control_physics
 from mjsim.environments.errors import ViewerError
+from mjsim.render.diagnostics import INSTALL_DM_CONTROL
 from mjsim.world.world import World
 
 _BACKEND = "MUJOCO_GL"

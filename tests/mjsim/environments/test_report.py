@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjsim import diagnostics
-from mjsim.diagnostics import advise, egl_vendors, environment_report
+from mjsim.render import diagnostics
 from mjsim.render.context import GlInfo, is_software
+from mjsim.render.diagnostics import advise, egl_vendors, environment_report
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 GPU = GlInfo("NVIDIA Corporation", "NVIDIA H100/PCIe/SSE2", "4.6.0", False)
@@ -59,7 +59,7 @@ def test_software_rasterisers_are_recognised():
 def test_a_machine_without_opengl_still_gets_a_report():
     """Rendering switched off stands in for a missing library: importing must work, the report must say why."""
     code = (
-        "from mjsim.diagnostics import environment_report as e; r = e(); "
+        "from mjsim.render.diagnostics import environment_report as e; r = e(); "
         "print(r.usable, r.gl, 'MUJOCO_GL' in r.problem, 'libegl1' in r.advice[-1], 'unusable' in str(r.lines()))"
     )
     run = subprocess.run(

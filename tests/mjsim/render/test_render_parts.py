@@ -222,7 +222,7 @@ class GLContext:
 module.GLContext = GLContext
 import mujoco
 sys.modules["mujoco.egl"] = module
-from mjsim.diagnostics import environment_report
+from mjsim.render.diagnostics import environment_report
 from mjsim.values.errors import RenderError
 from mjsim.render import gl_info
 try:
