@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import ConfigError
 from hud.texts import HudTexts
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.disorder import Disorder
 from mjsim.model.footprint import Footprint

@@ -40,7 +40,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from mjsim.environments.dm_environment import make
-    from mjsim.houses.home_cache import load_catalogue
+    from mjsim.generator.home_cache import load_catalogue
     from mjsim.model.catalogue import Catalogue
     from mjsim.model.house import navigable_floor
     from mjsim.model.sampling import sample_episode
@@ -68,7 +68,7 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "environments.dm_environment": ("make",),
         "values.episode": ("Episode",),
         "values.errors": ("MjsimError",),
-        "houses.home_cache": ("load_catalogue",),
+        "generator.home_cache": ("load_catalogue",),
         "model.catalogue": ("Catalogue",),
         "model.house": ("navigable_floor",),
         "model.sampling": ("sample_episode",),

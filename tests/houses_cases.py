@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 import mujoco
 
-from mjsim.houses.furniture.look import Look
-from mjsim.houses.furniture.piece import Piece, flattened
-from mjsim.houses.values import Asset, Door, FloorPlan, Palette, Rectangle, Room, Window
+from mjsim.generator.furniture.look import Look
+from mjsim.generator.furniture.piece import Piece, flattened
+from mjsim.generator.values import Asset, Door, FloorPlan, Palette, Rectangle, Room, Window
 from mjsim.model.assets import models_root
 
 PALETTE = Palette(

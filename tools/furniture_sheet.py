@@ -14,14 +14,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.houses.files import write_files
-from mjsim.houses.furnish import placed
-from mjsim.houses.furniture.catalogue import KINDS
-from mjsim.houses.furniture.look import draw_look
-from mjsim.houses.furniture.piece import Piece
-from mjsim.houses.palette import draw_palette
-from mjsim.houses.space import Place
-from mjsim.houses.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
+from mjsim.generator.files import write_files
+from mjsim.generator.furnish import placed
+from mjsim.generator.furniture.catalogue import KINDS
+from mjsim.generator.furniture.look import draw_look
+from mjsim.generator.furniture.piece import Piece
+from mjsim.generator.palette import draw_palette
+from mjsim.generator.space import Place
+from mjsim.generator.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
 from mjsim.model.assets import models_root
 from mjsim.model.model_files import read_model
 from mjsim.render import Renderer

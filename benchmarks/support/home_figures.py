@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from mjsim.houses.generated import generate, house_files
-from mjsim.houses.programme import NEEDS
-from mjsim.houses.recipe import RECIPE, read_recipe
-from mjsim.houses.values import WALL, Door, FloorPlan, Window
+from mjsim.generator.generated import generate, house_files
+from mjsim.generator.programme import NEEDS
+from mjsim.generator.recipe import RECIPE, read_recipe
+from mjsim.generator.values import WALL, Door, FloorPlan, Window
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.clearance import ClearanceField

@@ -41,7 +41,7 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
-    from mjsim.houses.home_cache import load_catalogue
+    from mjsim.generator.home_cache import load_catalogue
     from mjsim.model.validation.report import check_path
 
     if arguments.picture is not None:

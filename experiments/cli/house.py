@@ -183,8 +183,8 @@ def _export(arguments: argparse.Namespace) -> int:
     from experiments.house import House
     from experiments.record.run_directory import check_file
     from mjsim.exporting.procthor import procthor_house
-    from mjsim.houses.home_cache import load_catalogue
-    from mjsim.houses.recipe import floor_plan_of
+    from mjsim.generator.home_cache import load_catalogue
+    from mjsim.generator.recipe import floor_plan_of
     from mjsim.importing import require_extra
     from mjsim.support.files import exchange, work_folder, write_text_atomically
 

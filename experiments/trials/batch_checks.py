@@ -15,7 +15,7 @@ from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house import MAX_HOUSES
 from mjsim.model.house_ref import parse_house

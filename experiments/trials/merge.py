@@ -19,7 +19,7 @@ from experiments.trials.design import Design
 from experiments.trials.shards import Shard, shard_numbers
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.support.files import work_folder
 
 _ROWS_OF = re.compile(r"\.rows\.\d+-of-(\d+)\..*")

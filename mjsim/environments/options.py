@@ -14,7 +14,7 @@ from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.model.house import compiled_house, navigable_floor
 from mjsim.model.navigable import NavigableBuilder
 from mjsim.values.episode import POINTS, Episode

@@ -7,8 +7,8 @@ nearest.
 from collections.abc import Iterator
 from typing import Any
 
-from mjsim.houses.openings import portions
-from mjsim.houses.values import HEIGHT, SIDES, WALL, Door, FloorPlan, Room, Side, Window, opposite
+from mjsim.generator.openings import portions
+from mjsim.generator.values import HEIGHT, SIDES, WALL, Door, FloorPlan, Room, Side, Window, opposite
 
 NAMES = (
     "mjsim_rooms"  # of the metadata: room id -> [key, label], which ProcTHOR's four types of rooms cannot say

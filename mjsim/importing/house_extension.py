@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision

@@ -18,7 +18,7 @@ class HouseRef:
     Attributes:
         kind: How it was named.
         name: Its name in records: a path for a folder or a recipe.
-        file: Its `catalogue.toml`; None for a home that has yet to be generated (`mjsim.houses.home_cache.ensured`).
+        file: Its `catalogue.toml`; None for a home that has yet to be generated (`mjsim.generator.home_cache.ensured`).
         base: The house that its catalogue extends, if that is a generated one.
     """
 

@@ -106,7 +106,7 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
     "name",
     [
         "mjsim.environments.dm_environment",
-        "mjsim.houses.home_cache",
+        "mjsim.generator.home_cache",
         "mjsim.model.catalogue",
         "mjsim.model.sampling",
         "mjsim.values.person_parameters",

@@ -14,7 +14,7 @@ from experiments.house import House
 from experiments.procedure.house_pictures import floor_plan, room_views
 from experiments.web.view.page import run_page
 from experiments.web.view.tour import tour_page
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.model.generated_names import parse_name
 from mjsim.model.house import compiled_house
 from mjsim.model.house_ref import parse_house

@@ -10,10 +10,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from trimesh.transformations import rotation_matrix
 
-from mjsim.houses.files import used_materials
-from mjsim.houses.palette import surfaces
-from mjsim.houses.programme import use_of
-from mjsim.houses.values import WALL, FloorPlan, Rectangle, Room
+from mjsim.generator.files import used_materials
+from mjsim.generator.palette import surfaces
+from mjsim.generator.programme import use_of
+from mjsim.generator.values import WALL, FloorPlan, Rectangle, Room
 from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.procthor_furniture import Assets, Library, in_our_style
 from mjsim.importing.houses.procthor_plan import PlanOpening, PlanWall, ProcthorPlan, Thing, read_plan

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from mjsim.houses.files import STYLE, used_materials
-from mjsim.houses.furniture.catalogue import KINDS
-from mjsim.houses.furniture.look import draw_look
-from mjsim.houses.furniture.piece import flattened
-from mjsim.houses.palette import draw_palette
-from mjsim.houses.values import Asset
+from mjsim.generator.files import STYLE, used_materials
+from mjsim.generator.furniture.catalogue import KINDS
+from mjsim.generator.furniture.look import draw_look
+from mjsim.generator.furniture.piece import flattened
+from mjsim.generator.palette import draw_palette
+from mjsim.generator.values import Asset
 from mjsim.importing.houses.meshes import primitive
 from mjsim.importing.houses.procthor_plan import Thing
 from mjsim.importing.houses.values import Piece

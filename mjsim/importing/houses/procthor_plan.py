@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
-from mjsim.houses.values import WALL
+from mjsim.generator.values import WALL
 from mjsim.importing.houses.rooms import boxes_of, words_of
 from mjsim.importing.houses.values import NamedRoom
 from mjsim.support.files import read_json, read_text

@@ -8,7 +8,7 @@ import pytest
 
 from experiments.cli import main as cli
 from experiments.house import House
-from mjsim.houses.home_cache import load_catalogue
+from mjsim.generator.home_cache import load_catalogue
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
 from mjsim.model.catalogue import Catalogue

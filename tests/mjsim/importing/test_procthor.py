@@ -7,8 +7,8 @@ import pytest
 from house_scenes import write_procthor
 
 from experiments.cli import main as cli
-from mjsim.houses.home_cache import load_catalogue
-from mjsim.houses.recipe import floor_plan_of
+from mjsim.generator.home_cache import load_catalogue
+from mjsim.generator.recipe import floor_plan_of
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.procthor_plan import read_plan
 from mjsim.importing.houses.values import HouseOptions

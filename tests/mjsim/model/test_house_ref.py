@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mjsim.houses.home_cache import ensured, load_catalogue
+from mjsim.generator.home_cache import ensured, load_catalogue
 from mjsim.model.assets import models_root
 from mjsim.model.catalogue import Catalogue
 from mjsim.model.house_ref import parse_house

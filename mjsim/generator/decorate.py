@@ -1,0 +1,242 @@
+"""Hangs pictures, curtains and lamps, lays rugs, and puts radiators under windows."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mjsim.generator.furniture.catalogue import KINDS
+from mjsim.generator.furniture.look import Look
+from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
+from mjsim.generator.space import BLINDS, WALL_GAP, Place, Space
+from mjsim.generator.values import BACK, SIDES, FloorPlan, Side, Window
+from mjsim.support.random_streams import stream
+
+LOW = 1.15  # m: pictures hang over what is lower
+BESIDE_TILES = 0.3  # m between the tiles of a kitchen and a picture
+LAMPS_APART = 0.8  # m
+LARGE = 15.0  # m^2: the middle of a larger room looks bare without a large rug
+LONG = 2.0  # m: a stretch of wall that looks bare with nothing on it
+MOST_HUNG = 4  # on the walls of a room: every picture is a texture of its own
+_WALLS: dict[str, tuple[str, ...]] = {
+    "hall": ("picture", "wall_mirror", "picture", "clock"),
+    "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
+    "office": ("pinboard", "picture", "wall_shelf", "clock"),
+    "child": ("picture", "wall_shelf", "picture", "pinboard"),
+    "bathroom": ("picture",),
+    "shower_room": ("picture",),
+    "utility": ("clock", "picture", "wall_shelf", "picture"),
+}
+_RUGS: dict[str, tuple[str, ...]] = {
+    "hall": ("runner",),
+    "living_room": ("rug", "round_rug"),
+    "bedroom": ("rug", "round_rug", "runner"),
+    "child": ("round_rug", "rug"),
+    "office": ("rug", "round_rug"),
+    "studio": ("rug", "round_rug"),
+    "dining_room": ("round_rug",),
+    "bathroom": ("bath_mat",),
+    "shower_room": ("bath_mat",),
+}
+
+
+def decorate(
+    spaces: Sequence[Space], uses: Mapping[str, str], plan: FloorPlan, look: Look, seed: int
+) -> None:
+    """Add what is not furniture to all rooms; it takes no place from anybody but a radiator."""
+    for door in plan.doors:
+        if door.is_front:
+            space = next(s for s in spaces if s.room.key == door.rooms[0])
+            mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
+            x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
+            space.stood.append((mat, Place(x, y, BACK[door.side], door.side, door.center)))
+    for space in spaces:
+        key, use = space.room.key, uses[space.room.key]
+        for window in plan.windows_of(key):
+            _dress(space, window, use, look, stream(seed, "window", key, window.side, f"{window.center:.2f}"))
+        _lamps(space, look, stream(seed, "lamp", key))
+        _rug(space, use, look, stream(seed, "rug", key))
+        _walls(space, use, look, stream(seed, "wall", key))
+
+
+def _at_wall(space: Space, side: Side, along: float) -> Place:
+    x, y = space.room.floor.along(side, along, along, 0.0, 0.0).center
+    return Place(x, y, BACK[side], side, along)
+
+
+def _tallest(space: Space, side: Side, start: float, end: float, deep: float) -> float:
+    """Height of the highest thing that stands along a stretch of a wall, m."""
+    zone = space.room.floor.along(side, start, end, 0.0, deep)
+    tops = [
+        top
+        for x0, y0, x1, y1, top in space.solids
+        if x0 < zone.x1 and zone.x0 < x1 and y0 < zone.y1 and zone.y0 < y1
+    ]
+    return max(tops, default=0.0)
+
+
+def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Generator) -> None:
+    """A radiator, and curtains or a blind."""
+    side, half = window.side, window.width / 2
+    fit = (window.width, window.sill, window.top)
+    low, high = space.room.floor.wall(side)
+    below = _tallest(space, side, window.center - half, window.center + half, 0.5)
+    if below == 0.0 and window.sill > 0.55 and use != "kitchen":
+        radiator = KINDS["radiator"].make(rng, look, fit=fit)
+        place = _at_wall(space, side, window.center)
+        spots = [moved(part.spot, place.x, place.y, place.yaw) for part in radiator.parts]
+        if space.connected(spots):
+            space.stand(radiator, place, spots, (), spots)
+            below = radiator.size[2]
+    reach = half + 0.33
+    room = window.center - reach > low and window.center + reach < high
+    dry = use not in BLINDS
+    top = _tallest(space, side, window.center - reach, window.center + reach, 0.15)
+    if dry and room and top < window.sill - 0.2 and rng.random() < 0.8:
+        beside = max(
+            _tallest(space, side, window.center + a, window.center + b, 0.15)
+            for a, b in ((-reach, -half), (half, reach))
+        )
+        curtains = KINDS["curtains"].make(rng, look, smaller=int(beside > 0 or rng.random() < 0.25), fit=fit)
+        space.stood.append((curtains, _at_wall(space, side, window.center)))
+    elif rng.random() < 0.8:
+        space.stood.append(
+            (
+                KINDS[("blind", "roller_blind")[int(rng.integers(2))]].make(rng, look, fit=fit),
+                _at_wall(space, side, window.center),
+            )
+        )
+
+
+def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
+    """One lamp under the ceiling, two in a long room; none where one hangs over a table."""
+    floor = space.room.floor
+    hanging = [
+        moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
+        for piece, at in space.stood
+        for member, x, y, yaw in flattened(piece, at.x, at.y, at.yaw)
+        if member.kind == "pendant_lamp"
+    ]
+    longer = max(floor.width, floor.depth)
+    lamp = KINDS["ceiling_lamp"].make(rng, look)
+    count = 2 if longer > 4.8 and longer > 1.5 * min(floor.width, floor.depth) else 1
+    for i in range(count):
+        share = (i + 0.5) / count
+        x, y = floor.center
+        if floor.width >= floor.depth:
+            x = floor.x0 + share * floor.width
+        else:
+            y = floor.y0 + share * floor.depth
+        if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v in hanging):
+            space.stood.append((lamp, Place(x, y, 0 if floor.width >= floor.depth else 1, None)))
+
+
+def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
+    """A rug on the largest free floor, or a mat before the bath."""
+    lies = any(p.kind == "rug" for piece, _ in space.stood for p, *_ in flattened(piece))
+    if use not in _RUGS or lies or (rng.random() > 0.85 and space.room.floor.area < LARGE):
+        return
+    kinds = _RUGS[use]
+    kind = kinds[int(rng.integers(len(kinds)))] if space.room.floor.area < LARGE else kinds[0]
+    taken = [*space.solids, *(_spot(piece, at) for piece, at in space.stood if piece.kind == "door_mat")]
+    sizes: list[tuple[int, tuple[float, float, float] | None]] = [(0, None), (1, None)]
+    if space.room.floor.area > LARGE and kind == "rug":
+        sizes = [(0, (2.8, 1.9, 0.0)), (0, (2.2, 1.5, 0.0)), *sizes]
+    for smaller, fit in sizes:
+        rug = KINDS[kind].make(rng, look, smaller=smaller, fit=fit)
+        if kind == "bath_mat":
+            baths = [(p, at) for p, at in space.stood if p.kind in ("bathtub", "shower")]
+            places = [Place(*_before(p, at), at.turns, None) for p, at in baths]
+        else:
+            places = _rug_places(space, rug)
+        for place in places:
+            spot = _spot(rug, place)
+            if not any(
+                spot[0] < o[2] and o[0] < spot[2] and spot[1] < o[3] and o[1] < spot[3] for o in taken
+            ):
+                space.stood.append((rug, place))
+                return
+
+
+def _spot(piece: Piece, place: Place) -> Spot:
+    return moved((-piece.size[0] / 2, 0, piece.size[0] / 2, piece.size[1]), place.x, place.y, place.yaw)
+
+
+def _before(piece: Piece, place: Place) -> tuple[float, float]:
+    spot = moved((0, piece.size[1] + 0.04, 0, piece.size[1] + 0.04), place.x, place.y, place.yaw)
+    return spot[0], spot[1]
+
+
+def _rug_places(space: Space, rug: Piece) -> list[Place]:
+    """Where a rug fits into the room, the nearest to the middle first."""
+    floor, found = space.room.floor, []
+    for turns in (0, 1):
+        w, d = (rug.size[0], rug.size[1]) if turns == 0 else (rug.size[1], rug.size[0])
+        xs = np.arange(floor.x0 + w / 2 + 0.12, floor.x1 - w / 2 - 0.12, 0.1)
+        ys = np.arange(floor.y0 + d / 2 + 0.12, floor.y1 - d / 2 - 0.12, 0.1)
+        for x in xs.tolist():
+            for y in ys.tolist():
+                away = abs(x - floor.center[0]) + abs(y - floor.center[1])
+                at = Place(x, y - d / 2, 0, None) if turns == 0 else Place(x + w / 2, y, 1, None)
+                found.append((round(away, 3), at.x, at.y, turns, at))
+    return [at for *_, at in sorted(found, key=lambda f: f[:4])]
+
+
+def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
+    """Something on each wall that has a free stretch, over low furniture where there is some."""
+    kinds = _WALLS.get(use, ("picture", "picture", "wall_shelf", "picture"))
+    if use in ("bedroom", "living_room"):
+        kinds = ("picture", "wall_lamp", "picture", "wall_mirror")
+    hung = 0
+    found = [
+        (side, *stretch)
+        for side in (SIDES[i] for i in rng.permutation(4))
+        for stretch in _stretches(space, side, *space.room.floor.wall(side))
+    ]
+    found.sort(
+        key=lambda stretch: stretch[2] - stretch[1] < LONG
+    )  # long walls first: none of them stays bare
+    for side, start, end in found:
+        if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
+            continue
+        kind = kinds[hung % len(kinds)]
+        piece = KINDS[kind].make(rng, look, smaller=int(end - start < 1.5))
+        if piece.size[0] + 0.3 > end - start:
+            continue
+        middle = _over(space, side, start + piece.size[0] / 2 + 0.1, end - piece.size[0] / 2 - 0.1)
+        if kind == "wall_mirror" and _tallest(space, side, middle - 0.4, middle + 0.4, 0.4) > 0.3:
+            piece = KINDS["picture"].make(rng, look, smaller=1)
+        space.stood.append((piece, _at_wall(space, side, middle)))
+        hung += 1
+
+
+def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[float, float]]:
+    """Free stretches of a wall, m."""
+    blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
+    deep = space.room.floor.along(side, low, high, 0.0, 0.4)
+    tiled = [
+        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles over worktops
+        for piece, at in space.stood
+        for part in piece.parts
+        if "kitchen" in piece.kind
+    ]
+    for x0, y0, x1, y1, top in (*space.solids, *tiled):
+        if top > LOW and x0 < deep.x1 and deep.x0 < x1 and y0 < deep.y1 and deep.y0 < y1:
+            apart = BESIDE_TILES if top == LOW + 1 else 0.05
+            low_end, high_end = (x0, x1) if side in ("south", "north") else (y0, y1)
+            blocked.append((low_end - apart, high_end + apart))
+    found, at = [], low + WALL_GAP
+    for a, b in sorted(blocked):
+        if a - at > 0.7:
+            found.append((at, a))
+        at = max(at, b)
+    if high - at > 0.7:
+        found.append((at, high))
+    return found
+
+
+def _over(space: Space, side: Side, first: float, last: float) -> float:
+    """The middle of what stands at a wall, within limits, or the middle between them, m."""
+    for piece, place in space.stood:
+        if place.side == side and piece.parts and first <= place.along <= last and piece.size[0] > 0.7:
+            return place.along
+    return (first + last) / 2

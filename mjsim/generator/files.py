@@ -1,0 +1,148 @@
+"""The files of a generated house: `house.xml`, `catalogue.toml` and the textures that were drawn for it."""
+
+import json
+import math
+import re
+import tomllib
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from mjsim.generator.palette import surfaces
+from mjsim.generator.shell import shell
+from mjsim.generator.values import Asset, FloorPlan, Furnishing
+
+STYLE = "houses/apartment"  # whose classes, materials, categories and objects generated houses use
+_ALWAYS = {
+    "white",
+    "ceiling",
+    "shadow_box",
+    "shadow_round",
+    "shadow_edge",
+}  # of classes, and of drawn shadows
+_SHADOWS = 15.0  # m: a shorter range of shadows is finer, and speckles what is round
+_HEAD = """\
+<mujoco model="{name}">
+<compiler angle="radian" texturedir="textures"/>
+<statistic center="{x:g} {y:g} 0.8" extent="{extent:g}"/>
+<visual>
+<headlight ambient="0.53 0.53 0.53" diffuse="0.05 0.05 0.05" specular="0 0 0"/>
+<map znear="0.006" zfar="6" shadowclip="{clip:g}"/>
+<quality shadowsize="2048" numslices="16" numstacks="8" numquads="1"/>
+</visual>
+{default}
+<asset>
+{assets}
+</asset>
+<worldbody>
+<light name="lamp" type="directional" pos="{x:g} {y:g} 2.55" dir="0 0 -1" diffuse="0.28 0.28 0.26" specular="0.1 0.1 0.1" castshadow="true"/>
+<light name="day" type="directional" pos="{x:g} {y:g} 6" dir="0.2 -1 -0.35" diffuse="0.27 0.26 0.24" specular="0.1 0.1 0.1" castshadow="false"/>
+<light name="fill" type="directional" pos="{x:g} {y:g} 6" dir="-0.9 0.2 -0.2" diffuse="0.23 0.23 0.24" specular="0 0 0" castshadow="false"/>
+<light name="bounce" type="directional" pos="{x:g} {y:g} 0" dir="0.2 0.5 1" diffuse="0.38 0.37 0.34" specular="0 0 0" castshadow="false"/>
+{world}
+</worldbody>
+</mujoco>
+"""  # noqa: E501
+
+
+def write_files(
+    seed: int, name: str, label: str, plan: FloorPlan, furnishing: Furnishing, points: int, models: Path
+) -> Mapping[str, bytes]:
+    """Path in the house's folder -> content; the same bytes for the same arguments.
+
+    Args:
+        seed: Of the house.
+        name: Of the MJCF model.
+        label: As people read it.
+        plan: Its rooms.
+        furnishing: What stands in them.
+        points: How many points for objects the house is meant to have.
+        models: Folder of the models that come with the package.
+    """
+    world = "\n".join([*shell(plan), *_furniture(furnishing)])
+    own = {asset.name: asset for placed in furnishing.placements for asset in placed.assets}
+    x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
+    y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
+    style = ET.parse(models / STYLE / "defaults.xml").getroot()
+    house = _HEAD.format(
+        name=name,
+        x=round((x0 + x1) / 2, 3),
+        y=round((y0 + y1) / 2, 3),
+        extent=round(max(x1 - x0, y1 - y0) * 0.62, 3),
+        clip=round(_SHADOWS / (max(x1 - x0, y1 - y0) * 0.62), 3),
+        default=ET.tostring(style[0], encoding="unicode").strip(),
+        assets="\n".join(used_materials(world, surfaces(seed, plan), own.values(), models)),
+        world=world,
+    )
+    files = {
+        "house.xml": house.encode(),
+        "catalogue.toml": _catalogue(label, plan, furnishing, points, models).encode(),
+    }
+    for asset in own.values():
+        if asset.image is not None:
+            files[f"textures/{asset.name}.png"] = asset.image
+    return files
+
+
+def _furniture(furnishing: Furnishing) -> Iterable[str]:
+    for number, placed in enumerate(furnishing.placements):
+        x, y, z = placed.position
+        yaw = placed.quarter_turns * math.pi / 2 + placed.turn
+        yield (
+            f'<body name="{placed.room}/{placed.name}_{number}" pos="{x:.4f} {y:.4f} {z:.4f}" euler="0 0 {yaw:.6f}">'
+            f"{placed.geoms}</body>"
+        )
+    for mount in furnishing.mounts:
+        x, y, z = mount.position
+        yaw = (mount.quarter_turns + 2) % 4 * math.pi / 2
+        yield (
+            f'<site name="mount:{mount.receptacle}" class="mount" pos="{x:.4f} {y:.4f} {z:.4f}" '
+            f'euler="0 0 {yaw:.6f}"/>'
+        )
+
+
+def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
+    """The materials that are used, with their textures; those of the apartment only where nothing has their name."""
+    known: dict[tuple[str, str], ET.Element] = {}
+    for text in own:
+        _add(known, ET.fromstring(text))
+    for asset in brought:
+        element = ET.fromstring(asset.xml)
+        if asset.image is not None:
+            element.set("file", f"{asset.name}.png")
+        _add(known, element)
+    for element in ET.parse(models / STYLE / "materials.xml").getroot().iter():
+        if element.tag in ("texture", "material"):
+            known.setdefault((element.tag, element.get("name", "")), element)
+    used = _ALWAYS | set(re.findall(r'material="([^"]+)"', world))
+    materials = [known["material", name] for name in sorted(used) if ("material", name) in known]
+    textures = sorted({texture for m in materials if (texture := m.get("texture"))})
+    elements = [known["texture", name] for name in textures if ("texture", name) in known]
+    return [ET.tostring(element, encoding="unicode").strip() for element in (*elements, *materials)]
+
+
+def _add(known: dict[tuple[str, str], ET.Element], element: ET.Element) -> None:
+    known[element.tag, element.get("name", "")] = element
+
+
+def _catalogue(label: str, plan: FloorPlan, furnishing: Furnishing, points: int, models: Path) -> str:
+    source = tomllib.loads((models / STYLE / "catalogue.toml").read_text(encoding="utf-8"))
+    mounts = {mount.receptacle: mount for mount in furnishing.mounts}
+    categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}
+    objects = [key for category in categories.values() for key in category["objects"]]
+    receptacles = {
+        key: {**entry, "place": mounts[key].place, "room": mounts[key].room}
+        for key, entry in source["receptacles"].items()
+        if key in mounts
+    }
+    tables = {
+        "house": {"label": label, "model": "house.xml", "points": points},
+        "rooms": {room.key: room.label for room in plan.rooms},
+        **{f"categories.{key}": entry for key, entry in categories.items()},
+        **{f"receptacles.{key}": entry for key, entry in receptacles.items()},
+        **{f"objects.{key}": source["objects"][key] for key in objects},
+    }
+    lines = []
+    for name, table in tables.items():
+        lines += [f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in table.items()), ""]
+    return "\n".join(lines)

@@ -1,0 +1,292 @@
+"""Writes the geoms of one piece of furniture: boxes, legs, fronts, cushions, and small things on top."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mjsim.generator.furniture.look import Look
+from mjsim.generator.furniture.piece import Part, Picture, Piece, Spot
+
+Span = tuple[float, float]
+Point = tuple[float, float, float]
+T = TypeVar("T")
+PANEL = 0.016  # m, thickness of doors and drawers
+GAP = 0.008  # m, between them
+_THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
+FACING = 'xyaxes="-1 0 0 0 0 1"'  # an image that is seen from +y
+
+
+def numbers(*values: float) -> str:
+    """Numbers of MJCF, to a tenth of a millimetre."""
+    return " ".join(f"{round(float(v), 4) + 0.0:g}" for v in values)
+
+
+class Builder:
+    """Collects geoms in the frame of a piece; `w` is always the whole width, and `x` its middle."""
+
+    def __init__(
+        self, kind: str, rng: np.random.Generator, look: Look, smaller: int = 0, fit: Point | None = None
+    ) -> None:
+        self.kind, self.rng, self.look, self.smaller, self.fit = kind, rng, look, smaller, fit
+        self.geoms: list[str] = []
+        self.pictures: list[Picture] = []
+        self.wood, self.wood2 = self.pick(*look.woods), self.pick(*look.woods)
+        self.cloth, self.cloth2 = self.pick(*look.cloths), self.pick(*look.cloths)
+        self.front, self.metal = self.pick(*look.fronts), self.pick(*look.metals)
+        self.handle = self.pick("bar", "knob", "none", "bar")
+
+    def pick(self, *options: T) -> T:
+        """One of some options."""
+        return options[int(self.rng.integers(len(options)))]
+
+    def size(self, low: float, high: float, step: float = 0.05) -> float:
+        """A length, m, from `low` to `high` in steps; the smaller the piece has to be, the nearer to `low`."""
+        count = round((high - low) / step)
+        drawn = int(self.rng.integers(count + 1))
+        return round(low + step * max(0, min(drawn, round(count * (1 - 0.5 * self.smaller)))), 4)
+
+    def chance(self, share: float) -> bool:
+        """True in this share of cases."""
+        return bool(self.rng.random() < share)
+
+    def add(self, shape: str, material: str, seen: bool, attributes: str) -> None:
+        """A geom of any shape; `seen` ones do not collide."""
+        kind = "" if shape == "box" else f' type="{shape}"'
+        label = ' class="decor"' if seen else ""
+        self.geoms.append(f'<geom{label}{kind} material="{material}" {attributes}/>')
+
+    def box(self, material: str, w: float, y: Span, z: Span, x: float = 0.0, *, seen: bool = False) -> None:
+        """A box of width `w` around `x`."""
+        middle = numbers(x, sum(y) / 2, sum(z) / 2)
+        self.add(
+            "box",
+            material,
+            seen,
+            f'pos="{middle}" size="{numbers(w / 2, (y[1] - y[0]) / 2, (z[1] - z[0]) / 2)}"',
+        )
+
+    def guard(self, w: float, y: Span, z: Span, x: float = 0.0) -> None:
+        """A box that collides and is not seen."""
+        middle, half = (
+            numbers(x, sum(y) / 2, sum(z) / 2),
+            numbers(w / 2, (y[1] - y[0]) / 2, (z[1] - z[0]) / 2),
+        )
+        self.geoms.append(f'<geom class="guard" pos="{middle}" size="{half}"/>')
+
+    def post(self, material: str, x: float, y: float, z: Span, radius: float, *, seen: bool = True) -> None:
+        """An upright cylinder."""
+        half = numbers(radius, (z[1] - z[0]) / 2)
+        self.add("cylinder", material, seen, f'pos="{numbers(x, y, sum(z) / 2)}" size="{half}"')
+
+    def rod(self, material: str, start: Point, end: Point, radius: float, *, shape: str = "cylinder") -> None:
+        """A seen rod, or with `shape` "capsule" a roll."""
+        self.add(shape, material, True, f'fromto="{numbers(*start, *end)}" size="{numbers(radius)}"')
+
+    def soft(self, material: str, at: Point, half: Point, turn: Point = (0.0, 0.0, 0.0)) -> None:
+        """A seen ellipsoid, turned by Euler angles."""
+        euler = f' euler="{numbers(*turn)}"' if any(turn) else ""
+        self.add("ellipsoid", material, True, f'pos="{numbers(*at)}" size="{numbers(*half)}"{euler}')
+
+    def disc(self, material: str, x: float, y: float, z: float, radius: float, thick: float = 0.012) -> None:
+        """A seen disc that faces the room, its middle at `y`."""
+        turned = 'euler="1.5708 0 0"'
+        self.add(
+            "cylinder",
+            material,
+            True,
+            f'pos="{numbers(x, y, z)}" size="{numbers(radius, thick / 2)}" {turned}',
+        )
+
+    def image(self, material: str, w: float, z: Span, y: float, x: float = 0.0, thick: float = 0.008) -> None:
+        """A seen upright panel that shows an image to the room; it ends at `y`."""
+        middle = numbers(x, y - thick / 2, sum(z) / 2)
+        half = numbers(w / 2, (z[1] - z[0]) / 2, thick / 2)
+        self.add("box", material, True, f'pos="{middle}" size="{half}" {FACING}')
+
+    def shadow(self, w: float, y: Span, x: float = 0.0, *, round_one: bool = False) -> None:
+        """A contact shadow around a footprint; heights differ, so that two that overlap do not flicker."""
+        height = 0.0038 + 0.0001 * int(self.rng.integers(12))
+        material = ' material="shadow_round"' if round_one else ""
+        half = numbers(w / 2 + 0.1, (y[1] - y[0]) / 2 + 0.09, 0.1)
+        self.geoms.append(
+            f'<geom class="shadow"{material} pos="{numbers(x, sum(y) / 2 + 0.02, height)}" size="{half}"/>'
+        )
+
+    def legs(
+        self,
+        material: str,
+        w: float,
+        y: Span,
+        height: float,
+        inset: float = 0.05,
+        radius: float = 0.022,
+        x: float = 0.0,
+    ) -> None:
+        """Four seen legs, round or square."""
+        square = self.chance(0.5)
+        for sx in (-1, 1):
+            for v in (y[0] + inset, y[1] - inset):
+                u = x + sx * (w / 2 - inset)
+                if square:
+                    self.box(material, 2 * radius, (v - radius, v + radius), (0, height), u, seen=True)
+                else:
+                    self.post(material, u, v, (0, height), radius)
+
+    def fronts(
+        self,
+        material: str,
+        w: float,
+        z: Span,
+        y: float,
+        columns: int = 1,
+        rows: int = 1,
+        x: float = 0.0,
+        doors: bool = False,
+    ) -> None:
+        """Drawers, or doors, with handles; they begin at `y`."""
+        wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
+        for i in range(columns):
+            for j in range(rows):
+                u, v = x - w / 2 + GAP / 2 + wide * (i + 0.5), z[0] + GAP / 2 + high * (j + 0.5)
+                span = (v - high / 2 + GAP / 2, v + high / 2 - GAP / 2)
+                self.box(material, wide - GAP, (y, y + PANEL), span, u, seen=True)
+                self._handle(u, v, y + PANEL, wide, high, (1 if i % 2 == 0 else -1) if doors else 0)
+
+    def _handle(self, u: float, v: float, y: float, wide: float, high: float, side: int) -> None:
+        """A handle of a front of `wide` x `high`, at its middle or at one side of a door."""
+        out = (y - 0.002, y + 0.016)
+        if self.handle == "none":
+            return
+        if side:
+            u += side * (wide / 2 - 0.045)
+            v += 0.0 if high > 1.2 else (0.2 * high if v < 0.8 else -0.25 * high)
+        if self.handle == "knob":
+            self.box(self.metal, 0.026, out, (v - 0.013, v + 0.013), u, seen=True)
+        elif side:
+            length = min(0.16, 0.3 * high)
+            self.box(self.metal, 0.014, out, (v - length / 2, v + length / 2), u, seen=True)
+        else:
+            self.box(self.metal, min(0.18, 0.4 * wide), out, (v - 0.007, v + 0.007), u, seen=True)
+
+    def clutter(
+        self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
+    ) -> None:
+        """Small things on a top of width `w` around `x`; `low` ones end 0.13 m above it."""
+        things = ("books", "bowl", "box", "candles") if low else _THINGS
+        places = int(np.clip(w // 0.35, 1, most))
+        for i in range(int(self.rng.integers(1, places + 1))):
+            u = x + w * ((i + 0.5) / places - 0.5) + 0.05 * float(self.rng.uniform(-1, 1))
+            getattr(self, f"_{self.pick(*things)}")(u, sum(y) / 2, z)
+
+    def _vase(self, x: float, y: float, z: float) -> None:
+        tall = float(self.rng.uniform(0.07, 0.1))
+        self.soft(self.pick(*self.look.accents), (x, y, z + tall), (0.6 * tall, 0.6 * tall, tall))
+        if self.chance(0.5):
+            self.soft(self.pick("leaves", "accent_a", "accent_b"), (x, y, z + 2.1 * tall), (0.08, 0.08, 0.09))
+
+    def _plant(self, x: float, y: float, z: float) -> None:
+        self.post(self.pick("pot_a", "pot_b"), x, y, (z, z + 0.1), 0.055)
+        leaves = self.pick("leaves", "leaves_dark", "leaves_pale")
+        self.soft(leaves, (x, y, z + 0.18), (0.1, 0.09, self.pick(0.1, 0.12)))
+
+    def _books(self, x: float, y: float, z: float) -> None:
+        for i, (w, d) in enumerate(((0.22, 0.15), (0.19, 0.14), (0.17, 0.12))[: self.pick(2, 3)]):
+            span = (z + 0.03 * i, z + 0.03 * (i + 1) - 0.001)
+            self.box(self.pick(*self.look.accents), w, (y - d / 2, y + d / 2), span, x + 0.01 * i, seen=True)
+
+    def _bowl(self, x: float, y: float, z: float) -> None:
+        self.soft(self.pick("ceramic", *self.look.accents), (x, y, z + 0.035), (0.12, 0.11, 0.035))
+        if self.chance(0.6):
+            for u, v, fruit in (
+                (-0.04, 0.01, "accent_a"),
+                (0.04, 0.02, "accent_b"),
+                (0.0, -0.04, "accent_c"),
+            ):
+                self.soft(fruit, (x + u, y + v, z + 0.075), (0.035, 0.035, 0.035))
+
+    def _box(self, x: float, y: float, z: float) -> None:
+        self.box(
+            self.pick("wicker", self.cloth2, "white"), 0.22, (y - 0.08, y + 0.08), (z, z + 0.11), x, seen=True
+        )
+
+    def _candles(self, x: float, y: float, z: float) -> None:
+        for u, tall in ((-0.05, 0.13), (0.02, 0.09)):
+            self.post("cream", x + u, y, (z, z + tall), 0.025)
+
+    def lamp(self, x: float, y: float, z: float) -> None:
+        """A table lamp."""
+        self.soft(self.pick("ceramic", *self.look.accents), (x, y, z + 0.1), (0.07, 0.07, 0.1))
+        self.post("shade", x, y, (z + 0.2, z + 0.37), self.pick(0.1, 0.12))
+
+    def pillow(self, material: str, at: Point, half: Point, tilt: float = 0.0) -> None:
+        """A soft cushion, with a box inside so that it looks square."""
+        self.soft(material, at, half, (tilt, 0.0, 0.0))
+        euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
+        core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
+        self.add("box", material, True, f'pos="{numbers(*at)}" size="{core}"{euler}')
+
+    def own(self, picture: Picture) -> str:
+        """A material with a texture that was made for this piece; returns its name."""
+        self.pictures.append(picture)
+        return picture.name
+
+    def on_ceiling(self) -> None:
+        """What was written hangs from the ceiling: it is left out of a view from above."""
+        self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
+
+    def piece(
+        self,
+        size: Sequence[float],
+        *,
+        use: float | Sequence[Spot] = 0.0,
+        parts: Sequence[tuple[float, float, float, float, float]] | None = None,
+        stem: float = 0.0,
+        **more: Any,
+    ) -> Piece:
+        """The piece of what was written.
+
+        Args:
+            size: Along the wall, into the room, up, m.
+            use: Depth, m, of free floor in front of it; or the places, each x0, y0, x1, y1.
+            parts: x0, y0, x1, y1, top, m, of what nobody can walk through; by default the whole size.
+            stem: Half the width, m, of what people bump into, where only this is narrower than the parts.
+            more: Other fields of `Piece`.
+        """
+        w, d, h = (float(v) for v in size)
+        if parts is None:
+            parts = ((-w / 2, 0.0, w / 2, d, h),)
+        if isinstance(use, float | int):
+            use = ((-w / 2, d, w / 2, d + float(use)),) if use else ()
+        return Piece(
+            self.kind,
+            (w, d, h),
+            "".join(self.geoms),
+            tuple(Part((a, b, c, e), top, stem) for a, b, c, e, top in parts),
+            tuple(use),
+            mounts=tuple(more.pop("mounts", ())),
+            pictures=tuple(self.pictures),
+            **more,
+        )
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of furniture, of which every generator makes another piece."""
+
+    name: str
+    draw: Callable[[Builder], Piece]
+
+    def make(
+        self, rng: np.random.Generator, look: Look, *, smaller: int = 0, fit: Point | None = None
+    ) -> Piece:
+        """A piece of this kind.
+
+        Args:
+            rng: Draws size, materials and form.
+            look: The colours of the home.
+            smaller: 0 as large as drawn; 1, 2, ... for a lack of space.
+            fit: Width, lower and upper end, m, of what it goes with, such as a window; None for any.
+        """
+        return self.draw(Builder(self.name, rng, look, smaller, fit))

@@ -1,0 +1,103 @@
+"""Generated homes as folders in the user's cache, each made once."""
+
+import dataclasses
+import functools
+import hashlib
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+from mjsim.generator.files import STYLE
+from mjsim.generator.recipe import Recipe, read_recipe
+from mjsim.model.assets import models_root
+from mjsim.model.catalogue import Catalogue
+from mjsim.model.catalogue_files import MAX_EXTENDS, base_of
+from mjsim.model.generated_names import parse_name
+from mjsim.model.house_ref import CATALOGUE, HouseRef, parse_house
+from mjsim.support.files import work_folder
+from mjsim.support.kernels import cache_base
+from mjsim.support.sources import digest_of
+from mjsim.values.errors import HouseError
+
+# Modules outside the generator that a home follows from.
+_BESIDES = ("model/generated_names.py", "support/random_streams.py")
+
+
+def load_catalogue(house: str = "apartment") -> Catalogue:
+    """Read and check the catalogue of a house, which is generated first if necessary.
+
+    Args:
+        house: Name of a folder under `models/houses`, the path of a `catalogue.toml` or its folder, the seed of
+            a generated house (`generated:7`, `generated:7?rooms=5`), or the path of its recipe.
+
+    Raises:
+        AssetError: As by `Catalogue.read`.
+        HouseError: The house cannot be generated as asked.
+
+    Example:
+        >>> len(load_catalogue("generated:11?rooms=2").rooms)
+        2
+    """
+    return Catalogue.read(ensured(parse_house(house)))
+
+
+def ensured(house: HouseRef, _depth: int = 0) -> HouseRef:
+    """Generate a home, or the one that a house extends, unless its files are there. Return the reference with them.
+
+    Raises:
+        HouseError: The recipe is malformed or of another version, or the home cannot be generated or written.
+    """
+    if house.kind in ("generated", "recipe"):
+        return dataclasses.replace(house, file=_generated_catalogue(house, models_root()))
+    base = None if house.kind == "shipped" or _depth > MAX_EXTENDS else base_of(house)
+    return house if base is None else dataclasses.replace(house, base=ensured(base, _depth + 1))
+
+
+def _generated_catalogue(house: HouseRef, models: Path) -> Path:
+    """The `catalogue.toml` of a home, generated if the cache does not have it."""
+    made_of = read_recipe(Path(house.name)) if house.kind == "recipe" else parse_name(house.name)
+    identity = made_of.encoded() if isinstance(made_of, Recipe) else house.name.encode()
+    key = hashlib.sha256(identity + _digest(models).encode()).hexdigest()[:24]
+    folder = cache_base() / "houses" / key
+    if not (folder / CATALOGUE).is_file():
+        from mjsim.generator.generated import (  # OR-Tools takes a while to load
+            furnished,
+            generate,
+            house_files,
+        )
+
+        if isinstance(made_of, Recipe):
+            recipe, furnishing = made_of, furnished(made_of.seed, made_of.plan)
+        else:
+            recipe, furnishing = generate(made_of.seed, made_of.rooms)
+        _write(folder, house_files(recipe, furnishing, models))
+    return folder / CATALOGUE
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write all files at once. If another process was quicker, its folder stays."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with work_folder(folder.parent) as work:
+            for name, content in files.items():
+                (work / name).parent.mkdir(exist_ok=True)
+                (work / name).write_bytes(content)
+            try:
+                work.chmod(0o755)
+                work.rename(folder)
+            except OSError:
+                if not (folder / CATALOGUE).is_file():
+                    raise
+    except OSError as error:
+        raise HouseError(
+            f"cannot write the house to {folder}: {error.strerror}; free some space there"
+        ) from error
+
+
+@functools.cache
+def _digest(models: Path) -> str:
+    """Digest of everything that a home follows from, except its name."""
+    package = Path(__file__).parents[1]
+    style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
+    code = digest_of(Path(__file__).parent, *(package / name for name in _BESIDES), *style)
+    return code + version("ortools") + version("numpy")

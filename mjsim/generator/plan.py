@@ -1,0 +1,155 @@
+"""Floor plans: rectangles on a grid that cover a rectangular or L-shaped outline, by a constraint solver.
+
+No objective: the first plan near the wanted areas will do, and variety comes from the programme. Time is counted in the
+solver's deterministic units, with one worker and a fixed seed, so that each process finds the same plan.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ortools.sat.python import cp_model
+
+from mjsim.generator.programme import NEEDS, Programme, draw_programme, use_of
+from mjsim.generator.values import WALL, Rectangle, Room
+from mjsim.support.random_streams import stream
+from mjsim.values.errors import HouseError
+
+GRID = 0.2  # m
+TRIES = 500  # programmes
+EFFORT = 0.025  # deterministic seconds of the solver for one programme: most that have a plan have it sooner
+SLACK, LARGE_SLACK = 0.25, 0.45  # share by which an area may differ from the wanted one; from nine rooms on
+LARGE = 9  # rooms
+VOID = 1.2  # m, least sides of the corner that an L-shaped outline lacks
+
+
+@dataclass(frozen=True)
+class _Box:
+    """The solver's variables of a room, in cells of the grid."""
+
+    low: tuple[Any, Any]
+    high: tuple[Any, Any]
+    size: tuple[Any, Any]
+
+
+def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tuple[Room, ...]]:
+    """The programme of a seed and its rooms on the floor; another `attempt` gives another plan.
+
+    Raises:
+        HouseError: No plan was found, or the number of rooms is out of range.
+    """
+    for number in range(TRIES):
+        rng = stream(seed, "plan", str(rooms), str(attempt), str(number))
+        programme = draw_programme(rooms, rng)
+        if found := _solve(programme, rng):
+            return programme, tuple(
+                Room(key, use_of(key), NEEDS[key].label, floor) for key, floor in found.items()
+            )
+    raise HouseError(f"no floor plan of {rooms} rooms was found for seed {seed}; take another seed")
+
+
+def _solve(programme: Programme, rng: np.random.Generator) -> Mapping[str, Rectangle] | None:
+    total = sum((math.sqrt(a) + WALL) ** 2 for a in programme.areas.values())
+    ratio = rng.uniform(1.0, 1.7)
+    is_angular = rng.random() < (0.5 if len(programme.areas) < LARGE else 0.85) and len(programme.areas) > 1
+    lacks = rng.uniform(0.06, 0.16) if is_angular else 0.0
+    width = round(math.sqrt(total / (1 - lacks) * ratio) / GRID)
+    depth = round(total / (1 - lacks) / (width * GRID) / GRID)
+    if rng.random() < 0.5:
+        width, depth = depth, width
+    model = cp_model.CpModel()
+    slack = SLACK if len(programme.areas) < LARGE else LARGE_SLACK
+    boxes = {
+        key: _add_room(
+            model, key, (area * (1 - slack), area * (1 + slack)), (width, depth), key == programme.hub
+        )
+        for key, area in programme.areas.items()
+    }
+    covered = list(boxes.values())
+    if is_angular:
+        covered.append(_add_void(model, rng, (width, depth)))
+    areas = []
+    for box in covered:
+        area = model.new_int_var(0, width * depth, "")
+        model.add_multiplication_equality(area, box.size)
+        areas.append(area)
+    model.add(sum(areas) == width * depth)
+    intervals = [
+        [model.new_interval_var(box.low[axis], box.size[axis], box.high[axis], "") for box in covered]
+        for axis in (0, 1)
+    ]
+    model.add_no_overlap_2d(*intervals)
+    for way in programme.ways:
+        _add_shared_wall(model, boxes[way.a], boxes[way.b], math.ceil(way.wall / GRID))
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = 1
+    solver.parameters.random_seed = int(rng.integers(2**31))
+    solver.parameters.max_deterministic_time = EFFORT
+    if solver.solve(model) not in (cp_model.OPTIMAL, cp_model.FEASIBLE):
+        return None
+    return {key: _floor([solver.value(v) for v in (*box.low, *box.high)]) for key, box in boxes.items()}
+
+
+def _floor(cells: list[int]) -> Rectangle:
+    x0, y0, x1, y1 = (round(value * GRID, 3) for value in cells)
+    half = WALL / 2
+    return Rectangle(*(round(v, 3) for v in (x0 + half, y0 + half, x1 - half, y1 - half)))
+
+
+def _add_box(model: Any, least: int, outline: tuple[int, int]) -> _Box:
+    low = tuple(model.new_int_var(0, extent, "") for extent in outline)
+    high = tuple(model.new_int_var(0, extent, "") for extent in outline)
+    size = tuple(model.new_int_var(min(least, extent), extent, "") for extent in outline)
+    for axis in (0, 1):
+        model.add(low[axis] + size[axis] == high[axis])
+    return _Box(low, high, size)
+
+
+def _add_room(
+    model: Any, key: str, area: tuple[float, float], outline: tuple[int, int], is_outside: bool
+) -> _Box:
+    needs = NEEDS[key]
+    box = _add_box(model, math.ceil((needs.side + WALL) / GRID - 1e-9), outline)
+    w, h = box.size
+    gross = model.new_int_var(0, outline[0] * outline[1], "")
+    model.add_multiplication_equality(gross, (w, h))
+    # Of the floor between the walls, in hundredths of a cell.
+    floor = 100 * gross - round(100 * WALL / GRID) * (w + h) + round(100 * (WALL / GRID) ** 2)
+    cell = 100 / GRID**2
+    model.add(floor >= math.ceil(cell * max(needs.area[0], area[0])))
+    model.add(floor <= math.floor(cell * min(needs.area[1], area[1])))
+    model.add(10 * w <= round(10 * needs.aspect) * h)
+    model.add(10 * h <= round(10 * needs.aspect) * w)
+    if needs.daylight or is_outside:
+        outside = [model.new_bool_var("") for _ in range(4)]
+        for axis in (0, 1):
+            model.add(box.low[axis] == 0).only_enforce_if(outside[2 * axis])
+            model.add(box.high[axis] == outline[axis]).only_enforce_if(outside[2 * axis + 1])
+        model.add_bool_or(outside)
+    return box
+
+
+def _add_void(model: Any, rng: np.random.Generator, outline: tuple[int, int]) -> _Box:
+    """The corner that an L-shaped outline lacks."""
+    box = _add_box(model, round(VOID / GRID), outline)
+    for axis, at_end in enumerate(rng.random(2) < 0.5):
+        if at_end:
+            model.add(box.high[axis] == outline[axis])
+        else:
+            model.add(box.low[axis] == 0)
+        model.add(3 * box.size[axis] <= 2 * outline[axis])
+    return box
+
+
+def _add_shared_wall(model: Any, a: _Box, b: _Box, least: int) -> None:
+    choices = []
+    for one, other in ((a, b), (b, a)):
+        for axis in (0, 1):
+            chosen, across = model.new_bool_var(""), 1 - axis
+            model.add(one.high[axis] == other.low[axis]).only_enforce_if(chosen)
+            for p, q in ((one, other), (other, one)):
+                model.add(p.low[across] + least <= q.high[across]).only_enforce_if(chosen)
+            choices.append(chosen)
+    model.add_bool_or(choices)

@@ -1,0 +1,123 @@
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from houses_cases import BINS, PALETTE, flat, studio
+
+from mjsim.generator.furnish import Home, furnish, furnished
+from mjsim.generator.furniture.piece import flattened, moved
+from mjsim.generator.space import Space
+from mjsim.generator.values import FloorPlan, Placement, Rectangle
+from mjsim.values.errors import HouseError
+
+CASES = [(flat(), BINS, seed) for seed in range(6)] + [(studio(), BINS[:3], seed) for seed in range(4)]
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{len(case[0].rooms)}-{case[2]}")
+def home(request: pytest.FixtureRequest) -> Home:
+    plan, bins, seed = request.param
+    return furnished(plan, bins, PALETTE, seed)
+
+
+def boxes(space: Space) -> Iterator[list[Rectangle]]:
+    """What each piece of a room stands on."""
+    for piece, place in space.stood:
+        if piece.parts:
+            yield [Rectangle(*moved(part.spot, place.x, place.y, place.yaw)) for part in piece.parts]
+
+
+def test_pieces_stand_in_their_rooms_and_not_in_one_another(home: Home) -> None:
+    for space in home.spaces:
+        stood = list(boxes(space))
+        for box in itertools.chain(*stood):
+            assert space.room.floor.grown(0.001).contains(box.x0, box.y0)
+            assert space.room.floor.grown(0.001).contains(box.x1, box.y1)
+        for one, other in itertools.combinations(stood, 2):
+            assert not any(a.overlaps(b, 0.001) for a, b in itertools.product(one, other))
+
+
+def test_nothing_stands_in_doorways_or_where_somebody_has_to_stand(home: Home) -> None:
+    for space in home.spaces:
+        free = [Rectangle(*spot) for spot in (*space.keep, *space.use)]
+        for piece, place in space.stood:
+            own = [Rectangle(*moved(spot, place.x, place.y, place.yaw)) for spot in piece.use]
+            for part in piece.parts:
+                box = Rectangle(*moved(part.spot, place.x, place.y, place.yaw))
+                if piece.kind != "radiator":
+                    assert not any(box.overlaps(zone, 0.002) for zone in free if zone not in own), piece.kind
+
+
+def test_all_places_of_use_can_be_reached(home: Home) -> None:
+    for space in home.spaces:
+        assert space.connected(())
+
+
+def test_nothing_higher_than_a_sill_stands_before_a_window(home: Home) -> None:
+    for space in home.spaces:
+        for window in home.plan.windows_of(space.room.key):
+            half = window.width / 2
+            zone = space.room.floor.along(window.side, window.center - half, window.center + half, 0, 0.5)
+            for x0, y0, x1, y1, top in space.solids:
+                assert top <= window.sill or not Rectangle(x0, y0, x1, y1).overlaps(zone, 0.001)
+
+
+def test_a_home_has_what_it_must_have(home: Home) -> None:
+    kinds = [
+        p.kind for space in home.spaces for piece, _ in space.stood for p, *_ in (*flattened(piece), (piece,))
+    ]
+    for options in (
+        {"double_bed", "single_bed", "bunk_bed"},
+        {"toilet"},
+        {"washbasin"},
+        {"bathtub", "shower"},
+        {"straight_kitchen", "corner_kitchen"},
+        {"table", "round_table", "bar_table"},
+    ):
+        assert options & set(kinds)
+    sleeping = sum(space.room.use in ("bedroom", "studio") for space in home.spaces)
+    assert home.seats >= sleeping + 1
+    assert sorted(mount.receptacle for mount in home.mounts) == sorted(home.bins)
+    assert all(space.stood for space in home.spaces)
+
+
+def test_a_quarter_to_a_half_of_the_floor_is_furnished(home: Home) -> None:
+    share = sum(space.area for space in home.spaces) / home.plan.area
+    assert 0.25 < share < 0.45
+
+
+def test_no_floor_is_shut_off_from_large_people_alone() -> None:
+    space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
+    assert space.connected([(5.72, 1.95, 7.08, 1.99)])
+    assert not space.connected([(5.72, 1.95, 7.15, 1.99)])  # 0.55 m to a strip of 0.61 m
+
+
+def test_the_same_seed_gives_the_same_home() -> None:
+    one, again = (furnish(flat(), BINS, PALETTE, 11) for _ in range(2))
+    assert one == again
+    assert furnish(flat(), BINS, PALETTE, 12) != one
+
+
+def test_placements_name_each_asset_they_need() -> None:
+    def names(placement: Placement) -> set[str]:
+        return {asset.name for asset in placement.assets}
+
+    made = furnish(flat(), BINS, PALETTE, 3)
+    images = [asset for p in made.placements for asset in p.assets if asset.image is not None]
+    assert images and all(f'file="{asset.name}.png"' in asset.xml for asset in images)
+    for placement in made.placements:
+        assert "wood_a" not in placement.geoms or "wood_a" in names(placement)
+
+
+def test_a_home_without_space_is_refused() -> None:
+    plan = studio()
+    tiny = FloorPlan((plan.rooms[1],), plan.doors[:0], ())
+    with pytest.raises(HouseError, match="no place for a kitchen"):
+        furnish(tiny, BINS, PALETTE, 0)
+
+
+def test_a_piece_that_nobody_could_reach_is_not_put() -> None:
+    space = Space.of(studio(), studio().rooms[1], np.random.default_rng(0))
+    across = Rectangle(5.72, 0.0, 7.7, 2.6)
+    assert space.connected(())
+    assert not space.connected([(across.x0, 1.2, across.x1, 1.4)], [(6.0, 1.6, 7.0, 2.4)])

@@ -1,0 +1,86 @@
+import mujoco
+import numpy as np
+import pytest
+from houses_cases import PALETTE, compiled
+
+from mjsim.generator.furniture.catalogue import KINDS
+from mjsim.generator.furniture.look import Look, draw_look
+from mjsim.generator.furniture.piece import Piece
+
+SLACK = 0.03  # m
+
+
+@pytest.fixture(scope="module")
+def look() -> Look:
+    return draw_look(PALETTE, np.random.default_rng(0))
+
+
+def make(kind: str, look: Look, seed: int, smaller: int = 0) -> Piece:
+    return KINDS[kind].make(np.random.default_rng(seed), look, smaller=smaller)
+
+
+def extents(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners of all geoms that are no shadows, each (k, 3), and which collide."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    low, high = [], []
+    for geom in range(model.ngeom):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+            continue
+        axes = data.geom_xmat[geom].reshape(3, 3)
+        middle = data.geom_xpos[geom] + axes @ model.geom_aabb[geom, :3]
+        reach = np.abs(axes) @ model.geom_aabb[geom, 3:]
+        low.append(middle - reach)
+        high.append(middle + reach)
+    return np.array(low), np.array(high)
+
+
+def test_there_are_sixty_kinds() -> None:
+    assert len(KINDS) >= 60
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Look) -> None:
+    for seed in range(4):
+        piece = make(kind, look, seed, smaller=seed % 3)
+        low, high = extents(compiled(piece, look))
+        w, d, h = piece.size
+        assert low[:, 2].min() > -0.01
+        assert low[:, 0].min() > -w / 2 - SLACK and high[:, 0].max() < w / 2 + SLACK
+        if piece.stands != "ceiling":
+            assert (
+                low[:, 1].min() > (-0.08 if piece.stands == "recess" else -SLACK)
+                and high[:, 1].max() < d + SLACK
+            )
+        assert high[:, 2].max() < max(h, 2.6 if "dining" in kind else 0) + SLACK
+        for part in piece.parts:
+            x0, y0, x1, y1 = part.spot
+            assert -w / 2 - 1e-6 <= x0 < x1 <= w / 2 + 1e-6 and -1e-6 <= y0 < y1 <= d + 1e-6
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_what_collides_is_within_the_parts(kind: str, look: Look) -> None:
+    """Ways are looked for around the parts: nothing that stands in a way may be outside of them."""
+    for seed in range(4):
+        piece = make(kind, look, seed)
+        model = compiled(piece, look)
+        low, high = extents(model)
+        solid = [g for g in range(model.ngeom) if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_PLANE]
+        for k, geom in enumerate(solid):
+            if not model.geom_contype[geom] or low[k, 2] > 1.8 or high[k, 2] < 0.05:
+                continue
+            boxes = [np.array(part.hit) for part in piece.parts]
+            assert (
+                any(
+                    (low[k, :2] >= box[:2] - 0.025).all() and (high[k, :2] <= box[2:] + 0.025).all()
+                    for box in boxes
+                )
+                or len(boxes) > 1
+            ), (kind, seed, low[k], high[k])
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_seed_gives_the_same_piece_and_another_seed_another(kind: str, look: Look) -> None:
+    pieces = [make(kind, look, seed) for seed in (1, 1, 2, 3, 4, 5, 6)]
+    assert pieces[0] == pieces[1]
+    assert len({repr(piece) for piece in pieces[1:]}) >= 3
