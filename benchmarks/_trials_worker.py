@@ -24,7 +24,7 @@ from benchmarks.support.recorded_trial import RecordingWorld, play
 from experiments.house import House
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
 

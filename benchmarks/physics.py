@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.support.recorded_trial import RecordedTrial, play, record_trial
 from experiments.house import House
-from mjsim.model.scene import Scene, compose
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.values.actions import Move
 from mjsim.values.options import FIDELITIES
 from mjsim.world.state import set_physics, take_physics

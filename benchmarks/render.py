@@ -27,7 +27,7 @@ from hud.compose import Compositor
 from hud.conditions import condition
 from hud.state import HudState
 from hud.task import KnownPlan, TaskStep
-from mjsim.model.scene import Scene, compose
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, gl_info, render_pictures
 from mjsim.render.cameras import ViewVolume
 from mjsim.render.context import current_context

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from experiments.errors import ConfigError
 from hud.texts import HudTexts
 from mjsim.generator.home_cache import load_catalogue
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.disorder import Disorder
-from mjsim.model.footprint import Footprint
-from mjsim.model.house import compiled_house
-from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.model.rooms import RoomMap
-from mjsim.model.sampling import house_points, sample_episode
-from mjsim.model.validation.validate import require_usable
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.footprint import Footprint
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.scene.disorder import Disorder
+from mjsim.house.scene.sampling import house_points, sample_episode
+from mjsim.house.validation.validate import require_usable
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.walking.path_following import ARRIVED_WITHIN

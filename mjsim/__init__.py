@@ -41,10 +41,10 @@ __all__ = [
 if TYPE_CHECKING:
     from mjsim.environments.dm_environment import make
     from mjsim.generator.home_cache import load_catalogue
-    from mjsim.model.catalogue import Catalogue
-    from mjsim.model.house import navigable_floor
-    from mjsim.model.sampling import sample_episode
-    from mjsim.model.scene import Scene, compose
+    from mjsim.house.catalogue.catalogue import Catalogue
+    from mjsim.house.compiled.house import navigable_floor
+    from mjsim.house.scene.sampling import sample_episode
+    from mjsim.house.scene.scene import Scene, compose
     from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, Place, Refusal, Stop, Wait
     from mjsim.values.episode import Episode
     from mjsim.values.errors import MjsimError
@@ -69,10 +69,10 @@ else:  # hidden from type checkers, which would otherwise accept any name
         "values.episode": ("Episode",),
         "values.errors": ("MjsimError",),
         "generator.home_cache": ("load_catalogue",),
-        "model.catalogue": ("Catalogue",),
-        "model.house": ("navigable_floor",),
-        "model.sampling": ("sample_episode",),
-        "model.scene": ("Scene", "compose"),
+        "house.catalogue.catalogue": ("Catalogue",),
+        "house.compiled.house": ("navigable_floor",),
+        "house.scene.sampling": ("sample_episode",),
+        "house.scene.scene": ("Scene", "compose"),
         "values.observation": ("Observation",),
         "values.options": ("WorldOptions",),
         "values.person_parameters": ("PersonParameters",),

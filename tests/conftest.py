@@ -7,11 +7,11 @@ import pytest
 from hypothesis import settings
 
 from experiments.house import House
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.footprint import footprint
-from mjsim.model.house import compiled_house
-from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import compose
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.footprint import footprint
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene.sampling import sample_episode
+from mjsim.house.scene.scene import compose
 from planner.navmesh import NavMesh
 
 # Whether a test passes must not depend on how busy the machine is.

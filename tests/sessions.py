@@ -8,7 +8,7 @@ from experiments.session.session import Session
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.state import HudState
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.observation import Observation
 from mjsim.world.world import World
 

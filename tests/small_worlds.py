@@ -5,8 +5,8 @@ import math
 import mujoco
 import numpy as np
 
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.scene import compose
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import WAIT, Move
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.options import WorldOptions

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from hud.markers import breadcrumbs, flagpole, pin, rims
 from hud.state import Marker
-from mjsim.model.avatar import BODY, EYE, HANDS, PREFIX
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house, navigable_floor
-from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import Scene, compose
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house, navigable_floor
+from mjsim.house.scene.avatar import BODY, EYE, HANDS, PREFIX
+from mjsim.house.scene.sampling import sample_episode
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.render import Renderer
 from mjsim.scene_export.export import export_scene
 

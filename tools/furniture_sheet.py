@@ -22,8 +22,8 @@ from mjsim.generator.furniture.piece import Piece
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.space import Place
 from mjsim.generator.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
-from mjsim.model.assets import models_root
-from mjsim.model.model_files import read_model
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.model_files import read_model
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose
 from mjsim.support.random_streams import stream

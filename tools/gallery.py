@@ -26,8 +26,8 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.model.scene import compose
-from mjsim.model.sight import visible_objects
+from mjsim.house.scene.scene import compose
+from mjsim.house.sight.sight import visible_objects
 from mjsim.support.files import replacing
 from mjsim.values.errors import RenderError
 from mjsim.values.observation import ObjectStatus, Observation

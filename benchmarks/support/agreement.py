@@ -15,7 +15,7 @@ from experiments.record.metrics import compute_metrics
 from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.observation import ObjectStatus
 from mjsim.values.options import FIDELITIES
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import IDLE, WAIT, Action, EventKind, Move, Pick
 from mjsim.values.episode import Episode
 from mjsim.world.walking.path_following import wrap_angle

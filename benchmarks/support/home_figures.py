@@ -21,12 +21,12 @@ from mjsim.generator.generated import generate, house_files
 from mjsim.generator.programme import NEEDS
 from mjsim.generator.recipe import RECIPE, read_recipe
 from mjsim.generator.values import WALL, Door, FloorPlan, Window
-from mjsim.model.assets import models_root
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.clearance import ClearanceField
-from mjsim.model.house import CompiledHouse, compiled_house
-from mjsim.model.house_ref import CATALOGUE
-from mjsim.model.validation.report import check_house_name
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import CATALOGUE
+from mjsim.house.check import check_house_name
+from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.house import CompiledHouse, compiled_house
 from mjsim.scene_export.export import HOUSE, export_scene
 from mjsim.scene_export.store import SCENE
 

@@ -19,7 +19,7 @@ from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.render import render_house_map, render_pictures
 from mjsim.render.cameras import camera_pose
 from mjsim.values.observation import Observation

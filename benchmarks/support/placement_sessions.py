@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.model.catalogue import Category
-from mjsim.model.scene import compose
+from mjsim.house.catalogue.catalogue import Category
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import IDLE, EventKind, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.errors import PhysicsError

@@ -12,8 +12,8 @@ from experiments.house import House
 from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import Scene, compose
+from mjsim.house.scene.sampling import sample_episode
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.values.actions import Action, Move
 from mjsim.values.episode import POINTS
 from mjsim.values.observation import Observation

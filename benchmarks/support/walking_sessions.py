@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from benchmarks.support.parallel_sessions import session_episode, upright_object
 from experiments.house import House
-from mjsim.model.footprint import footprint
-from mjsim.model.scene import assemble
+from mjsim.house.compiled.footprint import footprint
+from mjsim.house.scene.scene import assemble
 from mjsim.values.actions import IDLE, Move
 from mjsim.values.episode import Episode
 from mjsim.values.errors import PhysicsError

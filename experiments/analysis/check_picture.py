@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjsim.model.validation.findings import Finding
-from mjsim.model.validation.report import Report
-from mjsim.model.validation.views import Drawing
+from mjsim.house.check import Report
+from mjsim.house.validation.findings import Finding
+from mjsim.house.validation.views import Drawing
 from mjsim.support.files import replacing
 
 SIDE = 9.0  # inches of the longest side of a drawing

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjsim.model.disorder import Disorder
+from mjsim.house.scene.disorder import Disorder
 from mjsim.support.files import replacing
 
 _KINDS = 15  # bars

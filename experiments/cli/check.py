@@ -10,7 +10,7 @@ from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
 
 if TYPE_CHECKING:
-    from mjsim.model.validation.report import Report
+    from mjsim.house.check import Report
 
 UNUSABLE = 2
 
@@ -42,7 +42,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from experiments.record.run_directory import check_file
     from mjsim.generator.home_cache import load_catalogue
-    from mjsim.model.validation.report import check_path
+    from mjsim.house.check import check_path
 
     if arguments.picture is not None:
         require_extra("study")

@@ -85,7 +85,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from experiments.house import House
     from experiments.record.run_directory import check_file
-    from mjsim.model.scene import compose
+    from mjsim.house.scene.scene import compose
 
     if arguments.what == GALLERY:
         return _gallery(arguments)
@@ -154,7 +154,7 @@ def _generate(arguments: argparse.Namespace) -> int:
     """Write the house of a seed into a folder, checked, with pictures: whole or not at all."""
     from experiments.house import House
     from experiments.procedure.house_pictures import draw_house
-    from mjsim.model.model_files import copy_house
+    from mjsim.house.catalogue.model_files import copy_house
     from mjsim.support.files import exchange, work_folder
 
     out: Path = arguments.out
@@ -221,7 +221,7 @@ def _export(arguments: argparse.Namespace) -> int:
 
 def _write(scene: Any, path: Path) -> None:
     """Write a composed scene in the format that the ending of the path names."""
-    from mjsim.model.export import export_house
+    from mjsim.formats.mjcf_scene import export_house
     from mjsim.scene_export.export import export_episode
     from mjsim.support.files import replacing
 

@@ -19,13 +19,13 @@ from mjsim.support.files import write_text_atomically
 from mjsim.values.episode import POINTS
 
 if TYPE_CHECKING:
+    from mjsim.house.scene.disorder import Disorder
     from mjsim.importing.episodes import EpisodeObject
-    from mjsim.model.disorder import Disorder
 
 DESCRIPTION = """\
 Read rearrangement episodes of others: RoomR (AI2-THOR rearrangement, .pkl.gz) and Housekeep (.json.gz). Writes
   objects.csv     every object of every episode: whether it is out of place, and how far
-  disorder.json   how many objects are out of place, and how far, as --episodes and mjsim.model.disorder take it
+  disorder.json   how many objects are out of place, and how far, as --episodes and mjsim.house.scene.disorder take it
   disorder.png    the same as a picture, with the kinds of objects (needs the extra `study`)
 With --episodes, also episode_0.json, ... for `mjsim run --episode`: our objects in a house of ours, as many and about
 as far from where they belong as in those episodes (docs/import.md)."""
@@ -45,8 +45,8 @@ def add_parser(kinds: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from mjsim.house.scene.disorder import Disorder
     from mjsim.importing.episodes import MISPLACED, kind_of, read_episodes
-    from mjsim.model.disorder import Disorder
 
     if arguments.episodes < 0 or arguments.seed < 0:
         raise ConfigError("--episodes and --seed must not be negative")

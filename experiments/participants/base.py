@@ -18,7 +18,7 @@ from planner.plan import Visit
 
 if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
     from experiments.house import House
-    from mjsim.model.receptacles import ReceptacleGeometry
+    from mjsim.house.compiled.receptacles import ReceptacleGeometry
 
 Point = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from experiments.house import House
-from mjsim.model.house import compiled_house
-from mjsim.model.sight import FieldOfView, visible_receptacles
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
 from planner.errors import PlannerError
 

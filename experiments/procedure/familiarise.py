@@ -10,7 +10,7 @@ from experiments.procedure.camera_path import bins_seen, camera_path
 from experiments.procedure.story import reading_time, story_text
 from experiments.record.phases import FLYTHROUGH, STORY, TRAINING
 from experiments.record.records import PHASE_BEGUN, PHASE_ENDED, Event, EventLog
-from mjsim.model.sight import FieldOfView
+from mjsim.house.sight.sight import FieldOfView
 from mjsim.values.person_parameters import PersonParameters
 
 

@@ -12,7 +12,7 @@ from experiments.procedure.camera_path import CameraPath, camera_path
 from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.caption import Captions
-from mjsim.model.house import compiled_house
+from mjsim.house.compiled.house import compiled_house
 from mjsim.render import CameraPose, Renderer
 from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PICTURE_ASPECT, PersonParameters

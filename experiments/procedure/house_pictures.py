@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from mjsim.model.house import compiled_house
+from mjsim.house.compiled.house import compiled_house
 from mjsim.render import CameraPose, Renderer, render_house_map
 from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PersonParameters

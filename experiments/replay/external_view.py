@@ -10,7 +10,7 @@ from experiments.session.film_config import TOP_DOWN, FilmConfig
 from experiments.session.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.render import CameraPose, LayeredRenderer
 from mjsim.render.rasteriser import TOP_DOWN_GROUPS
 from mjsim.values.observation import Observation

@@ -17,7 +17,7 @@ from experiments.session.endings import COMPLETE, PHYSICS_ERROR
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
 from experiments.session.viewer import Viewer
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.errors import ActionError, PhysicsError, StateError
 from mjsim.values.options import WorldOptions
 from mjsim.values.steps import Steps

@@ -17,8 +17,8 @@ from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.model.avatar import EYE
-from mjsim.model.scene import Scene
+from mjsim.house.scene.avatar import EYE
+from mjsim.house.scene.scene import Scene
 from mjsim.render import Renderer, gl_info, render_house_map, render_pictures
 from mjsim.render.cameras import CameraPose
 from mjsim.values.errors import RenderError

@@ -9,9 +9,9 @@ from experiments.participants.base import Choice, Guidance, Percept, Point, posi
 from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
-from mjsim.model.drawn_state import drawn_state
-from mjsim.model.receptacles import ReceptacleGeometry
-from mjsim.model.sight import (
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.sight.drawn_state import drawn_state
+from mjsim.house.sight.sight import (
     FieldOfView,
     in_field_of_view,
     persons_geoms,

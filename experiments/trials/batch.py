@@ -31,7 +31,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import UNSTAMPED, OnRead, TrialReader
 from experiments.trials.workers import EXECUTORS, PROCESSES, RAY, Executor, Pools
-from mjsim.model.house import MAX_HOUSES
+from mjsim.house.compiled.house import MAX_HOUSES
 from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]

@@ -16,10 +16,10 @@ from experiments.trials.setup import draw_behaviour, draw_person, prepare_sessio
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from mjsim.generator.home_cache import load_catalogue
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import MAX_HOUSES
-from mjsim.model.house_ref import parse_house
-from mjsim.model.scene import compose
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.house.compiled.house import MAX_HOUSES
+from mjsim.house.scene.scene import compose
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.person_parameters import PersonParameters

@@ -31,7 +31,7 @@ from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
 from experiments.trials.table import write_tables
 from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConfig
-from mjsim.model.house_ref import parse_house
+from mjsim.house.catalogue.house_ref import parse_house
 
 OUTDATED = "outdated"
 MAX_NAME = 120  # characters, without seeds and hash

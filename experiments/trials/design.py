@@ -22,8 +22,8 @@ from experiments.trials.trial_config import (
     TrialConfig,
     episode_settings,
 )
-from mjsim.model.generated_names import generated_names, is_generated
-from mjsim.model.house_ref import parse_house
+from mjsim.house.catalogue.generated_names import generated_names, is_generated
+from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.support.files import read_text
 
 MAX_NUMBERS = 1_000_000

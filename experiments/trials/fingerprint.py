@@ -17,7 +17,7 @@ from experiments.participants import participant_names
 from experiments.procedure.story import story_text
 from experiments.record.phases import STORY
 from experiments.trials.trial_config import PATHS, TrialConfig
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import read_bytes
 from mjsim.support.sources import PACKAGES, digest_of, source_digest
 

@@ -24,7 +24,7 @@ from experiments.session.viewer import Viewer
 from experiments.trials.fingerprint import fingerprint, trial_inputs
 from experiments.trials.person import check_person, drawn_person
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.episode import Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters

@@ -34,7 +34,7 @@ from experiments.trials.setup import (
 )
 from experiments.trials.training import training_config
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import Scene, compose
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.support.files import work_folder
 from mjsim.values.errors import PhysicsError
 from mjsim.values.person_parameters import PersonParameters

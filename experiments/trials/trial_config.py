@@ -13,7 +13,7 @@ from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.distribution import Distributions
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person, view_limits
-from mjsim.model.house_ref import parse_house
+from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solver import DEFAULT_SOLVER

@@ -12,7 +12,7 @@ from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names
-from mjsim.model.scene import Scene, compose
+from mjsim.house.scene.scene import Scene, compose
 from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.options import FIDELITIES, WorldOptions

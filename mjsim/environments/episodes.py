@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from mjsim.environments.errors import ViewerError
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.navigable import NavigablePoints
-from mjsim.model.sampling import sample_episode
-from mjsim.model.scene import compose
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.navigable import NavigablePoints
+from mjsim.house.scene.sampling import sample_episode
+from mjsim.house.scene.scene import compose
 from mjsim.render import Labels, Renderer
 from mjsim.render.diagnostics import INSTALL_DM_CONTROL
 from mjsim.values.episode import Episode

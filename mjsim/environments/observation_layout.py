@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.model.footprint import Footprint
+from mjsim.house.compiled.footprint import Footprint
 
 
 @dataclass(frozen=True)

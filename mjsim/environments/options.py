@@ -15,8 +15,8 @@ from mjsim.environments.observation_layout import CameraOptions, ObservationLayo
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
 from mjsim.generator.home_cache import load_catalogue
-from mjsim.model.house import compiled_house, navigable_floor
-from mjsim.model.navigable import NavigableBuilder
+from mjsim.house.compiled.house import compiled_house, navigable_floor
+from mjsim.house.compiled.navigable import NavigableBuilder
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from mjsim.environments.errors import EnvironmentConfigError
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.episode import CAPACITY
 from mjsim.values.observation import ObjectStatus, Observation
 

@@ -20,14 +20,14 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.model_files import read_model
+from mjsim.house.compiled.house import CompiledHouse, compiled_house
 from mjsim.importing.houses.gltf import RECEPTACLE, SEMANTICS
 from mjsim.importing.houses.meshes import Y_TO_Z
 from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.values import HouseOptions, Piece
 from mjsim.importing.surface import Floats
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import CompiledHouse, compiled_house
-from mjsim.model.model_files import read_model
 from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 

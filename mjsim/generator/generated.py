@@ -11,7 +11,7 @@ from mjsim.generator.palette import draw_palette
 from mjsim.generator.plan import draw_rooms
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.values import FloorPlan, Furnishing
-from mjsim.model.generated_names import VERSION
+from mjsim.house.catalogue.generated_names import VERSION
 from mjsim.support.random_streams import stream
 from mjsim.values.errors import HouseError
 

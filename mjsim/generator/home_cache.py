@@ -9,18 +9,18 @@ from pathlib import Path
 
 from mjsim.generator.files import STYLE
 from mjsim.generator.recipe import Recipe, read_recipe
-from mjsim.model.assets import models_root
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.catalogue_files import MAX_EXTENDS, base_of
-from mjsim.model.generated_names import parse_name
-from mjsim.model.house_ref import CATALOGUE, HouseRef, parse_house
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.files import MAX_EXTENDS, base_of
+from mjsim.house.catalogue.generated_names import parse_name
+from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, parse_house
 from mjsim.support.files import work_folder
 from mjsim.support.kernels import cache_base
 from mjsim.support.sources import digest_of
 from mjsim.values.errors import HouseError
 
 # Modules outside the generator that a home follows from.
-_BESIDES = ("model/generated_names.py", "support/random_streams.py")
+_BESIDES = ("house/catalogue/generated_names.py", "support/random_streams.py")
 
 
 def load_catalogue(house: str = "apartment") -> Catalogue:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjsim.model.generated_names import ROOMS
+from mjsim.house.catalogue.generated_names import ROOMS
 from mjsim.values.errors import HouseError
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 
 from mjsim.generator.values import FloorPlan
-from mjsim.model.generated_names import PREFIX, GeneratedName, check_version
+from mjsim.house.catalogue.generated_names import PREFIX, GeneratedName, check_version
 from mjsim.support.files import read_bytes
 from mjsim.values.errors import HouseError
 

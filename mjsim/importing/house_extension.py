@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from mjsim.generator.home_cache import load_catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import CATALOGUE, parse_house
+from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.model_writer import MODEL
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
-from mjsim.model.house_ref import CATALOGUE, parse_house
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 

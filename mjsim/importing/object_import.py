@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 from trimesh.transformations import translation_matrix
 
+from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.grip import Grip, find_grip
 from mjsim.importing.look import Look, make_look
 from mjsim.importing.parts import Parts, convex_parts
@@ -17,7 +18,6 @@ from mjsim.importing.solid import MAX_TRIANGLES, Solid, close, simplified
 from mjsim.importing.surface import Floats, Surface, cleaned
 from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.importing.weight import Weight, weigh
-from mjsim.model.validation.object_rules import SIZE
 from mjsim.values.errors import AssetError
 
 _COARSE = 0.005  # of the longest side, greatest distance between numbers of 32 bits

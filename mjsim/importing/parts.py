@@ -7,9 +7,9 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
+from mjsim.house.validation.object_rules import THIN
 from mjsim.importing.solid import Solid, simplified
 from mjsim.importing.surface import Floats
-from mjsim.model.validation.object_rules import THIN
 
 MAX_PARTS = 6
 MAX_VERTICES = 64  # of a part

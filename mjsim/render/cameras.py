@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.model.avatar import EYE
+from mjsim.house.scene.avatar import EYE
 from mjsim.values.errors import RenderError
 from mjsim.values.person_parameters import PICTURE_ASPECT
 

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.model import avatar
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene import avatar
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import MAX_SIDE, RenderProfile

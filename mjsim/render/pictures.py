@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import RenderProfile

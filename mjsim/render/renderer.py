@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.avatar import EYE
+from mjsim.house.scene.avatar import EYE
 from mjsim.render import context
 from mjsim.render.cameras import CameraPose, ViewVolume, camera_pose
 from mjsim.render.markers import MarkerLike

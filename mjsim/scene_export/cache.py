@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import mujoco
 
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.scene_export.export import export_scene, floor_json
 from mjsim.scene_export.store import GZIP
 from mjsim.support.files import WORK, replacing, work_folder

@@ -10,11 +10,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.model import avatar
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
-from mjsim.model.rooms import RoomMap
-from mjsim.model.scene import Scene, assemble
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows
 from mjsim.scene_export import textures
 from mjsim.scene_export.cube_maps import FACES

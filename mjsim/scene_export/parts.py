@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mjsim.model.rooms import RoomMap
+from mjsim.house.compiled.rooms import RoomMap
 from mjsim.scene_export.glb import Look
 from mjsim.scene_export.surfaces import Surface
 

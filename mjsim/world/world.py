@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import (
     IDLE,
     TIME_TOLERANCE,

@@ -12,7 +12,7 @@ from experiments.house import House
 from experiments.participants.base import Percept, Point, positions_of
 from experiments.participants.nearest import Nearest
 from mjsim.environments.core import ObservationDict, Rearrangement
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, StepAction
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.person_parameters import PersonParameters

@@ -33,7 +33,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition, condition_names
 from hud.options import option_names
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.person_parameters import RANGES
 from tools.data_dictionary import data_dictionary
 
@@ -107,8 +107,8 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
     [
         "mjsim.environments.dm_environment",
         "mjsim.generator.home_cache",
-        "mjsim.model.catalogue",
-        "mjsim.model.sampling",
+        "mjsim.house.catalogue.catalogue",
+        "mjsim.house.scene.sampling",
         "mjsim.values.person_parameters",
         "mjsim.world.world",
         "planner.geodesics",

@@ -74,7 +74,7 @@ def nothing_is_computed(monkeypatch):
         monkeypatch.setattr(name, fail)
     monkeypatch.setattr("experiments.cli.plan.solver", fail)
     monkeypatch.setattr("experiments.replay.replay.replay", fail)
-    monkeypatch.setattr("mjsim.model.validation.report.check_path", fail)
+    monkeypatch.setattr("mjsim.house.check.check_path", fail)
     monkeypatch.setattr("experiments.analysis.comparison.read_blocks", fail)
 
 

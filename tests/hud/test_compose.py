@@ -16,7 +16,7 @@ from hud.errors import FrameError
 from hud.messages import message
 from hud.panels import clock_text
 from hud.state import ChecklistItem, HudState, InventorySlot, Message, MessageKind, Pointer
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 
 SIZES = ((640, 480), (1280, 720), (1920, 1080))
 

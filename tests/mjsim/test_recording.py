@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_worlds import do, finish, scene_of
 
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import Pick
 from mjsim.values.errors import StateError
 from mjsim.world.state import StateHash, WorldState, engine_versions, model_fingerprint

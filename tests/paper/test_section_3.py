@@ -14,7 +14,7 @@ from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
 from hud.messages import message
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.values.observation import ObjectStatus
 

@@ -10,7 +10,7 @@ import pytest
 from sessions import opened
 
 from experiments.procedure.story import story_text
-from mjsim.model import sampling
+from mjsim.house.scene import sampling
 from mjsim.values.observation import ObjectStatus
 
 HOUSES = range(200)

@@ -10,7 +10,7 @@ from sessions import SIZES, opened, play
 from hud import theme
 from hud.compose import Compositor
 from hud.markers import BREADCRUMB, BREADCRUMB_RADIUS, CHEST, FLAGPOLE
-from mjsim.model.sight import FieldOfView, in_field_of_view, visible_objects
+from mjsim.house.sight.sight import FieldOfView, in_field_of_view, visible_objects
 from mjsim.render import CameraPose, Renderer
 from mjsim.values.observation import ObjectStatus
 

@@ -18,7 +18,7 @@ from experiments.trials import setup
 from experiments.trials.setup import prepare_session, prepared_planner
 from experiments.trials.table import read_rows
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from planner.checker import check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver

@@ -9,8 +9,8 @@ import numpy as np
 from experiments.session.viewer import Viewer
 from hud.projection import CameraView
 from hud.state import HudState
-from mjsim.model import avatar
-from mjsim.model.scene import Scene
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.render.cameras import camera_pose
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT

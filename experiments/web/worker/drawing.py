@@ -14,7 +14,7 @@ from experiments.web.worker.control import SessionControl
 from experiments.web.worker.encoders import Encoder, H264Encoder, JpegEncoder
 from experiments.web.worker.frame_size import SIZES, FrameSize, pause_after
 from hud.state import HudState, Marker
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.render import FAST, Renderer
 from mjsim.world.world import World
 

@@ -34,7 +34,7 @@ from experiments.trials.trial import draw_floor_plan
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.controls import Controls, Input, control_step
 from experiments.web.server.visits import JOURNALS
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import Action
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World

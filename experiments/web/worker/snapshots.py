@@ -7,7 +7,7 @@ import numpy as np
 from experiments.web.protocol import Gait, Scene, Snapshot, Speeds, View
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
-from mjsim.model.foresight import Foresight
+from mjsim.house.sight.foresight import Foresight
 from mjsim.values.errors import AssetError
 from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics

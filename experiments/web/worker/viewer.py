@@ -18,7 +18,7 @@ from experiments.web.worker.live_session import LiveSession
 from experiments.web.worker.snapshots import SnapshotStream, field_of_view, scene_of
 from hud.projection import CameraView, project
 from hud.state import HudState
-from mjsim.model.avatar import eye_position
+from mjsim.house.scene.avatar import eye_position
 from mjsim.values.actions import Pick
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT

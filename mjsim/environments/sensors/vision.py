@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
-from mjsim.model.sight import visible_objects
+from mjsim.house.sight.sight import visible_objects
 
 # Numbers of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot.
 MIN_LABEL = -1

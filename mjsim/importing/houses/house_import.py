@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from trimesh.transformations import translation_matrix
 
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.check import Report, check_house_name
+from mjsim.house.validation.findings import Finding, errors
 from mjsim.importing.houses.bins import place_bins
 from mjsim.importing.houses.gltf import INSTANCE, read_habitat, read_mesh_scene
 from mjsim.importing.houses.look import make_looks
@@ -31,9 +34,6 @@ from mjsim.importing.model_writer import write_png
 from mjsim.importing.reading import MAX_TRIANGLES
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import ImportDecision
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.validation.findings import Finding, errors
-from mjsim.model.validation.report import Report, check_house_name
 from mjsim.support.files import work_folder
 from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError
@@ -240,7 +240,7 @@ def _floor(pieces: Sequence[Piece]) -> Floats:
 
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
     """Draw the house from above; without OpenGL there is no picture, and the note says so."""
-    from mjsim.model.house import compiled_house
+    from mjsim.house.compiled.house import compiled_house
     from mjsim.render.floorplan import render_house_map
 
     loaded = Catalogue.load(str(catalogue))

@@ -11,6 +11,8 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
+from mjsim.house.catalogue.model_files import read_model
+from mjsim.house.compiled.rooms import PREFIX, RoomMap
 from mjsim.importing.houses.meshes import primitive
 from mjsim.importing.houses.values import (
     TEXTURE_SIDE,
@@ -22,8 +24,6 @@ from mjsim.importing.houses.values import (
     left_out,
 )
 from mjsim.importing.surface import Floats, Surface
-from mjsim.model.model_files import read_model
-from mjsim.model.rooms import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")

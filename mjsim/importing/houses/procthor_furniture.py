@@ -15,11 +15,11 @@ from mjsim.generator.furniture.look import draw_look
 from mjsim.generator.furniture.piece import flattened
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.values import Asset
+from mjsim.house.catalogue.assets import models_root
 from mjsim.importing.houses.meshes import primitive
 from mjsim.importing.houses.procthor_plan import Thing
 from mjsim.importing.houses.values import Piece
 from mjsim.importing.surface import Floats
-from mjsim.model.assets import models_root
 from mjsim.support.files import read_json, read_text
 from mjsim.support.random_streams import stream
 from mjsim.values.errors import AssetError, brief

@@ -10,6 +10,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import trimesh
 
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import CATALOGUE
 from mjsim.importing.houses.look import DrawnMesh, picture_key
 from mjsim.importing.houses.plan import Plan
 from mjsim.importing.houses.rooms import Rooms
@@ -17,9 +20,6 @@ from mjsim.importing.houses.solids import Solid
 from mjsim.importing.houses.values import Bin
 from mjsim.importing.model_writer import comment, look_lines, write_png
 from mjsim.importing.surface import Floats
-from mjsim.model.assets import models_root
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house_ref import CATALOGUE
 
 MODEL = "house.xml"
 MESHES = "meshes"

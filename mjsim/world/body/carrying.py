@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.clearance import ClearanceField
-from mjsim.model.house import compiled_house
-from mjsim.model.scene import Scene
+from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.inventory import LEFT, RIGHT
 from mjsim.values.motion_parameters import CarryingParameters

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mjsim.model import avatar
-from mjsim.model.rays import receptacle_in_sight, sees
+from mjsim.house.compiled.rays import receptacle_in_sight, sees
+from mjsim.house.scene import avatar
 from mjsim.values.actions import ActionResult, Pick, Place, Refusal
 from mjsim.values.inventory import Inventory
 from mjsim.values.observation import ObjectStatus

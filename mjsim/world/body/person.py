@@ -8,8 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.scene import Scene
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
+from mjsim.house.sight.receptacle_heights import ReceptacleHeights
 from mjsim.support.kernels import kernel
 from mjsim.values.actions import Move
 from mjsim.values.motion_parameters import MotionParameters
@@ -19,7 +20,6 @@ from mjsim.world.body.grips import Grips
 from mjsim.world.body.hand_path import point_between
 from mjsim.world.body.postures import move_hand, posture_pace
 from mjsim.world.body.rate_limits import change_pitch, change_turn_rate, change_velocity
-from mjsim.world.body.receptacle_heights import ReceptacleHeights
 from mjsim.world.body.rig import Rig
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
 from mjsim.support.kernels import kernel
 from mjsim.values.options import REST_STEPS
 from mjsim.world.body.hand_path import STRAIGHT

@@ -3,7 +3,7 @@
 Serves `mjsim.world.world.World`, which hides the tier behind one interface.
 """
 
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
 from mjsim.world.fidelity.event import Event
 from mjsim.world.fidelity.full import Full

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
+from mjsim.house.scene import avatar
 
 X, Y, HEADING, PITCH = 0, 1, 2, 3  # m, m, rad (unwrapped), rad
 VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7  # in the house frame, m/s, rad/s

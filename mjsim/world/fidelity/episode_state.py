@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.scene import Scene
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import EventKind, WorldEvent
 from mjsim.values.errors import StateError
 from mjsim.values.inventory import Inventory

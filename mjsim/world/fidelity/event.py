@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal, StepAction
 from mjsim.values.observation import Observation
 from mjsim.values.options import WorldOptions

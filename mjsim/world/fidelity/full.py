@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.scene import Scene
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
 from mjsim.values.errors import ActionError, StateError
 from mjsim.values.inventory import LEFT, RIGHT

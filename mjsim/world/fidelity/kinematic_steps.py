@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.clearance import ClearanceField
+from mjsim.house.compiled.clearance import ClearanceField
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
 from mjsim.values.steps import States

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.house import compiled_house
-from mjsim.model.scene import Scene
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.values.errors import StateError
 from mjsim.values.inventory import LEFT
 from mjsim.values.options import WorldOptions

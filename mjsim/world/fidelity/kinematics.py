@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model import avatar
-from mjsim.model.scene import Scene
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.options import WorldOptions
 from mjsim.world.body import rate_limits

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
 from mjsim.values.actions import ActionResult, EventKind, Place
 from mjsim.world.body.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.load_room import BodyMotion

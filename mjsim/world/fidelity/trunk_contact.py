@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mjsim.model.footprint import footprint
+from mjsim.house.compiled.footprint import footprint
 from mjsim.support.kernels import kernel
 from mjsim.world.fidelity.body_state import VX, VY, X, Y
 

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.rays import first_hit, moving_geoms
-from mjsim.model.scene import Scene
+from mjsim.house.compiled.rays import first_hit, moving_geoms
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import EventKind
 from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.world.health.settle_times import SettlingObject

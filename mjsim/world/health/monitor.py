@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.scene import Scene
+from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import EventKind
 from mjsim.values.errors import PhysicsError
 from mjsim.values.options import WorldOptions

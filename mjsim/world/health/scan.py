@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.model.house import compiled_house
-from mjsim.model.rooms import nearest_rectangle
-from mjsim.model.scene import Scene
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.compiled.rooms import nearest_rectangle
+from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.world.body.grips import site_angle, site_gap
 

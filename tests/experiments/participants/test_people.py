@@ -27,7 +27,7 @@ from experiments.trials.person import check_person, drawn_person
 from experiments.trials.setup import draw_person, prepare_session
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.options import FIDELITIES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 

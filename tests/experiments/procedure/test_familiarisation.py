@@ -27,8 +27,8 @@ from experiments.trials.setup import simulated_user
 from experiments.trials.training import training_config
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.house import compiled_house
-from mjsim.model.sight import FieldOfView, visible_receptacles
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.render import CameraPose, Renderer
 from mjsim.values.person_parameters import PersonParameters
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.replay.external_view import ExternalViewer, camera_path
 from experiments.session.film_config import FilmConfig
-from mjsim.model.footprint import Footprint
+from mjsim.house.compiled.footprint import Footprint
 from mjsim.world.world import World
 
 BOUNDS = (-1.0, 2.0, 9.0, 8.0)

@@ -344,7 +344,7 @@ BOMB = """
 
 def test_a_physics_error_leaves_a_dump_that_replays(own_house, tmp_path, capsys, monkeypatch):
     # Two bodies in an object: a house that is refused.
-    monkeypatch.setattr("mjsim.model.validation.validate.check_house", lambda _: [])
+    monkeypatch.setattr("mjsim.house.validation.validate.check_house", lambda _: [])
     block = own_house.with_name("block.xml")
     block.write_text(block.read_text().replace("</body>", BOMB))
     with pytest.raises(PhysicsError, match=r"kept for `mjsim replay .*run`"):

@@ -7,7 +7,7 @@ import pytest
 from sessions import Recorder, opened
 
 from experiments.session.session import INTERRUPTED
-from mjsim.model.sight import visible_objects
+from mjsim.house.sight.sight import visible_objects
 from mjsim.render import Renderer
 from mjsim.values.actions import WAIT
 from mjsim.values.observation import ObjectStatus

@@ -7,7 +7,7 @@ import pytest
 from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, prepared_planner, regret_evaluator, solver_source
 from experiments.trials.trial_config import TrialConfig
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from planner.service import Planner
 
 

@@ -21,7 +21,7 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import read_trials
 from hud.errors import ConditionError
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.errors import AssetError, EpisodeError, SamplingError
 from planner.errors import PlannerError
 

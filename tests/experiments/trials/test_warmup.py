@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from mjsim.values.actions import Move
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.episode import Episode
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from experiments.trials.warmup import compile_kernels
 from mjsim.world.world import World
 

@@ -17,8 +17,8 @@ from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
-from mjsim.model import navigable
-from mjsim.model.navigable import installed_builder
+from mjsim.house.compiled import navigable
+from mjsim.house.compiled.navigable import installed_builder
 from mjsim.values.actions import IDLE, Move, Pick, Place
 from mjsim.values.errors import ActionError, PhysicsError, SamplingError
 from mjsim.values.options import WorldOptions

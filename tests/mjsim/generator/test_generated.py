@@ -12,10 +12,10 @@ from experiments.trials.design import read_design
 from mjsim.generator.generated import generate, house_files
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import read_recipe
-from mjsim.model.assets import models_root
-from mjsim.model.generated_names import VERSION, generated_names, parse_name, split_of
-from mjsim.model.sampling import sample_episode
-from mjsim.model.validation.report import check_path
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.generated_names import VERSION, generated_names, parse_name, split_of
+from mjsim.house.check import check_path
+from mjsim.house.scene.sampling import sample_episode
 from mjsim.values.errors import HouseError
 
 

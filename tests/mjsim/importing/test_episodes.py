@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.cli import main as cli
+from mjsim.house.scene.disorder import Disorder
 from mjsim.importing.episodes import EpisodeObject, kind_of, read_episodes
-from mjsim.model.disorder import Disorder
 from mjsim.values.episode import Episode
 from mjsim.values.errors import EpisodeError
 

@@ -9,10 +9,10 @@ import pytest
 from experiments.cli import main as cli
 from experiments.house import House
 from mjsim.generator.home_cache import load_catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.houses.house_import import import_house
 from mjsim.importing.houses.values import HouseOptions
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
 
 Z_TO_Y = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 

@@ -19,6 +19,9 @@ from small_worlds import dropped
 from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments.cli import main as cli
 from experiments.house import House
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import compiled_house
+from mjsim.house.validation.object_rules import check_object
 from mjsim.importing import house_extension
 from mjsim.importing.atlas import SIDE, Atlas
 from mjsim.importing.house_extension import Entry, HouseExtension, held_in
@@ -28,9 +31,6 @@ from mjsim.importing.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itsel
 from mjsim.importing.resting import STEADY, resting_pose
 from mjsim.importing.values import ImportOptions
 from mjsim.importing.weight import weigh
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.house import compiled_house
-from mjsim.model.validation.object_rules import check_object
 from mjsim.support.files import remove_leftovers
 from mjsim.values.errors import AssetError, RenderError
 from mjsim.values.options import WorldOptions

@@ -22,7 +22,7 @@ from hud.messages import message
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
 from hud.task import KnownPlan, TaskStep
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures
 from mjsim.testing import FrameMismatchError, compare_frame, fixtures, psnr
 from mjsim.values.episode import Episode

@@ -14,7 +14,7 @@ from shapely import LineString, Point
 from small_worlds import scene_of
 
 from hud.markers import BREADCRUMB_RADIUS, CHEST, breadcrumbs
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.render import CameraPose, Labels, Renderer
 from mjsim.values.episode import Episode
 
@@ -187,7 +187,7 @@ from hud.compose import Compositor
 from hud.conditions import condition
 from mjsim.values.episode import Episode
 from mjsim.render import Renderer, render_pictures
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.world.world import World
 from hud.task import KnownPlan, TaskStep
 import pathlib

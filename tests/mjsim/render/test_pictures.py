@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjsim.model.catalogue import Catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.render import render_picture, render_pictures
 from mjsim.values.errors import AssetError, RenderError
 

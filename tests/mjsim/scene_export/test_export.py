@@ -20,9 +20,9 @@ from mesh_files import MESHES
 from scipy.spatial import cKDTree
 from small_worlds import edited
 
+from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
-from mjsim.model.catalogue import Catalogue
 from mjsim.scene_export import cache
 from mjsim.scene_export.export import export_episode, export_scene
 from mjsim.scene_export.store import GZIP, SCENE

@@ -97,7 +97,7 @@ def test_compiling_is_announced_once(tmp_path, kept):
         "@kernel\ndef after(x):\n    return x + 1\n\n\n"
         "announce_compiling()\nprint(after(1), after(1.5))\n"
     )
-    paths = os.pathsep.join((str(Path(__file__).parents[2]), *sys.path))
+    paths = os.pathsep.join((str(Path(__file__).parents[3]), *sys.path))
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": paths}
     run = subprocess.run([sys.executable, source], env=environment, capture_output=True, text=True)
     assert run.stdout.strip() == "2 2.5"

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from small_worlds import scene_of, world_of
 
 from experiments.house import WALL_GAP
-from mjsim.model import avatar
-from mjsim.model.clearance import ClearanceField
-from mjsim.model.sight import FieldOfView, visible_objects
+from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.scene import avatar
+from mjsim.house.sight.sight import FieldOfView, visible_objects
 from mjsim.render.cameras import camera_pose
 from mjsim.values.actions import IDLE, Move, Pick, Place
 from mjsim.values.errors import PersonError

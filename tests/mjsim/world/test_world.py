@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_worlds import do, finish, scene_of, walk_to, world_of
 
-from mjsim.model import avatar
-from mjsim.model.scene import compose
+from mjsim.house.scene import avatar
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import IDLE, EventKind, Move, Pick, Place, Refusal
 from mjsim.values.errors import ActionError, AssetError, PhysicsError
 from mjsim.values.observation import ObjectStatus

@@ -15,7 +15,7 @@ import shapely
 
 from experiments.house import House
 from experiments.web.controls import Controls, Input, act, control_step
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.options import WorldOptions
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity.body_state import HEADING, PITCH, X, Y, standing

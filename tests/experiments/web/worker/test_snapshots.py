@@ -13,7 +13,7 @@ from experiments.web.controls import Input
 from experiments.web.protocol import View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.snapshots import LINGERING, SnapshotStream
-from mjsim.model.avatar import EYE
+from mjsim.house.scene.avatar import EYE
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose, camera_pose
 

@@ -12,7 +12,7 @@ from experiments.web.controls import Input
 from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import HUD_EVERY, BrowserViewer
-from mjsim.model.avatar import EYE
+from mjsim.house.scene.avatar import EYE
 from mjsim.render.cameras import camera_pose
 from mjsim.world.fidelity import kinematics
 

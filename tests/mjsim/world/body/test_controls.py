@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from experiments.house import House
 from experiments.web.controls import MAX_PITCH, MAX_PRESSES, PRESS_LIFE, Controls, Input, control_step
-from mjsim.model.scene import compose
+from mjsim.house.scene.scene import compose
 from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, Refusal
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters

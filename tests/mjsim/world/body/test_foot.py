@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_worlds import scene_of, world_of
 
-from mjsim.model import avatar
+from mjsim.house.scene import avatar
 from mjsim.values.actions import IDLE, EventKind, Move
 from mjsim.values.person_parameters import PersonParameters
 

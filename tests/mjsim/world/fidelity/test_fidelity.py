@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
-from mjsim.model import avatar
-from mjsim.model.catalogue import Catalogue
-from mjsim.model.sight import visible_objects
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene import avatar
+from mjsim.house.sight.sight import visible_objects
 from mjsim.values.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
 from mjsim.values.errors import StateError
 from mjsim.values.observation import ObjectStatus

@@ -1,0 +1,83 @@
+"""Saving a composed house as plain MJCF that stock MuJoCo opens: one XML file and its assets beside it."""
+
+import hashlib
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from mjsim.house.scene.scene import Scene
+from mjsim.support.files import replacing, write_text_atomically
+from mjsim.values.errors import AssetError
+
+ASSETS = "assets"
+
+
+def export_house(scene: Scene, path: Path) -> None:
+    """Write the scene as a self-contained model, a file that ends in `.xml`, whose `qpos0` is the scene's.
+
+    Meshes and textures are copied into the folder `assets` beside the file, named by their content, and referred to by
+    relative paths, so that the folder can be moved. The XML file is written last, atomically.
+
+    Raises:
+        AssetError: The path does not end in `.xml`, or an asset file is gone.
+    """
+    if path.suffix != ".xml":
+        raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
+    try:
+        root = ET.fromstring(scene.spec.to_xml())
+    except ValueError as error:  # MuJoCo compiles it again, from the files
+        raise AssetError(f"cannot export to {path}: {error}") from error
+    for compiler in root.findall("compiler"):
+        for folder in ("meshdir", "texturedir", "assetdir"):
+            compiler.attrib.pop(folder, None)
+    for asset in root.iterfind("asset/*"):
+        for attribute in [a for a in asset.attrib if a.startswith("file")]:
+            asset.set(attribute, _copy_asset(Path(asset.attrib[attribute]), path.parent))
+    _sharpen_poses(root, scene.model)
+    ET.indent(root)
+    write_text_atomically(path, ET.tostring(root, encoding="unicode") + "\n")
+
+
+def _copy_asset(source: Path, folder: Path) -> str:
+    """Copy an asset file, named absolutely, and return its path relative to `folder`."""
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise AssetError(f"cannot read asset {source}: {error.strerror}") from error
+    # Files of the same name from different folders must not replace each other.
+    name = f"{source.stem}-{hashlib.sha256(content).hexdigest()[:12]}{source.suffix}"
+    target = folder / ASSETS / name
+    if not target.exists():
+        with replacing(target) as temporary:
+            temporary.write_bytes(content)
+    return f"{ASSETS}/{name}"
+
+
+def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
+    """Write the poses that `qpos0` comes from with all digits; MuJoCo writes six."""
+    world = root.find("worldbody")
+    for body in [] if world is None else _top_level_bodies(world):
+        if body.find("joint") is not None or body.find("freejoint") is not None:
+            compiled = model.body(body.get("name"))
+            body.set("pos", _digits(compiled.pos))
+            body.set("quat", _digits(compiled.quat))
+    for joint in root.iterfind("worldbody//joint"):
+        if joint.get("type") not in ("free", "ball"):
+            compiled = model.joint(joint.get("name"))
+            joint.set("axis", _digits(compiled.axis))
+            joint.set("ref", _digits(model.qpos0[compiled.qposadr]))
+
+
+def _top_level_bodies(parent: ET.Element) -> list[ET.Element]:
+    """Bodies right below the world, through frames that do not move them."""
+    bodies = parent.findall("body")
+    for frame in parent.findall("frame"):
+        if not set(frame.attrib) & {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"}:
+            bodies += _top_level_bodies(frame)
+    return bodies
+
+
+def _digits(values: Any) -> str:
+    return " ".join(repr(float(v)) for v in values)

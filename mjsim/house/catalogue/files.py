@@ -1,0 +1,82 @@
+"""Finding and reading the files of catalogues; one may extend another."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, parse_house
+from mjsim.support.files import is_file, read_text
+from mjsim.values.errors import AssetError, brief
+
+MAX_EXTENDS = 20  # catalogues, each of which extends the next
+
+
+def base_of(house: HouseRef) -> HouseRef | None:
+    """The house that a catalogue extends. None if it extends none, or cannot be read."""
+    if house.file is None:
+        return None
+    try:
+        name = tomllib.loads(read_text(house.file)).get("extends")
+        return parse_house(name, house.file.parent) if isinstance(name, str) else None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
+        return None  # reading the catalogue reports it
+
+
+def catalogue_file(house: HouseRef) -> Path:
+    """Absolute path of a catalogue.
+
+    Raises:
+        AssetError: There is none, or the home has yet to be generated.
+    """
+    if house.file is None:
+        raise AssetError(
+            f"the home {house.name!r} has not been generated; load it with mjsim.load_catalogue, which generates it"
+        )
+    if is_file(house.file):
+        return house.file.resolve() if house.kind == "folder" else house.file
+    remedy = f"the path of a {CATALOGUE} or its folder"
+    if house.kind == "folder":
+        raise AssetError(f"no catalogue at {house.name}; give a house name, or {remedy}")
+    known = sorted(path.parent.name for path in (models_root() / "houses").glob(f"*/{CATALOGUE}"))
+    raise AssetError(f"no house {house.name!r}; there are {known}, or give {remedy}")
+
+
+def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
+    """Read the tables of a catalogue and its text, each with those of the catalogue that it extends.
+
+    An entry replaces the one of the same key in the extended catalogue.
+    """
+    path = catalogue_file(house)
+    try:
+        text = read_text(path)
+        tables = tomllib.loads(text)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise AssetError(brief(f"cannot read catalogue {path}: {error}")) from error
+    if extended:
+        _name_models(tables, path.parent)
+    if "extends" not in tables:
+        return tables, text
+    name = tables.pop("extends")
+    if not isinstance(name, str) or path in extended or len(extended) > MAX_EXTENDS:
+        raise AssetError(
+            f"{path}: extends = {name!r} leads to no catalogue that stands by itself; name a house"
+        )
+    base, base_text = read_tables(house.base or parse_house(name, path.parent), (*extended, path))
+    for key, table in tables.items():
+        mergeable = isinstance(table, dict) and isinstance(base.get(key), dict)
+        base[key] = {**base[key], **table} if mergeable else table
+    return base, base_text + text
+
+
+def _name_models(tables: dict[str, Any], folder: Path) -> None:
+    """Name the model files that lie beside a catalogue absolutely, in place, for use in another folder."""
+    entries = [tables.get("house")]
+    for table in ("receptacles", "objects"):
+        if isinstance(tables.get(table), dict):
+            entries += tables[table].values()
+    for entry in entries:
+        if isinstance(entry, dict) and isinstance(entry.get("model"), str):
+            beside = folder / entry["model"]
+            if is_file(beside):
+                entry["model"] = str(beside)

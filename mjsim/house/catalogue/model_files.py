@@ -1,0 +1,108 @@
+"""Reading MJCF files, and telling by a hash whether any file of a house has changed."""
+
+import hashlib
+import shutil
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import mujoco
+
+from mjsim.house.catalogue.assets import models_root
+from mjsim.support.files import is_file, read_bytes
+from mjsim.values.errors import AssetError
+
+
+def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
+    """Read an MJCF file that has a top-level body, with asset files named absolutely, since attaching mixes folders."""
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise AssetError(f"cannot read model {path}: {error}") from error
+    if body is not None and (spec.body(body) is None or spec.body(body).parent != spec.worldbody):
+        raise AssetError(f"model {path} has no top-level body {body!r}")
+    name_files(spec, path.parent)
+    return spec
+
+
+def name_files(spec: mujoco.MjSpec, folder: Path) -> None:
+    """Name the asset files of a spec absolutely, in place; `folder` is that of its file."""
+    for mesh in spec.meshes:
+        mesh.file = _absolute(folder, spec.compiler.meshdir, mesh.file)
+    for texture in spec.textures:
+        texture.file = _texture(folder, spec.compiler.texturedir, texture.file)
+        for face, file in enumerate(texture.cubefiles):
+            texture.cubefiles[face] = _texture(folder, spec.compiler.texturedir, file)
+
+
+def copy_house(path: Path, folder: Path) -> None:
+    """Copy the folder of a house into another, with the textures of the package that it uses, for stock MuJoCo."""
+    shutil.copytree(path.parent, folder, dirs_exist_ok=True)
+    found = list(elements(path))
+    directory = next((e.get("texturedir", "") for e in found if e.tag == "compiler"), "")
+    for name in [name for e in found if e.tag == "texture" and (name := e.get("file"))]:
+        source = Path(_texture(path.parent, directory, name))
+        if not (folder / directory / name).exists() and is_file(source):
+            (folder / directory).mkdir(exist_ok=True)
+            shutil.copyfile(source, folder / directory / name)
+
+
+def elements(path: Path) -> Iterator[ET.Element]:
+    """All elements of an MJCF file and of the files that it includes; of files that are not XML, none."""
+    yield from _elements(str(path), str(path.parent), {})
+
+
+def content_hash(text: str, models: Iterable[Path]) -> str:
+    """64 hex digits over a text and the bytes of MJCF files, with every file that they include or refer to.
+
+    A file that is missing or cannot be parsed is no error here: reading the model reports it.
+    """
+    files: dict[str, bytes] = {}
+    for model in models:
+        elements = list(_elements(str(model), str(model.parent), files))
+        settings = {name: value for e in elements if e.tag == "compiler" for name, value in e.items()}
+        for element in elements:
+            for name in [name for name in element.attrib if name.startswith("file")]:
+                kind = "texturedir" if element.tag == "texture" else "meshdir"
+                folder = settings.get(kind, settings.get("assetdir", ""))
+                file = f"{model.parent}/{folder}/{element.get(name)}"
+                if not _read(file, files) and element.tag == "texture":
+                    _read(_texture(model.parent, folder, element.get(name, "")), files)
+    # In the order in which they are referred to: two files that swap their contents are another house.
+    digests = [hashlib.sha256(content).digest() for content in files.values()]
+    return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
+
+
+def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
+    """All elements of an MJCF file in a folder and of the files that it includes; adds these to `files`."""
+    if path in files or not _read(path, files):
+        return
+    try:
+        root = ET.fromstring(files[path])
+    except ET.ParseError:
+        return
+    for element in root.iter():
+        yield element
+        if element.tag == "include":
+            yield from _elements(f"{folder}/{element.get('file')}", folder, files)
+
+
+def _read(path: str, files: dict[str, bytes]) -> bool:
+    if path not in files:
+        try:
+            files[path] = read_bytes(Path(path))
+        except FileNotFoundError:
+            return False
+        except OSError as error:
+            raise AssetError(f"cannot read {path}: {error.strerror}; give a file") from error
+    return True
+
+
+def _texture(folder: Path, subfolder: str, file: str) -> str:
+    """A texture beside the model, else of those that come with the package."""
+    beside, shared = _absolute(folder, subfolder, file), models_root() / "textures" / file
+    return str(shared) if file and not is_file(Path(beside)) and is_file(shared) else beside
+
+
+def _absolute(folder: Path, subfolder: str, file: str) -> str:
+    return str((folder / subfolder / file).resolve()) if file else file

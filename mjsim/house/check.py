@@ -1,0 +1,173 @@
+"""The report that `mjsim check` gives of a house, a receptacle, an object or an episode."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import CATALOGUE
+from mjsim.house.catalogue.model_files import elements
+from mjsim.house.compiled.house import CompiledHouse, compiled_house
+from mjsim.house.scene.episode_rules import check_fit, check_overlaps, check_poses, check_reach
+from mjsim.house.scene.sampling import points_that_fit, sample_episode
+from mjsim.house.scene.scene import assemble
+from mjsim.house.validation.checked_model import Compiled, compile_model
+from mjsim.house.validation.findings import Finding, errors
+from mjsim.house.validation.object_rules import check_object
+from mjsim.house.validation.receptacle_rules import check_receptacle
+from mjsim.house.validation.validate import check_house, require_usable
+from mjsim.house.validation.views import Drawing, floor_view, side_views
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, SamplingError
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What a check found."""
+
+    kind: str  # `house`, `receptacle`, `object` or `episode`
+    path: str  # what was checked
+    findings: tuple[Finding, ...]  # every fault, errors first
+    facts: Mapping[str, str] = field(default_factory=dict)  # what is good to know: name -> text
+    views: tuple[Drawing, ...] = ()  # drawings, for a picture; empty where nothing could be compiled
+
+    def __post_init__(self) -> None:
+        ordered = sorted(self.findings, key=lambda f: f.severity != "error")
+        object.__setattr__(self, "findings", tuple(ordered))
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is no error."""
+        return not errors(self.findings)
+
+
+Load = Callable[[str], Catalogue]  # from the name of a house
+
+
+def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> Report:
+    """Check a catalogue, its folder, a house by name, an MJCF file, or an episode.
+
+    Args:
+        name: What to check.
+        house: Name of an episode's house, if not its own.
+        load: Loads the house; `mjsim.load_catalogue` also generates it.
+    """
+    path = Path(name)
+    if path.suffix == ".json":
+        return check_episode_file(path, house, load)
+    if path.suffix == ".xml":
+        return _check_model(path, load)
+    if path.is_dir() and not (path / CATALOGUE).is_file():
+        raise AssetError(f"no {CATALOGUE} in {path}; give a house's folder, or one of its files")
+    return check_house_name(str(path / CATALOGUE) if path.is_dir() else name, load)
+
+
+def check_house_name(name: str, load: Load = Catalogue.load) -> Report:
+    """Check a house with its receptacles and objects, and sample it."""
+    try:
+        catalogue = load(name)
+    except AssetError as error:
+        return Report("house", name, (_unreadable("catalogue", error),))
+    house = compiled_house(catalogue)
+    found = house.once("findings", lambda: check_house(house))
+    if errors(found):
+        return Report("house", name, tuple(found), views=_partial_view(catalogue))
+    fits, more = _check_sampling(house)
+    xmin, ymin, xmax, ymax = house.rooms.bounds
+    facts = {
+        "size": f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m",
+        "rooms": str(len(catalogue.rooms)),
+        "receptacles": str(len(catalogue.receptacles)),
+        "object models": str(len(catalogue.objects)),
+        "floor": f"{house.rooms.area:.1f} m2",
+        "points that fit": f"{fits}{' or more' if fits == (catalogue.points or POINTS) else ''}",
+    }
+    compiled = Compiled.of("house", catalogue.house_path, house.model)
+    view = floor_view(compiled, house.rooms, house.receptacles)
+    return Report("house", name, (*found, *more), facts, (view,))
+
+
+def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
+    """How many points fit, and what goes wrong when objects are dropped there."""
+    keep_away = np.array([r.center[:2] for r in house.receptacles.values()])
+    meant = house.catalogue.points or POINTS
+    fits = points_that_fit(house.navigable, keep_away, meant)
+    found = []
+    if fits < meant:
+        found.append(
+            Finding(
+                "points",
+                "house",
+                f"{fits} of {meant} points fit at least 1 m from each other and from the receptacles",
+                f"sample it with --points {max(fits - 2, 1)}, or enlarge it",
+                "warning" if fits else "error",
+            )
+        )
+    if fits:
+        pool = max(1, fits - 2 if fits < meant else fits)
+        objects = min(pool, len(house.catalogue.objects))
+        try:
+            sample_episode(house.catalogue, house.navigable, objects=objects, seed=0, points=pool)
+        except (SamplingError, PhysicsError) as error:
+            found.append(
+                Finding("sampling", "house", f"{objects} objects cannot be dropped: {error}", "see there")
+            )
+    return fits, found
+
+
+def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> Report:
+    """Check an episode against its house, or against another one."""
+    try:
+        episode = Episode.load(path)
+    except EpisodeError as error:
+        return Report("episode", str(path), (_unreadable("episode", error),))
+    try:
+        catalogue = load(house or episode.house)
+        built = compiled_house(catalogue)
+        require_usable(built)
+    except AssetError as error:
+        return Report("episode", str(path), (_unreadable("house", error),))
+    found = [*check_fit(episode, catalogue), *check_poses(episode, built.rooms)]
+    compiled = Compiled.of("house", catalogue.house_path, built.model)
+    view = floor_view(compiled, built.rooms, built.receptacles, episode)
+    if not errors(found):
+        scene = assemble(episode, catalogue)
+        found += check_overlaps(episode, scene.model, scene.index.geom_owner)
+        found += check_reach(episode, built.navigable)
+    facts = {"house": catalogue.name, "objects": str(len(episode.objects)), "seed": str(episode.seed)}
+    return Report("episode", str(path), tuple(found), facts, (view,))
+
+
+def _check_model(path: Path, load: Load) -> Report:
+    """Check an MJCF file by the body that it has."""
+    if not path.is_file():
+        raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
+    bodies = {e.get("name") for e in elements(path) if e.tag == "body"}
+    if "receptacle" in bodies:
+        findings, kind = check_receptacle(path), "receptacle"
+    elif "object" in bodies or not path.with_name(CATALOGUE).is_file():
+        findings, kind = check_object(path), "object"
+    else:
+        return check_house_name(str(path.with_name(CATALOGUE)), load)
+    compiled = compile_model(kind, path)
+    if not isinstance(compiled, Compiled) or not len(compiled.solid):
+        return Report(kind, str(path), tuple(findings))
+    size = np.ptp(compiled.extent(compiled.solid), axis=0)
+    facts = {
+        "size": " x ".join(f"{s:.3f}" for s in size) + " m",
+        "mass": f"{compiled.model.body_mass.sum():.3g} kg",
+        "parts": f"{len(compiled.solid)} collide, {len(compiled.shown)} are seen",
+    }
+    return Report(kind, str(path), tuple(findings), facts, side_views(compiled))
+
+
+def _partial_view(catalogue: Catalogue) -> tuple[Drawing, ...]:
+    compiled = compile_model("house", catalogue.house_path)
+    return (floor_view(compiled),) if isinstance(compiled, Compiled) else ()
+
+
+def _unreadable(subject: str, error: Exception) -> Finding:
+    message, _, remedy = " ".join(str(error).split()).rpartition("; ")
+    return Finding("file", subject, message or remedy, remedy if message else "correct the file")

@@ -1,0 +1,1 @@
+"""The compiled house without objects and person: rooms, receptacles, floor, rays."""

@@ -1,0 +1,84 @@
+"""Ray casts against the compiled model: the nearest geom, and lines of sight."""
+
+import math
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# What collides: structure and furniture (0), collision guards (3); not ceilings (1), decoration (2) or the person (4).
+SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
+DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # what the first-person view shows
+RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
+_SKIP = 1e-6  # share of a ray that is skipped to get through a surface
+_MAX_SKIPS = 32
+
+
+def first_hit(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    start: ArrayLike,
+    ray: ArrayLike,
+    *,
+    groups: NDArray[np.uint8] = SOLID,
+    through: Mask | None = None,
+    without: int = -1,
+    reach: float = math.inf,
+) -> tuple[float, int]:
+    """Distance and id of the nearest geom along a ray, infinity and -1 where there is none.
+
+    Args:
+        start, ray: Start, m, and direction, (3,); distances are in units of its length.
+        groups: Which geom groups count, (6,).
+        through: Geoms that the ray passes through, (ngeom,); None for none.
+        without: Body that counts as absent, so that what touches its surface is found too; -1 for none.
+        reach: Where the ray ends; later hits may be reported or not.
+    """
+    origin, along = np.asarray(start, np.float64), np.asarray(ray, np.float64)
+    geom, travelled = np.zeros(1, np.int32), 0.0
+    for _ in range(_MAX_SKIPS):
+        distance = mujoco.mj_ray(model, data, origin + travelled * along, along, groups, True, without, geom)
+        if distance < 0 or travelled > reach:
+            break
+        travelled += distance
+        if through is None or not through[geom[0]]:
+            return travelled, int(geom[0])
+        travelled += _SKIP
+    return math.inf, -1
+
+
+def moving_geoms(model: mujoco.MjModel) -> Mask:
+    """Which geoms can move, (ngeom,)."""
+    return np.asarray(model.body_weldid[model.geom_bodyid] != 0)
+
+
+def sees(model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, point: Floats) -> bool:
+    """Whether no static solid geom lies between two points (3,), m."""
+    return first_hit(model, data, eye, point - eye, through=moving_geoms(model), reach=1.0)[0] >= 1.0
+
+
+def receptacle_in_sight(
+    model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, receptacle: ReceptacleGeometry
+) -> bool:
+    """Whether the top of a receptacle's volume is visible from an eye (3,), m, at its middle or at the nearest point.
+
+    The receptacle's own rim does not hide it: a geom within its outline is taken to be part of it.
+    """
+    half, through = receptacle.half_size, moving_geoms(model)
+    nearest = np.clip(
+        (receptacle.rotation.T @ (eye - receptacle.center))[:2], -0.8 * half[:2], 0.8 * half[:2]
+    )
+    for at in (np.zeros(2), nearest):
+        towards = receptacle.center + receptacle.rotation @ np.array([*at, half[2]]) - eye
+        distance, _ = first_hit(model, data, eye, towards, through=through)
+        if distance >= 1.0:
+            return True
+        local = receptacle.rotation.T @ (eye + distance * towards - receptacle.center)
+        if np.all(np.abs(local[:2]) <= half[:2] + RIM):
+            return True
+    return False

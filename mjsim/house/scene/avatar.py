@@ -1,0 +1,271 @@
+"""The person's body: two slides and a yaw joint for walking, a head that pitches, and two hands that hold by welds.
+
+Contact bits are set here only. Two geoms collide when contype of one shares a bit with conaffinity of the other:
+
+    geoms                     contype   conaffinity   collides with
+    static (MuJoCo default)   1         1             objects, trunk
+    objects (set here)        4         1 | 4         static, objects, foot
+    avatar trunk              0         1             static
+    avatar foot               0         4             objects
+    hands                     0         0             nothing
+
+Each joint's `ref` is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is the
+person's x in the house, m, and `qpos` of `avatar/left/z` is the height of the left hand, m.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsim.house.scene.hand_look import draw_hand
+from mjsim.values.errors import AssetError
+from mjsim.values.person_parameters import PersonParameters
+
+STATIC_BIT = 1
+OBJECT_BIT = 4
+
+PREFIX = "avatar/"
+BASE = "avatar/base"  # slides along x and y
+SOLE = "avatar/sole"  # fixed to the base; collides with objects
+BODY = "avatar/body"  # yaws on the base; parent of head and hands
+HEAD = "avatar/head"
+EYE = "avatar/eye"
+TRUNK = "avatar/trunk"
+FOOT = "avatar/foot"
+HANDS = ("left", "right")
+GRIPS = (0, 1)
+GENTLE, FIRM = "gentle", "firm"  # how a hand holds
+
+SIDES = 64  # of the prisms of trunk and foot
+# Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
+# of the object's weight, so that a person steps over an object which a wall holds back. The high damping ties the
+# force to speed, so that such an object neither pushes the person away nor flies off.
+_FOOT_CONTACT = (0.1, 3.0, 0.2)
+EYE_FORWARD = 0.06
+START_PITCH = math.radians(-12.0)
+PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
+# Postures of a hand in the body frame of a person of usual eye height: forward, to its own side, up; m.
+REST = (0.34, 0.27, 1.00)
+CARRY = (0.50, 0.24, 1.25)
+TUCKED = (0.27, 0.19, 1.22)
+ASIDE = (0.30, 0.42, 1.26)
+HAND_KP, HAND_KV = 2000.0, 130.0
+HAND_FORCE = 80.0
+
+# Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object
+# upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by less
+# than 2 degrees even when the object brushes a door frame at walking speed.
+WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
+
+_TORQUESCALE = 10  # index in a weld's data
+
+
+def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
+    """Name of the weld that holds `instance` in `hand` at its grip site 0 or 1, `GENTLE` or `FIRM`."""
+    return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
+
+
+def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> tuple[float, float, float]:
+    """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m.
+
+    Who has lower eyes, m, holds the hands lower in proportion.
+    """
+    forward, side, up = place
+    return forward, side if hand == 0 else -side, up * (eye_height / PersonParameters.eye_height)
+
+
+def eye_position(
+    x: float, y: float, heading: float, pitch: float, eye_height: float
+) -> tuple[float, float, float]:
+    """Eye position in the house, m, of a person at (x, y), with heading and head pitch, rad; lengths in m."""
+    out = EYE_FORWARD * math.cos(pitch)
+    height = eye_height + EYE_FORWARD * math.sin(pitch)
+    return x + out * math.cos(heading), y + out * math.sin(heading), height
+
+
+def attach_avatar(
+    spec: mujoco.MjSpec,
+    object_names: Sequence[str],
+    *,
+    start: tuple[float, float, float],
+    person: PersonParameters,
+) -> None:
+    """Add the person at `start` (m, m, rad), and inactive welds between each hand and each object, in place.
+
+    `AssetError` where an instance has no body `<instance>/object` or lacks a grip site.
+    """
+    _set_object_bits(spec, object_names)
+    body = _add_body(spec, start, person.body_radius)
+    _add_head(spec, body, person)
+    for number, hand in enumerate(HANDS):
+        _add_hand(spec, body, hand, posture(number, REST, person.eye_height))
+    _declare_welds(spec, object_names)
+
+
+def _angle(spec: mujoco.MjSpec, radians: float) -> float:
+    """An angle in the unit that the spec's compiler reads."""
+    return math.degrees(radians) if spec.compiler.degree else radians
+
+
+def _yaw_quaternion(yaw: float) -> list[float]:
+    return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
+
+
+def _set_object_bits(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
+    for name in object_names:
+        body = spec.body(f"{name}/object")
+        if body is None:
+            raise AssetError(
+                f"the scene has no body '{name}/object'; attach the object model with prefix '{name}/'"
+            )
+        for geom in body.find_all(mujoco.mjtObj.mjOBJ_GEOM):
+            if geom.contype or geom.conaffinity:
+                geom.contype = OBJECT_BIT
+                geom.conaffinity = STATIC_BIT | OBJECT_BIT
+
+
+def _set_inertia(
+    body: Any, mass: float, inertia: Sequence[float], centre: Sequence[float] = (0, 0, 0)
+) -> None:
+    body.explicitinertial = True
+    body.mass = mass
+    body.inertia = list(inertia)
+    body.ipos = list(centre)
+
+
+def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: float) -> Any:
+    x, y, heading = start
+    # The base does not turn, because a contact off its axis would spin the body.
+    base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
+    _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
+    slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
+    base.add_joint(name=PREFIX + "x", type=slide, axis=[1, 0, 0], ref=x)
+    base.add_joint(name=PREFIX + "y", type=slide, axis=[0, 1, 0], ref=y)
+    body = base.add_body(name=BODY, quat=_yaw_quaternion(heading))
+    _set_inertia(body, 10.0, (2.0, 2.0, 1.5), (0.0, 0.0, 0.9))
+    body.add_joint(name=PREFIX + "yaw", type=hinge, axis=[0, 0, 1], ref=_angle(spec, heading))
+    for name, kv, force in (("x", 7000.0, 600.0), ("y", 7000.0, 600.0), ("yaw", 300.0, 150.0)):
+        _add_actuator(spec, name, kp=0.0, kv=kv, force=force)
+    base.add_geom(
+        name=TRUNK,
+        pos=[0, 0, 0.88],
+        conaffinity=STATIC_BIT,
+        condim=1,  # no friction: the person slides along walls
+        priority=2,
+        solref=[0.008, 1],
+        solimp=[0.98, 0.995, 0.001, 0.5, 2],
+        **_prism(spec, TRUNK, radius, 0.84),
+    )
+    # Soft, and lower than any carried object: it pushes light objects along the floor without launching them. It
+    # reaches below the floor, so that it touches flat objects with its side and never stands on them.
+    # It has its own body because the broad phase filters by body, and the foot never collides with the house.
+    sole = base.add_body(name=SOLE)
+    sole.fuse = 0
+    _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
+    sole.add_geom(
+        name=FOOT,
+        pos=[0, 0, 0.18],
+        conaffinity=OBJECT_BIT,
+        condim=3,
+        priority=1,
+        solref=list(_FOOT_CONTACT[:2]),
+        solimp=[_FOOT_CONTACT[2], _FOOT_CONTACT[2], 0.001, 0.5, 2.0],
+        friction=[0.3, 0.005, 0.0001],
+        **_prism(spec, FOOT, radius, 0.48),
+    )
+    return body
+
+
+def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) -> dict[str, Any]:
+    """Arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
+
+    Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box;
+    meshes do not.
+    """
+    angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
+    ring = radius * np.column_stack((np.cos(angles), np.sin(angles)))
+    vertices = [(*point, z) for point in ring.tolist() for z in (-half_height, half_height)]
+    spec.add_mesh(name=name, uservert=np.ravel(vertices))
+    return {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name, "group": 4, "contype": 0, "mass": 0.0}
+
+
+def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
+    """A velocity servo if kp is 0, else a position servo with damping.
+
+    The activation is the target and the control its rate of change, so that the target follows a ramp over the physics
+    steps of one control step.
+    """
+    spec.add_actuator(
+        name=PREFIX + joint,
+        target=PREFIX + joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
+        actearly=True,  # the ramp begins with the first physics step
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        gainprm=[kp or kv] + [0.0] * 9,
+        biasprm=[0.0, -kp, -kv] + [0.0] * 7,
+        forcelimited=1,
+        forcerange=[-force, force],
+    )
+
+
+def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
+    # The hinge's axis is -y, so that a positive pitch looks up.
+    half = -START_PITCH / 2
+    head = body.add_body(
+        name=HEAD, pos=[0, 0, person.eye_height], quat=[math.cos(half), 0, math.sin(half), 0]
+    )
+    head.gravcomp = 1.0
+    _set_inertia(head, 4.0, (0.03, 0.03, 0.03))
+    head.add_joint(
+        name=PREFIX + "pitch",
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, -1, 0],
+        ref=_angle(spec, START_PITCH),
+    )
+    _add_actuator(spec, "pitch", kp=60.0, kv=3.0, force=30.0)
+    # Camera axes: x to the person's right, y up, looking along -z.
+    fovy = round(math.degrees(person.vertical_field), 9)
+    head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=fovy)
+
+
+def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, float, float]) -> None:
+    side = math.copysign(1.0, position[1])
+    node = body.add_body(name=f"{PREFIX}{hand}_hand", pos=list(position))
+    node.gravcomp = 1.0
+    _set_inertia(node, 1.0, (0.002, 0.002, 0.002))
+    for axis, start in zip("xyz", position, strict=True):
+        node.add_joint(
+            name=f"{PREFIX}{hand}/{axis}",
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=[float(axis == a) for a in "xyz"],
+            ref=start,
+        )
+        _add_actuator(spec, f"{hand}/{axis}", kp=HAND_KP, kv=HAND_KV, force=HAND_FORCE)
+    node.add_site(name=f"{PREFIX}{hand}_grip", pos=[0, 0, 0], size=[0.005, 0.005, 0.005], group=4)
+    draw_hand(node, f"{PREFIX}{hand}", side)
+
+
+def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
+    """An inactive site-to-site weld for each hand, object, grip site and kind; inactive welds cost no time."""
+    for name, grip in itertools.product(object_names, GRIPS):
+        site = f"{name}/grip_{grip}"
+        if spec.site(site) is None:
+            raise AssetError(f"object '{name}' has no site '{site}'; see docs/models.md, 'An object'")
+        for hand, (kind, (time, torque, low, high)) in itertools.product(HANDS, WELDS.items()):
+            weld = spec.add_equality(
+                name=grip_name(hand, name, grip, kind),
+                type=mujoco.mjtEq.mjEQ_WELD,
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                name1=f"{PREFIX}{hand}_grip",
+                name2=site,
+                active=False,
+                solref=[time, 1.0],
+                solimp=[low, high, 0.001, 0.5, 2.0],
+            )
+            weld.data[_TORQUESCALE] = torque

@@ -1,0 +1,175 @@
+"""Rules of an episode: it fits its house, and everything in it lies free within a person's reach."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.navigable import NavigablePoints
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.scene.avatar import PREFIX, TRUNK
+from mjsim.house.validation.findings import Finding
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.person_parameters import PersonParameters
+
+MAX_OBJECTS = 200
+FULL = 8  # objects that a receptacle is sure to hold
+HEIGHTS = (-0.02, 1.5)  # m, of an object's origin
+UNIT = 0.01  # greatest deviation of a quaternion's norm from 1
+OVERLAP = 0.005  # m, between what starts
+REACH = PersonParameters().reach  # m, from where a person can stand to an object
+OUTSIDE = 0.05  # m, out of a room
+NAME = re.compile(r"[A-Za-z0-9_.-]+")
+
+
+def check_fit(episode: Episode, catalogue: Catalogue) -> Iterator[Finding]:
+    """What the catalogue does not know, or knows otherwise."""
+    if len(episode.objects) > MAX_OBJECTS:
+        yield _episode("objects", f"has {len(episode.objects)} objects", f"use at most {MAX_OBJECTS}")
+    unknown = sorted(set(episode.receptacles) - set(catalogue.receptacles))
+    if unknown:
+        yield _episode(
+            "receptacles",
+            f"names the receptacles {unknown}, which catalogue {catalogue.name!r} does not have",
+            f"it has {sorted(catalogue.receptacles)}",
+        )
+    for placed in episode.objects:
+        yield from _check_object(placed, episode.targets[placed.name], catalogue)
+    for key, count in Counter(episode.targets.values()).items():
+        if count > FULL:
+            yield Finding(
+                "objects",
+                f"receptacle {key}",
+                f"has to take {count} objects",
+                f"give it {FULL} at most, or see that they fit",
+                "warning",
+            )
+
+
+def _check_object(placed: PlacedObject, target: str, catalogue: Catalogue) -> Iterator[Finding]:
+    name = placed.name
+    if not NAME.fullmatch(name) or name in catalogue.receptacles or f"{name}/" == PREFIX:
+        yield Finding(
+            "names",
+            f"object {name!r}",
+            "has a name that cannot be used in a scene",
+            "use letters, digits and _, such as object_07, and not the key of a receptacle",
+        )
+    model = catalogue.objects.get(placed.model)
+    if model is None:
+        yield Finding(
+            "objects",
+            name,
+            f"is a {placed.model!r}, which catalogue {catalogue.name!r} does not have",
+            f"it has {sorted(catalogue.objects)}",
+        )
+        return
+    if placed.category != model.category:
+        yield Finding(
+            "objects",
+            name,
+            f"is of category {placed.category!r}, but a {placed.model!r} is of {model.category!r}",
+            "correct the category or the model",
+        )
+    elif target != catalogue.categories[model.category].receptacle:
+        yield Finding(
+            "receptacles",
+            name,
+            f"is to go into {target!r}, but {model.category!r} go into "
+            f"{catalogue.categories[model.category].receptacle!r}",
+            "correct its target",
+        )
+
+
+def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
+    """The start and the objects are in the house, and the objects have an orientation."""
+    start = episode.start
+    if not rooms.contains((start.x, start.y), margin=OUTSIDE):
+        yield Finding(
+            "start",
+            "start",
+            f"at ({start.x:.2f}, {start.y:.2f}) lies outside of every room",
+            "move it into one",
+            place=(start.x, start.y, 0.0),
+        )
+    for placed in episode.objects:
+        norm = float(np.linalg.norm(placed.quaternion))
+        if abs(norm - 1.0) > UNIT:
+            yield Finding(
+                "poses",
+                placed.name,
+                f"has the quaternion {list(placed.quaternion)} of norm {norm:.3g}",
+                "give one of norm 1, such as (1, 0, 0, 0)",
+                place=placed.position,
+            )
+        if not HEIGHTS[0] <= placed.position[2] <= HEIGHTS[1]:
+            yield Finding(
+                "poses",
+                placed.name,
+                f"is at z = {placed.position[2]:.2f} m",
+                "put it onto the floor: z = 0",
+                place=placed.position,
+            )
+        elif not rooms.contains(placed.position[:2], margin=OUTSIDE):
+            yield Finding(
+                "poses",
+                placed.name,
+                f"at ({placed.position[0]:.2f}, {placed.position[1]:.2f}) lies outside of every room",
+                "move it into one",
+                place=placed.position,
+            )
+
+
+def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:
+    """Nothing starts inside of something else; `owner` (ngeom,) is the object of each geom, or -1."""
+    data = mujoco.MjData(model)
+    mujoco.mj_fwdPosition(model, data)
+    trunk = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TRUNK)
+    deep = np.flatnonzero(data.contact.dist < -OVERLAP) if data.ncon else ()
+    reported = set()
+    for contact in deep:
+        first, second = sorted(data.contact.geom[contact].tolist(), key=lambda g: (owner[g] < 0, g))
+        # The person pushes objects out of the way, but not walls.
+        if trunk in (first, second):
+            what, subject = "a wall or a piece of furniture", "start"
+        elif owner[first] < 0:
+            continue
+        else:
+            subject = episode.objects[owner[first]].name
+            other = int(owner[second])
+            what = episode.objects[other].name if other >= 0 else "a wall, the floor or a piece of furniture"
+            if model.geom(second).name.startswith(PREFIX):
+                continue
+        if (subject, what) not in reported:
+            reported.add((subject, what))
+            yield Finding(
+                "overlap",
+                subject,
+                f"overlaps {what} by {-1000 * data.contact.dist[contact]:.0f} mm",
+                "move it to where it lies free",
+                place=tuple(data.contact.pos[contact].tolist()),
+            )
+
+
+def check_reach(episode: Episode, navigable: NavigablePoints) -> Iterator[Finding]:
+    """A person at the start can walk to within reach of every object."""
+    places = [("start", (episode.start.x, episode.start.y), 0.25)]
+    places += [(o.name, o.position[:2], REACH) for o in episode.objects]
+    for subject, xy, limit in places:
+        gap = float(np.hypot(*(navigable.snap(xy, np.inf) - xy)))
+        if gap > limit:
+            yield Finding(
+                "reach",
+                subject,
+                f"at ({xy[0]:.2f}, {xy[1]:.2f}) is {gap:.2f} m from where a person can walk",
+                f"move it to at most {limit} m",
+                place=(*xy, 0.0),
+            )
+
+
+def _episode(rule: str, message: str, remedy: str) -> Finding:
+    return Finding(rule, "episode", message, remedy)

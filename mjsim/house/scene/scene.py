@@ -1,0 +1,213 @@
+"""Composition of a house, its receptacles and an episode's objects into one compiled model (MjSpec)."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TypeVar, cast
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.bounding_volumes import tighten
+from mjsim.house.compiled.house import compile_errors, compiled_house
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.scene.avatar import attach_avatar
+from mjsim.house.scene.episode_rules import check_fit, check_overlaps, check_poses
+from mjsim.house.validation.findings import Finding, errors, one_line
+from mjsim.house.validation.validate import require_usable
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.errors import AssetError, EpisodeError
+from mjsim.values.person_parameters import PersonParameters
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class SceneIndex:
+    """Where each object lives in the model's and the state's arrays, in the episode's order."""
+
+    names: tuple[str, ...]  # instance names
+    bodies: NDArray[np.int32]  # body ids, (n,)
+    qpos: NDArray[np.int32]  # first `qpos` address of each free joint (3 position, 4 quaternion), (n,)
+    dofs: NDArray[np.int32]  # first `qvel` address (3 linear, 3 angular), (n,)
+    trees: NDArray[np.int32]  # kinematic tree ids, for sleep states, (n,)
+    geom_owner: NDArray[np.int32]  # per geom, the position of its object in this order, or -1, (ngeom,)
+    _rows: NDArray[np.intp] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_rows", self.qpos[:, None].astype(np.intp) + np.arange(7))
+
+    @classmethod
+    def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
+        """Look the objects up in a compiled model; `AssetError` where it lacks the body or the free joint of one."""
+        bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
+        joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
+        owner_of_body = np.full(model.nbody, -1, np.int32)
+        for position, body in enumerate(bodies):
+            owner_of_body[model.body_rootid == body] = position
+        return cls(
+            names=names,
+            bodies=bodies,
+            qpos=model.jnt_qposadr[joints].astype(np.int32),
+            dofs=model.jnt_dofadr[joints].astype(np.int32),
+            trees=model.body_treeid[bodies].astype(np.int32),
+            geom_owner=owner_of_body[model.geom_bodyid],
+        )
+
+    def position_of(self, name: str) -> int:
+        """Position of an instance in the episode's order.
+
+        Raises:
+            EpisodeError: No such instance.
+        """
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise EpisodeError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
+
+    def body(self, name: str) -> int:
+        """Body id of an instance; raises `EpisodeError` for an unknown one."""
+        return int(self.bodies[self.position_of(name)])
+
+    def geoms(self, name: str) -> NDArray[np.intp]:
+        """Geom ids of an instance, shape (its geoms,); raises `EpisodeError` for an unknown one."""
+        return np.flatnonzero(self.geom_owner == self.position_of(name))
+
+    def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions (n, 3), m, and quaternions wxyz (n, 4) of all objects, copied out of a `qpos`."""
+        rows = qpos[self._rows]
+        return rows[:, :3], rows[:, 3:]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A compiled episode.
+
+    Attributes:
+        model: The compiled model; its `qpos0` holds the episode's poses.
+        episode: What it was composed from.
+        catalogue: The house's catalogue.
+        index: Where the objects are in the state.
+        rooms: Which room a point is in.
+        receptacles: Receptacle key -> geometry.
+        spec: The editable description, for export.
+        person: Size, reach and speeds of the person.
+        visuals: Whether the model includes what is only drawn.
+    """
+
+    model: mujoco.MjModel
+    episode: Episode
+    catalogue: Catalogue
+    index: SceneIndex
+    rooms: RoomMap
+    receptacles: Mapping[str, ReceptacleGeometry]
+    spec: mujoco.MjSpec
+    person: PersonParameters
+    visuals: bool
+    _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
+
+    def once(self, key: str, make: Callable[[], T]) -> T:
+        """The cached result of `make`, which is called once per `key`."""
+        if key not in self._derived:
+            self._derived[key] = make()
+        return cast(T, self._derived[key])
+
+    def counterpart(self, *, visuals: bool) -> "Scene":
+        """The same episode, with the person, with or without what is only drawn; states fit both."""
+        if visuals == self.visuals:
+            return self
+        return self.once(
+            "counterpart", lambda: assemble(self.episode, self.catalogue, person=self.person, visuals=visuals)
+        )
+
+
+def compose(
+    episode: Episode,
+    catalogue: Catalogue,
+    *,
+    person: PersonParameters | None = None,
+    avatar: bool = True,
+    visuals: bool = True,
+) -> Scene:
+    """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
+
+    Args:
+        episode: What to compose.
+        catalogue: Catalogue of the episode's house.
+        person: Size, reach and speeds of the person; None for the default.
+        avatar: Whether to add the person's body.
+        visuals: Whether to include what is only drawn. Without it a scene moves the same, compiles faster and steps
+            faster, but cannot be rendered.
+
+    Raises:
+        AssetError: The house of a user breaks a convention of docs/models.md, or a model does not compile.
+        EpisodeError: The episode does not fit the catalogue, or something starts outside of the house or inside of
+            something else.
+    """
+    _require(check_fit(episode, catalogue), episode)
+    if avatar:  # without one, things are still to fall into place
+        _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
+    scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
+    if avatar:
+        _require(check_overlaps(episode, scene.model, scene.index.geom_owner), episode)
+    return scene
+
+
+def assemble(
+    episode: Episode,
+    catalogue: Catalogue,
+    *,
+    person: PersonParameters | None = None,
+    avatar: bool = True,
+    visuals: bool = True,
+) -> Scene:
+    """As `compose`, for an episode whose poses need not make sense."""
+    person = person or PersonParameters()
+    house = compiled_house(catalogue)
+    require_usable(house)
+    spec = house.spec(visuals=visuals)
+    spec.copy_during_attach = True
+    names = tuple(o.name for o in episode.objects)
+    with compile_errors(f"episode {episode.seed} of house {catalogue.house_path}"):
+        for placed in episode.objects:
+            model = house.object_spec(catalogue.objects[placed.model].path, visuals=visuals)
+            _attach_object(spec, model, placed)
+        if avatar:
+            start = episode.start
+            attach_avatar(spec, names, start=(start.x, start.y, start.heading), person=person)
+        spec.dedup_assets()  # attaching copies a model's assets for every instance
+        model = spec.compile()
+    tighten(model)
+    return Scene(
+        model=model,
+        episode=episode,
+        catalogue=catalogue,
+        index=SceneIndex.from_model(model, names),
+        rooms=house.rooms,
+        receptacles=house.receptacles,
+        spec=spec,
+        person=person,
+        visuals=visuals,
+    )
+
+
+def _require(findings: Iterable[Finding], episode: Episode) -> None:
+    if found := errors(findings):
+        raise EpisodeError(one_line(found, f"episode {episode.seed} of {episode.house}"))
+
+
+def _attach_object(spec: mujoco.MjSpec, model: mujoco.MjSpec, placed: PlacedObject) -> None:
+    spec.attach(model, prefix=f"{placed.name}/", frame=spec.worldbody.add_frame())
+    body = spec.body(f"{placed.name}/object")
+    body.pos = placed.position
+    body.quat = placed.quaternion
+    body.add_freejoint(name=f"{placed.name}/free")
+
+
+def _find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    found = mujoco.mj_name2id(model, kind, name)
+    if found < 0:
+        raise AssetError(f"the compiled model has no {name!r}; compose it from an episode")
+    return int(found)

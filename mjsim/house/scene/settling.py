@@ -1,0 +1,76 @@
+"""Dropped objects come to rest under physics, in a house without a person."""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene.scene import Scene, compose
+from mjsim.values.episode import Episode, PlacedObject
+from mjsim.values.errors import PhysicsError
+
+REST_SPEED = 0.01  # m/s
+MAX_TIME = 6.0  # s
+MAX_DRIFT = 0.3  # m, from where it was dropped
+MAX_SINK = 0.02  # m below the floor
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Objects after the drop, in the episode's order."""
+
+    objects: tuple[PlacedObject, ...]  # the objects in their settled poses
+    faults: dict[str, str]  # instance name -> why its pose is unusable; empty when all is well
+
+
+def settle(episode: Episode, catalogue: Catalogue) -> Settled:
+    """Run the physics of an empty house until every object sleeps, 6 s at most; `PhysicsError` where it fails.
+
+    An object is at fault when it is then awake and faster than 1 cm/s, when it came to lie more than 0.3 m
+    from its point, or when it left the house.
+    """
+    scene = compose(episode, catalogue, avatar=False, visuals=False)
+    data = mujoco.MjData(scene.model)
+    steps = round(0.1 / scene.model.opt.timestep)
+    while data.time < MAX_TIME and _awake(scene, data).any():
+        mujoco.mj_step(scene.model, data, nstep=steps)
+    moving = _awake(scene, data) & (_speeds(scene, data) >= REST_SPEED)
+    _check_warnings(data, episode)
+    positions, quaternions = scene.index.poses(data.qpos)
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    objects, faults = [], {}
+    for placed, position, quaternion, moves in zip(
+        episode.objects, positions, quaternions, moving, strict=True
+    ):
+        x, y, z = position.tolist()
+        w, i, j, k = quaternion.tolist()
+        objects.append(replace(placed, position=(x, y, z), quaternion=(w, i, j, k)))
+        if fault := _fault(scene, placed, position, moves):
+            faults[placed.name] = fault
+    return Settled(tuple(objects), faults)
+
+
+def _awake(scene: Scene, data: mujoco.MjData) -> NDArray[np.bool_]:
+    return np.asarray(data.tree_asleep[scene.index.trees] < 0)
+
+
+def _speeds(scene: Scene, data: mujoco.MjData) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(data.qvel[scene.index.dofs[:, None] + np.arange(3)], axis=1))
+
+
+def _fault(scene: Scene, placed: PlacedObject, position: NDArray[np.float64], moving: bool) -> str | None:
+    drift = float(np.hypot(*(position[:2] - placed.point)))
+    if not np.isfinite(position).all() or not scene.rooms.contains(position[:2]) or position[2] < -MAX_SINK:
+        return f"left the house for {position.round(2).tolist()}"
+    if drift > MAX_DRIFT:
+        return f"rolled {drift:.2f} m"
+    return f"still moves after {MAX_TIME} s" if moving else None
+
+
+def _check_warnings(data: mujoco.MjData, episode: Episode) -> None:
+    raised = [w for w in range(int(mujoco.mjtWarning.mjNWARNING)) if data.warning[w].number]
+    if raised:
+        names = ", ".join(mujoco.mjtWarning(w).name for w in raised)
+        raise PhysicsError(f"settling episode {episode.seed} of house {episode.house!r} raised {names}")

@@ -1,0 +1,68 @@
+"""The state of a scene without visuals in the model that has them, for looking and drawing."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.scene.scene import Scene
+from mjsim.support.kernels import kernel
+
+Floats = NDArray[np.float64]
+
+
+def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
+    """The scene with visuals and its state, placed as in `data` until the next call with a state of the same scene."""
+    if scene.visuals:
+        return scene, data
+    drawn = scene.once("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
+    drawn.place(data)
+    return drawn.scene, drawn.data
+
+
+class _DrawnState:
+    """Poses of bodies and geoms in a scene with visuals."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.data = scene, mujoco.MjData(scene.model)
+        model, data = scene.model, self.data
+        mujoco.mj_kinematics(model, data)  # places what never moves
+        geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+        self._geoms = (
+            geoms, model.geom_bodyid[geoms], model.geom_pos[geoms], model.geom_quat[geoms],
+            data.geom_xpos, data.geom_xmat,
+        )  # fmt: skip
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Place everything as in the state of a model with the same bodies."""
+        mine = self.data
+        mine.xpos[:], mine.xquat[:], mine.xmat[:] = data.xpos, data.xquat, data.xmat
+        mine.xipos[:], mine.ximat[:] = data.xipos, data.ximat
+        place_geoms(self._geoms, data.xpos, data.xquat, data.xmat)
+
+
+@kernel
+def place_geoms(geoms: Any, positions: Floats, quaternions: Floats, rotations: Floats) -> None:
+    """Place geoms on their bodies, with the operations of MuJoCo in the same order.
+
+    `geoms` holds ids (g,), bodies (g,), positions (g, 3), m, and quaternions (g, 4) in the body frame, and the poses to
+    write, (ngeom, 3) and (ngeom, 9); the other arrays are poses of bodies, as in `MjData`.
+    """
+    ids, bodies, local_positions, local_quaternions, geom_xpos, geom_xmat = geoms
+    for k in range(len(ids)):
+        position, rotation, r = local_positions[k], geom_xmat[ids[k]], rotations[bodies[k]]
+        for i in range(3):
+            offset = r[3 * i] * position[0] + r[3 * i + 1] * position[1] + r[3 * i + 2] * position[2]
+            geom_xpos[ids[k], i] = offset + positions[bodies[k], i]
+        a, b = quaternions[bodies[k]], local_quaternions[k]
+        w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+        x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+        y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+        z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+        rotation[0] = w * w + x * x - y * y - z * z
+        rotation[4] = w * w - x * x + y * y - z * z
+        rotation[8] = w * w - x * x - y * y + z * z
+        rotation[1], rotation[2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        rotation[3], rotation[5] = 2.0 * (x * y + w * z), 2.0 * (y * z - w * x)
+        rotation[6], rotation[7] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)

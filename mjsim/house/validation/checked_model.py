@@ -1,0 +1,200 @@
+"""A model compiled on its own for checking, and the rules that hold for every MJCF file."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.catalogue.model_files import content_hash, elements, name_files
+from mjsim.house.compiled.footprint import outline_points
+from mjsim.house.validation.findings import Finding
+from mjsim.support.files import read_text
+from mjsim.values.errors import AssetError
+
+MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
+LOOK_GROUPS, SOLID_GROUPS = (0, 1, 2), (0, 3)
+_TEXT = ("name", "file", "class", "childclass", "material", "mesh", "texture", "model")
+_KIND = {
+    "nu": "actuators",
+    "ntendon": "tendons",
+    "neq": "equality constraints",
+    "nkey": "keyframes",
+    "nflex": "flexible bodies",
+    "nskin": "skins",
+    "nhfield": "height fields",
+    "npair": "contact pairs",
+    "nplugin": "plugins",
+    "nmocap": "mocap bodies",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Compiled:
+    """A compiled model at rest."""
+
+    subject: str  # what findings call it (`object mug`)
+    path: Path  # its MJCF file
+    model: mujoco.MjModel  # the compiled model
+    data: mujoco.MjData  # its state, with the frames of bodies, geoms and sites
+
+    @classmethod
+    def of(cls, subject: str, path: Path, model: mujoco.MjModel) -> "Compiled":
+        """The model at its initial positions."""
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        return cls(subject, path, model, data)
+
+    @cached_property
+    def solid(self) -> NDArray[np.intp]:
+        """Geoms that collide, shape (k,)."""
+        return np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
+
+    @cached_property
+    def shown(self) -> NDArray[np.intp]:
+        """Geoms that a person sees, shape (k,)."""
+        seen = np.isin(self.model.geom_group, LOOK_GROUPS) & (self.model.geom_rgba[:, 3] > 0)
+        return np.flatnonzero(seen)
+
+    def points(self, geom: int) -> NDArray[np.float64]:
+        """Points (k, 3), m, that span a geom's outline from above and its bounding box."""
+        rotation = self.data.geom_xmat[geom].reshape(3, 3)
+        return outline_points(self.model, geom, self.data.geom_xpos[geom], rotation)
+
+    def extent(self, geoms: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Lower and upper corner of the box around some geoms, m, shape (2, 3)."""
+        points = np.concatenate([self.points(int(g)) for g in geoms])
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def geom_name(self, geom: int) -> str:
+        """A geom's name, or its number and body."""
+        body = self.model.body(int(self.model.geom_bodyid[geom])).name
+        return repr(self.model.geom(geom).name or f"#{geom} of body {body}")
+
+    def site(self, name: str) -> int | None:
+        """Id of a site; None where there is none."""
+        found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name)
+        return None if found < 0 else int(found)
+
+    def error(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
+        """A finding about this model; `place` is (x, y, z), m."""
+        return Finding(rule, self.subject, message, remedy, "error", self.path.name, _place(place))
+
+    def warning(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
+        """A finding that does not make the model unusable; `place` is (x, y, z), m."""
+        return Finding(rule, self.subject, message, remedy, "warning", self.path.name, _place(place))
+
+
+def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
+    """Compile an MJCF file on its own, or say why that cannot be done."""
+    try:
+        read_text(path)
+        content_hash("", [path])  # reads all that the file refers to, or says why not
+        # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
+        if found := list(check_numbers(subject, path)):
+            return found
+        spec = mujoco.MjSpec.from_file(str(path))
+        name_files(spec, path.parent)
+        return Compiled.of(subject, path, spec.compile())
+    except OSError as error:
+        message, remedy = f"{path} cannot be read: {error.strerror}", "correct the path"
+    except AssetError as error:
+        message, _, remedy = str(error).rpartition("; ")
+    except UnicodeDecodeError as error:
+        message, remedy = f"is not UTF-8 at byte {error.start}", "save it as UTF-8"
+    except (ValueError, mujoco.FatalError) as error:
+        message, remedy = f"does not compile: {' '.join(str(error).split())}", "correct that element"
+    return [Finding("file", subject, message, remedy, file=path.name)]
+
+
+def check_numbers(subject: str, path: Path) -> Iterator[Finding]:
+    """Numbers in the text that are not finite or absurdly large: MuJoCo takes some of them for missing."""
+    for element in elements(path):
+        for name, value in element.items():
+            if name in _TEXT or element.tag in ("include", "text"):
+                continue
+            if bad := next((w for w in value.split() if _is_bad_number(w)), None):
+                label = element.get("name", "")
+                yield Finding(
+                    "finite",
+                    subject,
+                    f"<{element.tag} {label}> has {name}={bad}",
+                    "give a finite number in metres, kilograms, seconds or radians",
+                    file=path.name,
+                )
+
+
+def check_still(compiled: Compiled) -> Iterator[Finding]:
+    """Rules of whatever is put into a scene: no joints and nothing but bodies, geoms, sites and looks."""
+    model = compiled.model
+    for joint in range(model.njnt):
+        body = model.body(int(model.jnt_bodyid[joint])).name
+        name = model.joint(joint).name or f"#{joint}"
+        yield compiled.error(
+            "joints",
+            f"joint {name!r} of body {body!r} lets it move",
+            "remove the joint: doors and drawers stand still, and objects get their free joint in the scene",
+            compiled.data.xpos[model.jnt_bodyid[joint]],
+        )
+    for field, kind in _KIND.items():
+        if count := int(getattr(model, field, 0)):
+            yield compiled.error("contents", f"has {count} {kind}", "remove them")
+    floating = np.flatnonzero(model.body_gravcomp)
+    if len(floating):
+        name = model.body(int(floating[0])).name
+        yield compiled.error("contents", f"body {name!r} has gravcomp, which cancels its weight", "remove it")
+
+
+def check_groups(compiled: Compiled) -> Iterator[Finding]:
+    """What collides is in group 0 or 3, and what does not in 1 or 2: sight and pictures go by the group."""
+    model = compiled.model
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    solid = np.isin(model.geom_group, SOLID_GROUPS)
+    for geom in np.flatnonzero(collides & ~solid):
+        yield compiled.error(
+            "groups",
+            f"geom {compiled.geom_name(int(geom))} collides but is in group {model.geom_group[geom]}",
+            'use group 0 (seen) or 3 (not seen), or make it visual: contype="0" conaffinity="0"',
+            compiled.data.geom_xpos[geom],
+        )
+    for geom in np.flatnonzero(~collides & ~np.isin(model.geom_group, (1, 2))):
+        yield compiled.error(
+            "groups",
+            f"geom {compiled.geom_name(int(geom))} meets nothing but is in group {model.geom_group[geom]}",
+            "use group 2 for what is only seen (1 for ceilings and lamps), or let it collide",
+            compiled.data.geom_xpos[geom],
+        )
+
+
+def check_contact_bits(compiled: Compiled) -> Iterator[Finding]:
+    """What collides has the bit by which MuJoCo's defaults meet: others would fall through each other."""
+    model = compiled.model
+    for geom in compiled.solid:
+        contype, conaffinity = int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])
+        if not (contype & 1 and conaffinity & 1):
+            yield compiled.error(
+                "contact",
+                f'geom {compiled.geom_name(int(geom))} has contype="{contype}" conaffinity="{conaffinity}"',
+                'leave both out (1 and 1), or set both to "0" for what is only seen',
+                compiled.data.geom_xpos[geom],
+            )
+
+
+def _is_bad_number(word: str) -> bool:
+    try:
+        value = float(word)
+    except ValueError:
+        return False
+    return not math.isfinite(value) or abs(value) > MAX_NUMBER
+
+
+def _place(place: object) -> tuple[float, ...] | None:
+    if place is None:
+        return None
+    values = np.asarray(place, dtype=np.float64)
+    return tuple(values.tolist()) if np.isfinite(values).all() else None

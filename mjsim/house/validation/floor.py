@@ -1,0 +1,84 @@
+"""A compiled house as a floor to walk on, with grids of its rooms and of the distance to what stands on it."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.navigable import NavigableFloor
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.validation.checked_model import Compiled
+
+BODY_BAND = (0.05, 1.8)  # m, heights in which a person bumps into things
+BORDER = 1.0  # m of grid around the rooms
+_CELLS = 1e6  # of a grid
+_FINEST = 0.025  # m
+
+
+@dataclass(frozen=True, eq=False)
+class WalkableFloor:
+    """A compiled house with its receptacles, and what is derived from it."""
+
+    compiled: Compiled  # the model
+    rooms: RoomMap  # which room a point is in
+    receptacles: dict[str, ReceptacleGeometry]  # receptacle key -> geometry
+    rooms_of: dict[str, str]  # receptacle key -> room that the catalogue gives
+    navigable: NavigableFloor  # where one can walk
+
+    @cached_property
+    def walkable(self) -> tuple[NDArray[np.float64], float]:
+        """Points (k, 2), m, of the largest island, on a grid of about 5 cm, and the area that each stands for, m^2."""
+        xmin, ymin, xmax, ymax = self.rooms.bounds
+        islands = self.navigable.topdown_map
+        size = np.array([(xmax - xmin) / islands.shape[1], (ymax - ymin) / islands.shape[0]])
+        cells = np.argwhere(islands == 0)[:, ::-1]
+        return np.array([xmin, ymin]) + (cells + 0.5) * size, float(np.prod(size))
+
+    @cached_property
+    def clearance(self) -> ClearanceField:
+        """Distance to the nearest wall or piece of furniture, on a grid with a border around the rooms."""
+        xmin, ymin, xmax, ymax = self.rooms.bounds
+        area = (xmax - xmin + 2 * BORDER) * (ymax - ymin + 2 * BORDER)
+        low, high = BODY_BAND
+        return ClearanceField.from_model(
+            self.compiled.model,
+            low=low,
+            high=high,
+            resolution=max(_FINEST, math.sqrt(area / _CELLS)),
+            border=BORDER,
+        )
+
+    @cached_property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres of the clearance's cells, m, shape (nx, ny, 2)."""
+        field = self.clearance
+        nx, ny = field.distance.shape
+        x, y = (o + field.resolution * np.arange(n) for o, n in ((field.origin_x, nx), (field.origin_y, ny)))
+        return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+
+    @cached_property
+    def rectangle_of(self) -> NDArray[np.intp]:
+        """Rectangle of the room map that holds each cell's centre, -1 off all rooms, shape (nx, ny)."""
+        field = self.clearance
+        found = np.full(field.distance.shape, -1)
+        for k, (centre, half, axes) in enumerate(zip(*self.rooms.rectangles, strict=True)):
+            reach = np.abs(axes) @ half
+            low, high = (self.cell_of(centre + sign * reach) for sign in (-1, 1))
+            window = np.s_[low[0] : high[0] + 1, low[1] : high[1] + 1]
+            local = np.abs((self.centres[window] - centre) @ axes)
+            found[window][(local <= half).all(axis=-1)] = k
+        return found
+
+    def cell_of(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Cells nearest to points (..., 2), m, shape (..., 2)."""
+        field = self.clearance
+        cells = np.rint((points - [field.origin_x, field.origin_y]) / field.resolution).astype(np.intp)
+        return np.clip(cells, 0, np.array(field.distance.shape) - 1)
+
+    def rectangles_of(self, key: str) -> NDArray[np.intp]:
+        """Rectangles of a room, shape (k,)."""
+        return np.flatnonzero(np.array(self.rooms.keys) == key)

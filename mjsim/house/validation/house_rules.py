@@ -1,0 +1,142 @@
+"""Rules of a house's MJCF file: docs/models.md, "A house"; what one can walk on is judged in `floor_rules`."""
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import mujoco
+import numpy as np
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import TIMESTEP
+from mjsim.house.compiled.rooms import PREFIX, RoomMap
+from mjsim.house.validation.checked_model import (
+    Compiled,
+    check_contact_bits,
+    check_groups,
+    check_still,
+    compile_model,
+)
+from mjsim.house.validation.findings import Finding
+from mjsim.house.validation.hull_rules import check_hulls
+from mjsim.values.errors import AssetError
+
+SIZE = (1.5, 150.0)  # m, sides of the rectangle around all rooms
+GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
+GRAVITY_SLACK = 0.1  # m/s^2
+OVERLAP = 0.05  # m^2, between two rooms
+MOUNT = "mount:"
+RESERVED = "avatar"
+USUAL_TIMESTEP = 0.002  # s, of a file that names none
+
+
+def check_house_file(catalogue: Catalogue) -> list[Finding]:
+    """All that is wrong with a house's file, without its receptacles."""
+    compiled = compile_model("house", catalogue.house_path)
+    if not isinstance(compiled, Compiled):
+        return compiled
+    found = [finding for rule in FILE_RULES for finding in rule(compiled)]
+    return found + [finding for rule in CATALOGUE_RULES for finding in rule(compiled, catalogue)]
+
+
+def _options(compiled: Compiled) -> Iterator[Finding]:
+    option = compiled.model.opt
+    if np.abs(option.gravity - GRAVITY).max() > GRAVITY_SLACK:
+        yield compiled.error(
+            "options", f"its gravity is {option.gravity.tolist()} m/s^2", "leave it out of <option>, z is up"
+        )
+    if option.disableflags:
+        bits = mujoco.mjtDisableBit.__members__.items()
+        flags = [name for name, bit in bits if int(bit) & option.disableflags]
+        yield compiled.error("options", f"its <flag> disables {flags}", "remove <flag>")
+    if option.timestep not in (USUAL_TIMESTEP, TIMESTEP):
+        yield compiled.warning(
+            "options",
+            f"its timestep of {option.timestep:g} s is not used: a step takes {TIMESTEP:g} s",
+            "leave it out of <option>",
+        )
+    if np.any(option.wind) or option.density or option.viscosity:
+        yield compiled.warning(
+            "options", "its <option> has wind, density or viscosity", "remove them: they move objects"
+        )
+
+
+def _names(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
+    """Scenes prefix the names of receptacles, objects and the person; the house must not use these prefixes."""
+    model = compiled.model
+    taken = {RESERVED, *catalogue.receptacles}
+    kinds = (("body", model.nbody), ("geom", model.ngeom), ("site", model.nsite))
+    for kind, count in kinds:
+        for index in range(count):
+            name = getattr(model, kind)(index).name
+            first = name.split("/")[0]
+            if "/" in name and (first in taken or first.startswith("object_")):
+                yield compiled.error(
+                    "names", f"{kind} {name!r} begins like those of a scene", f"rename it: not {first}/..."
+                )
+
+
+def _rooms(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
+    try:
+        rooms = RoomMap.from_model(compiled.model, catalogue.rooms)
+    except AssetError as error:
+        yield compiled.error("rooms", str(error), f"each room has box sites {PREFIX}<key>, each key a room")
+        return
+    xmin, ymin, xmax, ymax = rooms.bounds
+    sides = sorted((xmax - xmin, ymax - ymin))
+    if not (sides[0] >= SIZE[0] and sides[1] <= SIZE[1]):
+        factor = next((f for f in (0.01, 0.001) if SIZE[0] < sides[1] * f < SIZE[1]), None)
+        yield compiled.error(
+            "size",
+            f"its rooms span {xmax - xmin:.4g} x {ymax - ymin:.4g} m",
+            f"keep both sides within {SIZE[0]} and {SIZE[1]:g} m"
+            + (f" (scale by {factor:g}?)" if factor else ""),
+        )
+        return
+    yield from _overlaps(compiled, rooms)
+
+
+def _overlaps(compiled: Compiled, rooms: RoomMap) -> Iterator[Finding]:
+    """Rooms whose rectangles overlap: a point would be in both."""
+    reach = np.einsum("kij,kj->ki", np.abs(rooms.axes), rooms.half_sizes)
+    low, high = rooms.centers - reach, rooms.centers + reach
+    square = np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9  # others are not judged: their corners stand out
+    for i, j in itertools.combinations(np.flatnonzero(square), 2):
+        sides = np.minimum(high[i], high[j]) - np.maximum(low[i], low[j])
+        if rooms.keys[i] != rooms.keys[j] and sides.min() > 0 and np.prod(sides) > OVERLAP:
+            yield compiled.warning(
+                "rooms",
+                f"rooms {rooms.keys[i]!r} and {rooms.keys[j]!r} overlap by {np.prod(sides):.2g} m^2",
+                "end each at its walls",
+                (*(np.maximum(low[i], low[j]) + sides / 2), 0.0),
+            )
+
+
+def _mounts(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
+    for key in catalogue.receptacles:
+        site = compiled.site(f"{MOUNT}{key}")
+        if site is None:
+            yield compiled.error(
+                "mounts", f"has no site '{MOUNT}{key}'", "add it where the middle of the receptacle's base is"
+            )
+        elif compiled.data.site_xmat[site, 8] < 1 - 1e-6:
+            at = compiled.data.site_xpos[site]
+            yield compiled.error("mounts", f"the site '{MOUNT}{key}' is tilted", "turn it about z only", at)
+    for site in range(compiled.model.nsite):
+        name = compiled.model.site(site).name
+        if name.startswith(MOUNT) and name.removeprefix(MOUNT) not in catalogue.receptacles:
+            yield compiled.warning(
+                "mounts",
+                f"the site {name!r} is for no receptacle of the catalogue",
+                f"the catalogue has {sorted(catalogue.receptacles)}",
+                compiled.data.site_xpos[site],
+            )
+
+
+FILE_RULES: tuple[Callable[[Compiled], Iterator[Finding]], ...] = (
+    check_still,
+    check_groups,
+    check_contact_bits,
+    _options,
+    check_hulls,
+)
+CATALOGUE_RULES: tuple[Callable[[Compiled, Catalogue], Iterator[Finding]], ...] = (_names, _rooms, _mounts)

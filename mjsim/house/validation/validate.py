@@ -1,0 +1,117 @@
+"""The validator of houses with their objects and receptacles, for `mjsim check` and for houses of users."""
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.house import CompiledHouse
+from mjsim.house.validation.checked_model import Compiled, compile_model
+from mjsim.house.validation.findings import Finding, errors, one_line
+from mjsim.house.validation.floor import WalkableFloor
+from mjsim.house.validation.floor_rules import check_floor, nowhere_to_stand
+from mjsim.house.validation.house_rules import check_house_file
+from mjsim.house.validation.object_rules import check_compiled_object
+from mjsim.house.validation.receptacle_rules import check_receptacle
+from mjsim.support.kernels import cache_base
+from mjsim.support.sources import source_digest
+from mjsim.values.errors import AssetError, MjsimError
+
+SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
+
+
+def require_usable(house: CompiledHouse) -> None:
+    """Check a house, unless it comes with the package; `AssetError` gives the first error.
+
+    Once per process, and a generated one once for all: its cached verdict is one on its content, by this code.
+    """
+    catalogue = house.catalogue
+    if catalogue.ref.kind == "shipped":
+        return
+    verdict = _verdict(catalogue) if catalogue.ref.kind == "generated" else None
+    if verdict is not None and verdict.is_file():
+        return
+    if found := errors(house.once("findings", lambda: check_house(house))):
+        raise AssetError(one_line(found, catalogue.name))
+    if verdict is not None:
+        with contextlib.suppress(OSError):  # of a full disk: the next process checks again
+            verdict.parent.mkdir(parents=True, exist_ok=True)
+            verdict.touch()
+
+
+def _verdict(catalogue: Catalogue) -> Path:
+    """A file that is there where a house of this content was found usable."""
+    by = f"{source_digest('mjsim', 'planner')}-{mujoco.__version__}"
+    return cache_base() / "houses" / "usable" / f"{catalogue.content[:32]}-{by}"
+
+
+def check_house(house: CompiledHouse) -> list[Finding]:
+    """All that is wrong with a house, its receptacles and its objects.
+
+    What needs a sound file is only judged where the file is sound: a house of the wrong size has no floor plan.
+    """
+    catalogue = house.catalogue
+    found = check_house_file(catalogue)
+    for receptacle in catalogue.receptacles.values():
+        found += check_receptacle(receptacle.path, receptacle.key)
+    footprints = {}
+    for model in catalogue.objects.values():
+        compiled = compile_model(f"object {model.key}", model.path)
+        if isinstance(compiled, Compiled):
+            found += check_compiled_object(compiled)
+            if len(compiled.solid):
+                footprints[model.key] = np.sort(np.ptp(compiled.extent(compiled.solid), axis=0)[:2])
+        else:
+            found += compiled
+    return found if errors(found) else [*found, *_check_composed(house), *_check_sizes(house, footprints)]
+
+
+def _check_composed(house: CompiledHouse) -> list[Finding]:
+    try:
+        compiled = Compiled.of("house", house.catalogue.house_path, house.model)
+        rooms, receptacles = house.rooms, house.receptacles
+    except AssetError as error:
+        return [Finding("file", "house", str(error), "correct it")]
+    try:
+        navigable = house.navigable
+    except MjsimError:
+        raise
+    except Exception:  # of whichever package computes it, where nothing is free
+        return [nowhere_to_stand(compiled, rooms)]
+    rooms_of = {r.key: r.room for r in house.catalogue.receptacles.values()}
+    return check_floor(WalkableFloor(compiled, rooms, receptacles, rooms_of, navigable))
+
+
+def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:
+    """Every object fits into its receptacle, and a few of them do side by side."""
+    for category in house.catalogue.categories.values():
+        interior = np.sort(2 * house.receptacles[category.receptacle].half_size[:2])
+        sizes = {key: footprints[key] for key in category.objects}
+        yield from _too_large(category.receptacle, interior, sizes)
+        room = float(np.prod(interior)) / float(np.mean([np.prod(size) for size in sizes.values()]))
+        if room < SLOTS:
+            yield Finding(
+                "capacity",
+                f"receptacle {category.receptacle}",
+                f"its floor has room for {room:.1f} objects of {category.key!r} side by side",
+                f"enlarge it to {SLOTS} or more: a trial may bring eight",
+                "warning",
+            )
+
+
+def _too_large(
+    receptacle: str, interior: NDArray[np.float64], sizes: Mapping[str, NDArray[np.float64]]
+) -> Iterator[Finding]:
+    for key, size in sizes.items():
+        if np.any(size > interior):
+            sides = " x ".join(f"{s:.2f}" for s in size)
+            yield Finding(
+                "capacity",
+                f"object {key}",
+                f"its footprint of {sides} m does not fit into {receptacle!r}, {interior[0]:.2f} x {interior[1]:.2f} m",
+                "enlarge the receptacle, shrink the object, or put it into another category",
+            )

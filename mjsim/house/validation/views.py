@@ -1,0 +1,97 @@
+"""Outlines of models from above and from the sides, for the pictures of `mjsim check`: no OpenGL is needed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from mjsim.house.compiled.footprint import outline_points
+from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.validation.checked_model import Compiled
+from mjsim.values.episode import Episode
+from mjsim.values.errors import AssetError
+
+Point = tuple[float, float]
+_BAND = (0.05, 1.8)  # m, heights of what is drawn of a house
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A drawing in metres."""
+
+    title: str  # from where it is seen
+    axes: tuple[int, int]  # which coordinates of a place it shows, to the right and up: (0, 1) from above
+    outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each (k, 2)
+    rooms: tuple[
+        tuple[str, NDArray[np.float64]], ...
+    ] = ()  # corners (4, 2) of each rectangle, with the room's name
+    marks: Mapping[str, Point] = field(
+        default_factory=dict
+    )  # name -> point, of sites, receptacles and objects
+
+
+def floor_view(
+    compiled: Compiled,
+    rooms: RoomMap | None = None,
+    receptacles: Mapping[str, ReceptacleGeometry] | None = None,
+    episode: Episode | None = None,
+) -> Drawing:
+    """A house from above: what a person bumps into, rooms, receptacles, and what an episode puts there."""
+    marks = {key: _point(r.center, (0, 1)) for key, r in (receptacles or {}).items()}
+    if episode is not None:
+        marks |= {o.name: _point(o.position, (0, 1)) for o in episode.objects}
+        marks["start"] = (episode.start.x, episode.start.y)
+    return Drawing("from above", (0, 1), _outlines(compiled, (0, 1), _BAND), _rectangles(rooms), marks)
+
+
+def side_views(compiled: Compiled) -> tuple[Drawing, ...]:
+    """An object or a receptacle from above, from the front and from the right, with its sites."""
+    sites = {compiled.model.site(s).name: compiled.data.site_xpos[s] for s in range(compiled.model.nsite)}
+    return tuple(
+        Drawing(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
+        for title, axes in (("from above", (0, 1)), ("from the front", (0, 2)), ("from the right", (1, 2)))
+    )
+
+
+def _point(place: object, axes: tuple[int, int]) -> Point:
+    values = np.asarray(place, dtype=np.float64)
+    return float(values[axes[0]]), float(values[axes[1]])
+
+
+def _rectangles(rooms: RoomMap | None) -> tuple[tuple[str, NDArray[np.float64]], ...]:
+    if rooms is None:
+        return ()
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    corners = [centre + (signs * half) @ axes.T for centre, half, axes in zip(*rooms.rectangles, strict=True)]
+    return tuple((rooms.labels.get(k, k), c) for k, c in zip(rooms.keys, corners, strict=True))
+
+
+def _outlines(
+    compiled: Compiled, axes: tuple[int, int], band: tuple[float, float] | None = None
+) -> tuple[NDArray[np.float64], ...]:
+    """Outlines of what collides as seen along the remaining axis; what has none is left out."""
+    right, up = (np.eye(3)[a] for a in axes)
+    turn = np.array([right, up, np.cross(right, up)])
+    found = []
+    for geom in compiled.solid:
+        if compiled.model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+            continue
+        try:
+            if band is not None and not _reaches(compiled.points(int(geom))[:, 2], band):
+                continue
+            rotation = compiled.data.geom_xmat[geom].reshape(3, 3)
+            points = outline_points(
+                compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
+            )
+            found.append(points[ConvexHull(points[:, :2]).vertices, :2])
+        except (AssetError, QhullError, ValueError):  # flat or not finite: the findings say so
+            continue
+    return tuple(found)
+
+
+def _reaches(heights: NDArray[np.float64], band: tuple[float, float]) -> bool:
+    return bool(heights.max() > band[0] and heights.min() < band[1])
