@@ -1,7 +1,11 @@
 """Fixtures shared by the tests: the apartment as shipped, and a small house written for tests."""
 
+import os
 import signal
 import sys
+
+# Before NumPy is loaded: on small matrices, threads of OpenBLAS cost more than they gain.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings

@@ -122,24 +122,26 @@ def cast(parts, origins, direction):
     Back faces are not seen; what is translucent is taken as opaque.
     """
     nearest, colours = np.full(len(origins), np.inf), np.full((len(origins), 3), np.nan)
+    across = np.linalg.svd(direction[None])[2][1:]  # two axes of the plane that the rays cross
+    rays, start = origins @ across.T, origins @ direction
     for part in parts:
-        for triangle in part.triangles:
-            a, b, c = part.positions[triangle]
-            normal = np.cross(b - a, c - a)
-            facing = normal @ direction
-            if facing >= 0:
-                continue
-            depth = (a - origins) @ normal / facing
-            hit = origins + depth[:, None] * direction
-            shares = np.stack(
-                [np.cross(q - p, hit - p) @ normal for p, q in ((b, c), (c, a), (a, b))], axis=1
-            ) / (normal @ normal)
-            seen = (shares >= -1e-9).all(axis=1) & (depth < nearest)
-            nearest[seen] = depth[seen]
-            colour = shares[seen] @ part.colours[triangle][:, :3]
+        corners = part.positions[part.triangles]
+        flat, along = corners @ across.T, corners @ direction
+        low, high = flat.min(axis=1) - 1e-9, flat.max(axis=1) + 1e-9
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for number in np.flatnonzero(normals @ direction < 0):
+            near = np.flatnonzero(((rays >= low[number]) & (rays <= high[number])).all(axis=1))
+            sides = flat[number, 1:] - flat[number, 0]
+            second, third = np.linalg.solve(sides.T, (rays[near] - flat[number, 0]).T)
+            shares = np.stack((1 - second - third, second, third), axis=1)
+            depth = shares @ along[number] - start[near]
+            seen = (shares >= -1e-9).all(axis=1) & (depth < nearest[near])
+            near, shares, triangle = near[seen], shares[seen], part.triangles[number]
+            nearest[near] = depth[seen]
+            colour = shares @ part.colours[triangle][:, :3]
             if part.image is not None:
-                colour = colour * sampled(part.image, shares[seen] @ part.uv[triangle])
-            colours[seen] = colour
+                colour = colour * sampled(part.image, shares @ part.uv[triangle])
+            colours[near] = colour
     return colours
 
 

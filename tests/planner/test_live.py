@@ -9,14 +9,13 @@ import planning_cases
 import pytest
 from planning_cases import SEARCH, Task, asked, planner_of, two_rooms
 
-from experiments.cli import play
+from experiments.cli import batch, play
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.replay.log_source import LogSource
 from experiments.trials import setup
 from experiments.trials.setup import prepare_session, prepared_planner
-from experiments.trials.table import read_rows
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose
 from planner.checker import check
@@ -28,7 +27,7 @@ from planner.plan import Plan, Status, VisitKind
 from planner.regret import RegretEvaluator
 from planner.route import TaskState, remaining
 from planner.service import Mode, Planner
-from planner.solver import solver
+from planner.solver import SolveLimit, solver
 from planner.solver_source import TIE, SolverSource
 from planner.task_problems import TaskProblems
 from planner.tour import possible_next, tour_length
@@ -219,30 +218,30 @@ def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_pa
     assert asked == []
 
 
-@pytest.mark.parametrize(
-    "command", [["run", "--no-video", "--no-floor-plan"], ["run", "--live", "--no-video", "--no-floor-plan"]]
-)
-def test_or_tools_plans_where_it_is_chosen(tmp_path, monkeypatch, command):
+@pytest.mark.parametrize(("live", "delivered"), [([], 4), (["--live", "--time-limit", "5"], 0)])
+def test_or_tools_plans_where_it_is_chosen(tmp_path, monkeypatch, live, delivered):
     """Neither tours nor better ones come from the exact planner; it still finds the regrets."""
 
     def fail(*_args, **_options):
         pytest.fail("planned by the exact planner")
 
     monkeypatch.setattr(ExactSolver, "improve", fail)
+    monkeypatch.setattr("planner.solver_source.PROOF_LIMIT", SolveLimit(seconds=0.3))
     words = ["--objects", "4", "--planner", "ortools", "--fidelity", "event", "--no-regret"]
-    assert main([*command, *words, "--out", str(tmp_path / "run")]) == 0
+    words += ["--no-video", "--no-floor-plan", "--out", str(tmp_path / "run")]
+    assert main(["run", *live, *words]) == 0
     metrics = json.loads((tmp_path / "run" / records.METRICS).read_text())
-    assert (metrics["planner"], metrics["delivered"]) == ("ortools", 4)
+    assert (metrics["planner"], metrics["delivered"]) == ("ortools", delivered)
     assert json.loads((tmp_path / "run" / records.PLAN).read_text())
 
 
-def test_a_batch_and_play_take_or_tools(tmp_path):
-    words = ["--objects", "2", "--assistance", "optimal", "--seeds", "0:1", "--planner", "ortools"]
-    assert main(["batch", *words, "--fidelity", "event", "--out", str(tmp_path)]) == 0
-    (row,) = read_rows(tmp_path / "trials.parquet")
-    assert (row["planner"], row["delivered"]) == ("ortools", 2)
+def test_a_batch_and_play_take_or_tools():
     parser = argparse.ArgumentParser()
-    play.add_parser(parser.add_subparsers())
+    commands = parser.add_subparsers()
+    batch.add_parser(commands)
+    play.add_parser(commands)
+    design = batch._design(parser.parse_args(["batch", "--planner", "ortools", "--out", "out"]))
+    assert {trial.planner for trial in design.trials} == {"ortools"}
     trials = play._trials(parser.parse_args(["play", "--planner", "ortools"]))
     assert {trial["planner"] for trial in trials.values()} == {"ortools"}
 

@@ -87,26 +87,28 @@ def views():
         yield np.array(direction) / np.linalg.norm(direction)
 
 
-def both(model, direction):
-    """What MuJoCo and the file show from one direction, (SIDE, SIDE, 3), 0 to 1."""
+def shown(model):
+    """What MuJoCo and the file show from each direction, (SIDE, SIDE, 3), 0 to 1."""
     file, data = exported(model)
-    axes, eye = look_rotation(direction), MIDDLE - 3 * direction
-    view = ViewVolume(position=eye, rotation=axes, half_height=0.8, near=0.1, far=6, orthographic=True)
-    with Rasteriser(model, SIDE, SIDE, RenderProfile("plain", skybox=False)) as rasteriser:
-        rasteriser.update(data)
-        theirs = rasteriser.colour(view) / 255
+    parts = file.parts()
     across = (np.arange(SIDE) + 0.5) / SIDE * 2 - 1
     right, up = np.meshgrid(across, -across)
-    origins = eye + 0.8 * (right[..., None] * axes[:, 0] + up[..., None] * axes[:, 1])
-    ours = cast(file.parts(), origins.reshape(-1, 3), direction)
-    return theirs, np.nan_to_num(ours).reshape(SIDE, SIDE, 3)
+    with Rasteriser(model, SIDE, SIDE, RenderProfile("plain", skybox=False)) as rasteriser:
+        rasteriser.update(data)
+        for direction in views():
+            axes, eye = look_rotation(direction), MIDDLE - 3 * direction
+            view = ViewVolume(
+                position=eye, rotation=axes, half_height=0.8, near=0.1, far=6, orthographic=True
+            )
+            origins = eye + 0.8 * (right[..., None] * axes[:, 0] + up[..., None] * axes[:, 1])
+            ours = cast(parts, origins.reshape(-1, 3), direction)
+            yield rasteriser.colour(view) / 255, np.nan_to_num(ours).reshape(SIDE, SIDE, 3)
 
 
 @pytest.mark.parametrize(("geom", "texture", "mapping"), CASES)
 def test_each_type_of_geom_looks_as_mujoco_draws_it(folder, geom, texture, mapping):
     model = compiled(folder, geom, texture, mapping)
-    for direction in views():
-        theirs, ours = both(model, direction)
+    for theirs, ours in shown(model):
         seen = (theirs.max(axis=2) > 0) | (ours.max(axis=2) > 0)
         wrong = np.abs(theirs - ours).max(axis=2)[seen]
         assert seen.mean() > 0.05
@@ -116,8 +118,7 @@ def test_each_type_of_geom_looks_as_mujoco_draws_it(folder, geom, texture, mappi
 
 def test_shapes_end_where_those_of_mujoco_do(folder):
     for geom in GEOMS:
-        for direction in views():
-            theirs, ours = both(compiled(folder, geom), direction)
+        for theirs, ours in shown(compiled(folder, geom)):
             assert ((theirs.max(axis=2) > 0) != (ours.max(axis=2) > 0)).mean() < 0.004, geom
 
 
