@@ -13,6 +13,7 @@ import numpy as np
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows
@@ -26,7 +27,6 @@ from mjsim.scene_export.store import SCENE
 from mjsim.scene_export.surfaces import Surface, drawn_scene, surfaces
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
-from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
 _AWAY = -100.0  # m; where the object models stand, below the house

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.trunk_floor import Floor
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
 from mjsim.values.steps import States
@@ -15,7 +16,6 @@ from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity.body_state import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.world.fidelity.kinematics import Gait
-from mjsim.world.fidelity.trunk_contact import Floor
 from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, later_step, next_step
 
 Floats = NDArray[np.float64]

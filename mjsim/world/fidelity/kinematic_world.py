@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.house import compiled_house
+from mjsim.house.compiled.trunk_floor import Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.values.errors import StateError
@@ -30,7 +31,6 @@ from mjsim.world.fidelity.kinematic_steps import (
 )
 from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
-from mjsim.world.fidelity.trunk_contact import Floor
 from mjsim.world.walking.path_following import Walk
 
 # An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.trunk_floor import Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
@@ -33,7 +34,7 @@ from mjsim.world.fidelity.body_state import (
     X,
     Y,
 )
-from mjsim.world.fidelity.trunk_contact import Floor, is_clear, slide
+from mjsim.world.fidelity.trunk_contact import is_clear, slide
 
 
 class Gait(NamedTuple):

