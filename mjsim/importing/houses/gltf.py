@@ -11,17 +11,18 @@ import numpy as np
 from trimesh.transformations import quaternion_matrix, scale_matrix
 
 from mjsim.importing.houses.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
-from mjsim.importing.houses.plan import MAX_SIDE, unit_of
-from mjsim.importing.houses.rooms import boxes_of
 from mjsim.importing.houses.values import (
+    MAX_SIDE,
     Bin,
     HouseOptions,
     Missing,
     NamedRoom,
     Piece,
     SourceScene,
+    boxes_of,
     left_out,
     numbers,
+    unit_of,
 )
 from mjsim.importing.surface import Floats
 from mjsim.importing.values import UNITS, ImportDecision

@@ -23,12 +23,12 @@ from mjsim.importing.houses.procthor import SUFFIXES as PROCTHOR
 from mjsim.importing.houses.procthor import read_procthor
 from mjsim.importing.houses.robocasa import SUFFIXES as ROBOCASA
 from mjsim.importing.houses.robocasa import read_robocasa
-from mjsim.importing.houses.rooms import find_rooms, read_rooms, words_of
+from mjsim.importing.houses.rooms import find_rooms, read_rooms
 from mjsim.importing.houses.sdf import SUFFIXES as SDF
 from mjsim.importing.houses.sdf import read_sdf
 from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.houses.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
-from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved
+from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved, words_of
 from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
 from mjsim.importing.model_writer import write_png
 from mjsim.importing.reading import MAX_TRIANGLES

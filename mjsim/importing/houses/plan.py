@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from mjsim.importing.houses.solids import Solid
+from mjsim.importing.houses.values import MAX_SIDE, unit_of
 from mjsim.importing.surface import Floats
-from mjsim.importing.values import UNITS
 from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m
 BODY = 0.27  # m, radius of a person with a little air
-MIN_SIDE, MAX_SIDE = 3.0, 60.0  # m, longest sides that houses have
 _MAX_AREA = 1500.0  # m^2 that can be walked on
 _BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
@@ -134,11 +133,6 @@ def too_large(sides: Floats) -> AssetError:
     unit = unit_of(float(sides.max()))
     advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
     return AssetError(f"spans {_metres(sides)}, and houses have at most {MAX_SIDE:g} m; {advice}")
-
-
-def unit_of(longest: float) -> str | None:
-    """The unit in which a longest side is that of a house; None without any."""
-    return next((unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE), None)
 
 
 def _metres(sides: Floats) -> str:

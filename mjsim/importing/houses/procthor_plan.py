@@ -16,8 +16,7 @@ import msgspec
 import numpy as np
 
 from mjsim.generator.values import WALL
-from mjsim.importing.houses.rooms import boxes_of, words_of
-from mjsim.importing.houses.values import NamedRoom
+from mjsim.importing.houses.values import NamedRoom, boxes_of, words_of
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 

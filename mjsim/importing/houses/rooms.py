@@ -10,13 +10,11 @@ from typing import Annotated
 import cv2
 import msgspec
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
-from mjsim.importing.houses.plan import CELL, MAX_SIDE, Mask, Plan, clearance
-from mjsim.importing.houses.solids import merged_rectangles
-from mjsim.importing.houses.values import NamedRoom, Piece
+from mjsim.importing.houses.plan import CELL, Mask, Plan, clearance
+from mjsim.importing.houses.values import NamedRoom, Piece, merged_rectangles, words_of
 from mjsim.importing.surface import Floats
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
@@ -26,7 +24,6 @@ _HALL = 45.0  # m^2, floor of a room that is rather parted at wider openings
 _HALL_PART = 5.0  # m^2, at least, of each part
 _MIN_AREA = 1.5  # m^2 of floor; smaller ones belong to their neighbours
 _MIN_WALK = 0.5  # m^2 that can be walked on
-_STEP = 0.1  # m, of the rectangles of a polygon with slanted sides
 _COARSE = 2  # cells along the side of the grid of a room's rectangles
 _LARGE = 0.5  # m; smaller things say nothing about the use of a room
 # Names of furniture say what a room is; the first that fits counts.
@@ -107,24 +104,6 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
             "boxes = [[xmin, ymin, xmax, ymax], ...]"
         )
     return tuple(NamedRoom(key, room.label, tuple(room.boxes)) for key, room in rooms.items())
-
-
-def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
-    """Rectangles, m, that cover a polygon (k, 2); one with slanted sides in steps of 0.1 m. `ValueError` for none."""
-    polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
-    if not polygon.is_valid or polygon.area < _STEP**2:
-        raise ValueError("has no floor")
-    if np.ptp(outline, axis=0).max() > MAX_SIDE:
-        raise ValueError(f"spans more than {MAX_SIDE:g} m")
-    sides = np.abs(np.diff(outline, axis=0, append=outline[:1]))
-    slanted = sides.min(axis=1).max() > 0.01
-    cuts = [
-        np.arange(v.min(), v.max() + _STEP, _STEP) if slanted else np.unique(v.round(3)) for v in outline.T
-    ]
-    middles = np.meshgrid(*((cut[1:] + cut[:-1]) / 2 for cut in cuts), indexing="ij")
-    x, y = (cut.tolist() for cut in cuts)
-    mask = shapely.contains_xy(polygon, *middles)
-    return tuple((x[a], y[c], x[b], y[d]) for a, b, c, d in merged_rectangles(mask))
 
 
 def find_rooms(plan: Plan, given: Sequence[NamedRoom], pieces: Sequence[Piece]) -> Rooms:
@@ -233,11 +212,6 @@ def _names(labels: Labels, count: int, plan: Plan, pieces: Sequence[Piece]) -> l
         same = sum(re.fullmatch(rf"{key}(_\d+)?", k) is not None for k, _ in names)
         names.append((f"{key}_{same + 1}", f"{text} {same + 1}") if same or key == "room" else (key, text))
     return names
-
-
-def words_of(name: str) -> list[str]:
-    """Words of a name such as `KitchenCabinet_01_001`: kitchen, cabinet."""
-    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
 
 
 def _spread(labels: Labels, shape: int) -> Labels:

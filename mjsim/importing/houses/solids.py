@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 from scipy.spatial import QhullError
 
-from mjsim.importing.houses.values import Piece
+from mjsim.importing.houses.values import Piece, merged_rectangles
 from mjsim.importing.parts import _few_vertices
 from mjsim.importing.surface import Floats
 
@@ -218,19 +218,3 @@ def merged_boxes(grid: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int, int]
         for a, b, c, d in merged_rectangles(index == number):
             for bottom, top in spans:
                 yield (a, c, int(bottom)), (b, d, int(top))
-
-
-def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
-    """Rectangles that cover the cells of a mask (nx, ny) once: rows from, to, columns from, to, ends not included."""
-    left = mask.copy()
-    for row in range(len(left)):
-        while left[row].any():
-            start = int(left[row].argmax())
-            stop = start
-            while stop < left.shape[1] and left[row, stop]:
-                stop += 1
-            end = row + 1
-            while end < len(left) and left[end, start:stop].all():
-                end += 1
-            left[row:end, start:stop] = False
-            yield row, end, start, stop

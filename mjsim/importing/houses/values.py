@@ -1,16 +1,22 @@
-"""What readers make of a scene, and what the user says about it."""
+"""The scene that every reader returns, what the user may say about it, and helpers that readers share."""
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from mjsim.importing.surface import Floats, Surface
-from mjsim.importing.values import ImportDecision
+from mjsim.importing.values import UNITS, ImportDecision
 from mjsim.values.errors import AssetError
 
 TEXTURE_SIDE = 512  # px, longest side of a picture
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # m, longest sides that houses have
+_STEP = 0.1  # m, of the rectangles that cover slanted outlines
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +107,47 @@ def numbers(values: Any, count: int, path: Path) -> Floats:
 def moved(pieces: list[Piece], transform: Floats) -> list[Piece]:
     """Pieces moved by a homogeneous transform (4, 4)."""
     return [Piece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]
+
+
+def unit_of(longest: float) -> str | None:
+    """The unit in which a house could have this longest side, or None."""
+    return next((unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE), None)
+
+
+def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
+    """Rectangles, m, that cover a polygon (k, 2); one with slanted sides in steps of 0.1 m. `ValueError` for none."""
+    polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
+    if not polygon.is_valid or polygon.area < _STEP**2:
+        raise ValueError("has no floor")
+    if np.ptp(outline, axis=0).max() > MAX_SIDE:
+        raise ValueError(f"spans more than {MAX_SIDE:g} m")
+    sides = np.abs(np.diff(outline, axis=0, append=outline[:1]))
+    slanted = sides.min(axis=1).max() > 0.01
+    cuts = [
+        np.arange(v.min(), v.max() + _STEP, _STEP) if slanted else np.unique(v.round(3)) for v in outline.T
+    ]
+    middles = np.meshgrid(*((cut[1:] + cut[:-1]) / 2 for cut in cuts), indexing="ij")
+    x, y = (cut.tolist() for cut in cuts)
+    mask = shapely.contains_xy(polygon, *middles)
+    return tuple((x[a], y[c], x[b], y[d]) for a, b, c, d in merged_rectangles(mask))
+
+
+def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
+    """Rectangles that cover the cells of a mask (nx, ny) once: rows from, to, columns from, to, ends not included."""
+    left = mask.copy()
+    for row in range(len(left)):
+        while left[row].any():
+            start = int(left[row].argmax())
+            stop = start
+            while stop < left.shape[1] and left[row, stop]:
+                stop += 1
+            end = row + 1
+            while end < len(left) and left[end, start:stop].all():
+                end += 1
+            left[row:end, start:stop] = False
+            yield row, end, start, stop
+
+
+def words_of(name: str) -> list[str]:
+    """Words of a name such as `KitchenCabinet_01_001`: kitchen, cabinet."""
+    return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]
