@@ -162,7 +162,7 @@ def measure(
     """
     each = count or (QUICK if quick else COUNT)
     homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
-    code = digest_of(*(ROOT / "mjsim" / name for name in ("generator", "house", "scene_export")))
+    code = digest_of(*(ROOT / "mjsim" / name for name in ("generator", "house", "formats/gltf")))
     rows = {(row["rooms"], row["seed"]): row for row in _kept(out) if row["code"] == code}
     missing = [home for home in homes if home not in rows]
     out.mkdir(parents=True, exist_ok=True)

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from hud.markers import breadcrumbs, flagpole, pin, rims
 from hud.state import Marker
+from mjsim.formats.gltf.export import export_scene
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house, navigable_floor
 from mjsim.house.scene.avatar import BODY, EYE, HANDS, PREFIX
 from mjsim.house.scene.sampling import sample_episode
 from mjsim.house.scene.scene import Scene, compose
 from mjsim.render import Renderer
-from mjsim.scene_export.export import export_scene
 
 Image = NDArray[np.uint8]
 

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
+from mjsim.formats.gltf.export import HOUSE, export_scene
+from mjsim.formats.gltf.store import SCENE
 from mjsim.generator.generated import generate, house_files
 from mjsim.generator.programme import NEEDS
 from mjsim.generator.recipe import RECIPE, read_recipe
@@ -27,8 +29,6 @@ from mjsim.house.catalogue.house_ref import CATALOGUE
 from mjsim.house.check import check_house_name
 from mjsim.house.compiled.clearance import ClearanceField
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
-from mjsim.scene_export.export import HOUSE, export_scene
-from mjsim.scene_export.store import SCENE
 
 DRAWN = 10  # one home of so many is exported as the browser's client draws it
 CELL = 0.0125  # m

@@ -182,7 +182,7 @@ def _export(arguments: argparse.Namespace) -> int:
 
     from experiments.house import House
     from experiments.record.run_directory import check_file
-    from mjsim.exporting.procthor import procthor_house
+    from mjsim.formats.procthor.writer import procthor_house
     from mjsim.generator.home_cache import load_catalogue
     from mjsim.generator.recipe import floor_plan_of
     from mjsim.importing import require_extra
@@ -196,7 +196,7 @@ def _export(arguments: argparse.Namespace) -> int:
         print(f"{out} ({len(plan.rooms)} rooms, {len(plan.doors)} doors, {len(plan.windows)} windows)")
         return 0
     require_extra()  # then trimesh is loaded
-    from mjsim.exporting.habitat import export_habitat
+    from mjsim.formats.habitat_writer import export_habitat
 
     if arguments.episodes < 0:
         raise ConfigError(f"{arguments.episodes} episodes cannot be sampled; give 0 or more")
@@ -221,8 +221,8 @@ def _export(arguments: argparse.Namespace) -> int:
 
 def _write(scene: Any, path: Path) -> None:
     """Write a composed scene in the format that the ending of the path names."""
-    from mjsim.formats.mjcf_scene import export_house
-    from mjsim.scene_export.export import export_episode
+    from mjsim.formats.gltf.export import export_episode
+    from mjsim.formats.mjcf_writer import export_house
     from mjsim.support.files import replacing
 
     if path.suffix == MJCF:

@@ -7,8 +7,8 @@ from typing import Any
 
 from experiments.cli import import_episodes
 from experiments.cli.options import HelpFormatter
+from mjsim.formats.scene.options import AXES, UNITS, ImportDecision, ImportOptions
 from mjsim.importing import require_extra
-from mjsim.importing.values import AXES, UNITS, ImportDecision, ImportOptions
 
 DESCRIPTION = """\
 Make an object of a mesh file: in metres and z up, closed, in convex parts, with mass, grips and a look, resting as it
@@ -112,8 +112,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def run_house(arguments: argparse.Namespace) -> int:
     require_extra()
+    from mjsim.formats.scene.source_scene import HouseOptions
     from mjsim.importing.houses.house_import import import_house
-    from mjsim.importing.houses.values import HouseOptions
 
     options = HouseOptions(
         arguments.units,

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.importing.surface import Floats, Ints
+from mjsim.formats.scene.surface import Floats, Ints
 
 SIDE = 512  # px
 _GUTTER = 2  # px around a triangle, so that neighbours do not bleed in

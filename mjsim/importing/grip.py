@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from mjsim.importing.surface import Floats
+from mjsim.formats.scene.surface import Floats
 
 MAX_OFFSET = 0.15  # m; a load that hangs farther to one side of the hand is not carried
 _RIM = 0.01  # m below the highest point; what is lower may be the bottom of something hollow

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from mjsim.formats.scene.options import ImportDecision
+from mjsim.formats.scene.surface import Floats
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE, parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.model_writer import MODEL
-from mjsim.importing.surface import Floats
-from mjsim.importing.values import ImportDecision
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 

@@ -9,9 +9,9 @@ import scipy.spatial
 import trimesh
 from numpy.typing import NDArray
 
+from mjsim.formats.scene.surface import Floats, Ints, Surface
 from mjsim.importing.atlas import Atlas
 from mjsim.importing.solid import is_closed, simplified
-from mjsim.importing.surface import Floats, Ints, Surface
 
 MAX_TRIANGLES = 1400
 _SAMPLES = 200_000  # points of the file's surface among which the nearest is looked for

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
+from mjsim.formats.scene.options import ImportDecision, ImportOptions
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_object
 from mjsim.importing.grip import MAX_OFFSET
@@ -11,7 +12,6 @@ from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.model_writer import write_model
 from mjsim.importing.object_import import ImportedObject, import_object
 from mjsim.importing.preview import write_preview
-from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.values.errors import AssetError, RenderError
 
 PREVIEW, REPORT = "preview.png", "report.json"

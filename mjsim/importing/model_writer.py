@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from mjsim.formats.scene.surface import Floats
 from mjsim.importing.look import Look
 from mjsim.importing.object_import import ImportedObject
-from mjsim.importing.surface import Floats
 from mjsim.values.errors import AssetError
 
 MODEL = "object.xml"

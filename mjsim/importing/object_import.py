@@ -7,16 +7,16 @@ import numpy as np
 import trimesh
 from trimesh.transformations import translation_matrix
 
+from mjsim.formats.scene.mesh_files import missing_colours, read_surface
+from mjsim.formats.scene.options import ImportDecision, ImportOptions
+from mjsim.formats.scene.surface import Floats, Surface, cleaned
 from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.grip import Grip, find_grip
 from mjsim.importing.look import Look, make_look
 from mjsim.importing.parts import Parts, convex_parts
-from mjsim.importing.reading import missing_colours, read_surface
 from mjsim.importing.resting import STEADY, RestingPose, foot, resting_pose
 from mjsim.importing.scaling import Scaling, scaling
 from mjsim.importing.solid import MAX_TRIANGLES, Solid, close, simplified
-from mjsim.importing.surface import Floats, Surface, cleaned
-from mjsim.importing.values import ImportDecision, ImportOptions
 from mjsim.importing.weight import Weight, weigh
 from mjsim.values.errors import AssetError
 

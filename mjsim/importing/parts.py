@@ -7,9 +7,9 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
+from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import THIN
 from mjsim.importing.solid import Solid, simplified
-from mjsim.importing.surface import Floats
 
 MAX_PARTS = 6
 MAX_VERTICES = 64  # of a part

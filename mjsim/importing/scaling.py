@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mjsim.formats.scene.options import UNITS
+from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import SIZE
-from mjsim.importing.surface import Floats
-from mjsim.importing.values import UNITS
 from mjsim.values.errors import AssetError
 
 MIN_SIDE, MAX_SIDE = SIZE

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from mjsim.importing.surface import Floats
+from mjsim.formats.scene.surface import Floats
 
 MAX_TRIANGLES = 20_000  # of what is worked on; finer surfaces are simplified first
 MAX_PIECES = 400  # pieces of a surface that are closed one by one

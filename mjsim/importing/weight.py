@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import MASS
-from mjsim.importing.surface import Floats
 from mjsim.values.errors import AssetError
 
 MIN_MASS, MAX_MASS = MASS

@@ -32,7 +32,7 @@ from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.static_files import static_routes
-from mjsim.scene_export.store import scenes_folder
+from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 HEALTH_TIMEOUT = 3.0  # s for the database to answer

@@ -35,7 +35,7 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.static_files import static_routes
 from experiments.web.server.visits import TOKEN, token_hash
-from mjsim.scene_export.store import scenes_folder
+from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}

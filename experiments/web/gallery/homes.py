@@ -14,12 +14,12 @@ from experiments.house import House
 from experiments.procedure.house_pictures import floor_plan, room_views
 from experiments.web.view.page import run_page
 from experiments.web.view.tour import tour_page
+from mjsim.formats.gltf.export import export_scene
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.generated_names import parse_name
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import Renderer
-from mjsim.scene_export.export import export_scene
 from mjsim.support.files import exchange, work_folder
 from mjsim.support.sources import source_digest
 

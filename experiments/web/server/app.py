@@ -33,7 +33,7 @@ from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.static_files import static_routes
 from experiments.web.server.visits import PLAYED, RESULT, Ended, Visits, following, new_token, token_hash
-from mjsim.scene_export.store import scenes_folder
+from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.play")
 MAX_QUEUE = 100  # visits that may wait for a place

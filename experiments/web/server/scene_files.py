@@ -8,7 +8,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from mjsim.scene_export.store import GZIP
+from mjsim.formats.gltf.store import GZIP
 
 HEADERS = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
 _MEDIA_TYPES = {".glb": "model/gltf-binary", ".json": "application/json", ".webp": "image/webp"}
@@ -16,7 +16,7 @@ _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-
 
 
 def scene_route(folder: Path) -> Route:
-    """Serve the scenes in a folder, as `mjsim.scene_export.cache` leaves them; they need no token."""
+    """Serve the scenes in a folder, as `mjsim.formats.gltf.cache` leaves them; they need no token."""
 
     def serve(request: Request) -> Response:
         scene, name = request.path_params["hash"], request.path_params["name"]

@@ -18,10 +18,10 @@ from experiments.web.server.pages import CLIENT
 from experiments.web.view import timeline
 from experiments.web.view.recorder import RunRecorder
 from experiments.web.worker.encoders import data_url
+from mjsim.formats.gltf.cache import cached_scene
+from mjsim.formats.gltf.store import GZIP, scenes_folder
 from mjsim.house.scene.avatar import EYE_FORWARD
 from mjsim.render import render_pictures
-from mjsim.scene_export.cache import cached_scene
-from mjsim.scene_export.store import GZIP, scenes_folder
 
 _TYPES = {
     ".js": "text/javascript",

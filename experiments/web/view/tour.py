@@ -22,7 +22,7 @@ def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
 
     Args:
         house: The home.
-        scene: Its files, of `mjsim.scene_export`.
+        scene: Its files, of `mjsim.formats.gltf`.
         caption: What is said of it.
     """
     return run_page(house.catalogue.label, _tour(house), scene, tour=caption)

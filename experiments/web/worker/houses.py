@@ -11,9 +11,9 @@ from experiments.house import House
 from experiments.trials import warmup
 from experiments.web.worker.encoders import Image, data_url
 from hud.options.minimap import FLOORPLAN
+from mjsim.formats.gltf.cache import cached_floor, cached_scene
+from mjsim.formats.gltf.store import scenes_folder
 from mjsim.render import render_house_map, render_pictures
-from mjsim.scene_export.cache import cached_floor, cached_scene
-from mjsim.scene_export.store import scenes_folder
 
 DRAWING_TIMEOUT = 60.0  # s
 _pictures: dict[str, dict[str, Image]] = {}

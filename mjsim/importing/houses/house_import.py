@@ -9,31 +9,31 @@ from pathlib import Path
 import numpy as np
 from trimesh.transformations import translation_matrix
 
+from mjsim.formats.gltf.reader import INSTANCE, read_habitat, read_mesh_scene
+from mjsim.formats.mjcf_reader import SUFFIXES as MJCF
+from mjsim.formats.mjcf_reader import read_mjcf
+from mjsim.formats.procthor.reader import SUFFIXES as PROCTHOR
+from mjsim.formats.procthor.reader import read_procthor
+from mjsim.formats.robocasa import SUFFIXES as ROBOCASA
+from mjsim.formats.robocasa import read_robocasa
+from mjsim.formats.scene.mesh_files import MAX_TRIANGLES
+from mjsim.formats.scene.meshes import SUFFIXES as MESHES
+from mjsim.formats.scene.options import ImportDecision
+from mjsim.formats.scene.source_scene import HouseOptions, Piece, SourceScene, left_out, moved, words_of
+from mjsim.formats.scene.surface import Floats
+from mjsim.formats.sdf import SUFFIXES as SDF
+from mjsim.formats.sdf import read_sdf
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.check import Report, check_house_name
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.importing.houses.bins import place_bins
-from mjsim.importing.houses.gltf import INSTANCE, read_habitat, read_mesh_scene
 from mjsim.importing.houses.look import make_looks
-from mjsim.importing.houses.meshes import SUFFIXES as MESHES
-from mjsim.importing.houses.mjcf import SUFFIXES as MJCF
-from mjsim.importing.houses.mjcf import read_mjcf
 from mjsim.importing.houses.plan import Plan, make_plan, too_large
-from mjsim.importing.houses.procthor import SUFFIXES as PROCTHOR
-from mjsim.importing.houses.procthor import read_procthor
-from mjsim.importing.houses.robocasa import SUFFIXES as ROBOCASA
-from mjsim.importing.houses.robocasa import read_robocasa
 from mjsim.importing.houses.rooms import find_rooms, read_rooms
-from mjsim.importing.houses.sdf import SUFFIXES as SDF
-from mjsim.importing.houses.sdf import read_sdf
 from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.houses.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
-from mjsim.importing.houses.values import HouseOptions, Piece, SourceScene, left_out, moved, words_of
 from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
 from mjsim.importing.model_writer import write_png
-from mjsim.importing.reading import MAX_TRIANGLES
-from mjsim.importing.surface import Floats
-from mjsim.importing.values import ImportDecision
 from mjsim.support.files import work_folder
 from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError

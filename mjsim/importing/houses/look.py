@@ -8,11 +8,11 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
+from mjsim.formats.scene.source_scene import Piece
+from mjsim.formats.scene.surface import Floats, Surface, cleaned, joined
 from mjsim.importing.houses.plan import Mask
-from mjsim.importing.houses.values import Piece
 from mjsim.importing.look import Look, corner_normals
 from mjsim.importing.solid import is_closed
-from mjsim.importing.surface import Floats, Surface, cleaned, joined
 
 BUDGET = 150_000  # triangles of a house
 _LEAST = 100  # triangles that every mesh keeps

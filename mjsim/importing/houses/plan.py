@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
+from mjsim.formats.scene.source_scene import MAX_SIDE, unit_of
+from mjsim.formats.scene.surface import Floats
 from mjsim.importing.houses.solids import Solid
-from mjsim.importing.houses.values import MAX_SIDE, unit_of
-from mjsim.importing.surface import Floats
 from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m

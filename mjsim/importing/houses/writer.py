@@ -10,6 +10,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import trimesh
 
+from mjsim.formats.scene.source_scene import Bin
+from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE
@@ -17,9 +19,7 @@ from mjsim.importing.houses.look import DrawnMesh, picture_key
 from mjsim.importing.houses.plan import Plan
 from mjsim.importing.houses.rooms import Rooms
 from mjsim.importing.houses.solids import Solid
-from mjsim.importing.houses.values import Bin
 from mjsim.importing.model_writer import comment, look_lines, write_png
-from mjsim.importing.surface import Floats
 
 MODEL = "house.xml"
 MESHES = "meshes"

@@ -12,12 +12,12 @@ import trimesh
 from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_robocasa, write_sdf
 
 from experiments.cli import main as cli
+from mjsim.formats.scene.source_scene import HouseOptions
 from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.importing.houses.house_import import import_house
-from mjsim.importing.houses.values import HouseOptions
 from mjsim.values.errors import AssetError
 
 

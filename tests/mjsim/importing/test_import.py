@@ -19,6 +19,7 @@ from small_worlds import dropped
 from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments.cli import main as cli
 from experiments.house import House
+from mjsim.formats.scene.options import ImportOptions
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.object_rules import check_object
@@ -29,7 +30,6 @@ from mjsim.importing.mesh_import import add_mesh
 from mjsim.importing.object_import import import_object
 from mjsim.importing.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width
 from mjsim.importing.resting import STEADY, resting_pose
-from mjsim.importing.values import ImportOptions
 from mjsim.importing.weight import weigh
 from mjsim.support.files import remove_leftovers
 from mjsim.values.errors import AssetError, RenderError

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjsim.scene_export.export import export_scene
+from mjsim.formats.gltf.export import export_scene
 from tools.drawn_pairs import decoded, sampled_scene, served
 
 EMULATOR = Path(__file__).parents[4] / "experiments/web/client/node_modules/iwer/build/iwer.min.js"

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.scene_files import scene_route
-from mjsim.scene_export.store import GZIP, scenes_folder
+from mjsim.formats.gltf.store import GZIP, scenes_folder
 
 HASH = "0123456789abcdef0123"
 SCENE = b'{"house":"house.glb"}' * 50

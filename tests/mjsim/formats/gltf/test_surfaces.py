@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from glb_files import File, cast
 
+from mjsim.formats.gltf.glb import UPRIGHT, Glb
+from mjsim.formats.gltf.lights import lights_of
+from mjsim.formats.gltf.surfaces import drawn_scene, surfaces
+from mjsim.formats.gltf.textures import Images
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.rasteriser import Rasteriser
-from mjsim.scene_export.glb import UPRIGHT, Glb
-from mjsim.scene_export.lights import lights_of
-from mjsim.scene_export.surfaces import drawn_scene, surfaces
-from mjsim.scene_export.textures import Images
 from mjsim.values.errors import AssetError
 
 TETRAHEDRON = 'vertex="-.3 -.2 -.1 .5 -.3 -.1 0 .4 0 .1 0 .6"'

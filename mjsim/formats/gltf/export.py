@@ -10,6 +10,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjsim.formats.gltf import textures
+from mjsim.formats.gltf.cube_maps import FACES
+from mjsim.formats.gltf.glb import UPRIGHT, Glb
+from mjsim.formats.gltf.lights import lights_of, rounded
+from mjsim.formats.gltf.parts import divided
+from mjsim.formats.gltf.shapes import Floats
+from mjsim.formats.gltf.store import SCENE
+from mjsim.formats.gltf.surfaces import Surface, drawn_scene, surfaces
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.compiled.rooms import RoomMap
@@ -17,14 +25,6 @@ from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows
-from mjsim.scene_export import textures
-from mjsim.scene_export.cube_maps import FACES
-from mjsim.scene_export.glb import UPRIGHT, Glb
-from mjsim.scene_export.lights import lights_of, rounded
-from mjsim.scene_export.parts import divided
-from mjsim.scene_export.shapes import Floats
-from mjsim.scene_export.store import SCENE
-from mjsim.scene_export.surfaces import Surface, drawn_scene, surfaces
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
 

@@ -9,6 +9,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from mjsim.formats.procthor.plan import Thing
+from mjsim.formats.scene.meshes import primitive
+from mjsim.formats.scene.source_scene import Piece
+from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import STYLE, used_materials
 from mjsim.generator.furniture.catalogue import KINDS
 from mjsim.generator.furniture.look import draw_look
@@ -16,10 +20,6 @@ from mjsim.generator.furniture.piece import flattened
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.values import Asset
 from mjsim.house.catalogue.assets import models_root
-from mjsim.importing.houses.meshes import primitive
-from mjsim.importing.houses.procthor_plan import Thing
-from mjsim.importing.houses.values import Piece
-from mjsim.importing.surface import Floats
 from mjsim.support.files import read_json, read_text
 from mjsim.support.random_streams import stream
 from mjsim.values.errors import AssetError, brief

@@ -11,10 +11,8 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
-from mjsim.house.catalogue.model_files import read_model
-from mjsim.house.compiled.rooms import PREFIX, RoomMap
-from mjsim.importing.houses.meshes import primitive
-from mjsim.importing.houses.values import (
+from mjsim.formats.scene.meshes import primitive
+from mjsim.formats.scene.source_scene import (
     TEXTURE_SIDE,
     HouseOptions,
     Missing,
@@ -23,7 +21,9 @@ from mjsim.importing.houses.values import (
     SourceScene,
     left_out,
 )
-from mjsim.importing.surface import Floats, Surface
+from mjsim.formats.scene.surface import Floats, Surface
+from mjsim.house.catalogue.model_files import read_model
+from mjsim.house.compiled.rooms import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")

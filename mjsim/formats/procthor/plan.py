@@ -15,8 +15,8 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from mjsim.formats.scene.source_scene import NamedRoom, boxes_of, words_of
 from mjsim.generator.values import WALL
-from mjsim.importing.houses.values import NamedRoom, boxes_of, words_of
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 

@@ -13,7 +13,7 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.resolvers import FilePathResolver
 
-from mjsim.importing.surface import Floats, Surface, joined
+from mjsim.formats.scene.surface import Floats, Surface, joined
 from mjsim.support.files import check_input
 from mjsim.values.errors import AssetError
 

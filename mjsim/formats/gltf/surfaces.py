@@ -7,11 +7,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjsim.formats.gltf.cube_maps import laid_out
+from mjsim.formats.gltf.shapes import MESHES, Floats, Indices, Shape, shape_of
 from mjsim.render.profiles import FAST
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
-from mjsim.scene_export.cube_maps import laid_out
-from mjsim.scene_export.shapes import MESHES, Floats, Indices, Shape, shape_of
 from mjsim.values.errors import AssetError
 
 _OPAQUE_FROM = 0.995  # MuJoCo blends geoms of a lower alpha

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from trimesh.transformations import quaternion_matrix, scale_matrix
 
-from mjsim.importing.houses.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
-from mjsim.importing.houses.values import (
+from mjsim.formats.scene.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
+from mjsim.formats.scene.options import UNITS, ImportDecision
+from mjsim.formats.scene.source_scene import (
     MAX_SIDE,
     Bin,
     HouseOptions,
@@ -24,8 +25,7 @@ from mjsim.importing.houses.values import (
     numbers,
     unit_of,
 )
-from mjsim.importing.surface import Floats
-from mjsim.importing.values import UNITS, ImportDecision
+from mjsim.formats.scene.surface import Floats
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from small_worlds import scene_of
 
-from mjsim.formats.mjcf_scene import export_house
+from mjsim.formats.mjcf_writer import export_house
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import compose

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from mjsim.scene_export.shapes import Floats, Indices, Shape
+from mjsim.formats.gltf.shapes import Floats, Indices, Shape
 
 FACES = 6  # +x, -x, +y, -y, +z, -z below each other in an image
 _MAX_SHIFT = 0.015  # of the image in the middle of an edge, as a share of a face

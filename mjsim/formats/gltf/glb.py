@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.scene_export.shapes import Floats
-from mjsim.scene_export.surfaces import Surface
+from mjsim.formats.gltf.shapes import Floats
+from mjsim.formats.gltf.surfaces import Surface
 
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion xyzw that turns z up into y up
 _STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # m between quantised positions: 1/128 mm to 128 mm

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mjsim.importing.surface import Floats, Surface
-from mjsim.importing.values import UNITS, ImportDecision
+from mjsim.formats.scene.options import UNITS, ImportDecision
+from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.values.errors import AssetError
 
 TEXTURE_SIDE = 512  # px, longest side of a picture
@@ -67,7 +67,7 @@ class SourceScene:
 class HouseOptions:
     """What the user gives; None for what is to be found out."""
 
-    units: str | None = None  # key of `mjsim.importing.values.UNITS`
+    units: str | None = None  # key of `mjsim.formats.scene.options.UNITS`
     up: str | None = None  # `y` or `z`
     scale: float = 1.0  # factor on top of the unit
     floor: float | None = None  # height of the floor in the source, m

@@ -10,18 +10,18 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from trimesh.transformations import rotation_matrix
 
+from mjsim.formats.mjcf_reader import read_mjcf
+from mjsim.formats.procthor.furniture import Assets, Library, in_our_style
+from mjsim.formats.procthor.plan import PlanOpening, PlanWall, ProcthorPlan, Thing, read_plan
+from mjsim.formats.scene.options import ImportDecision
+from mjsim.formats.scene.source_scene import HouseOptions, NamedRoom, SourceScene, left_out
+from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import used_materials
 from mjsim.generator.palette import surfaces
 from mjsim.generator.programme import use_of
 from mjsim.generator.values import WALL, FloorPlan, Rectangle, Room
 from mjsim.house.catalogue.assets import models_root
 from mjsim.house.validation.object_rules import SIZE
-from mjsim.importing.houses.mjcf import read_mjcf
-from mjsim.importing.houses.procthor_furniture import Assets, Library, in_our_style
-from mjsim.importing.houses.procthor_plan import PlanOpening, PlanWall, ProcthorPlan, Thing, read_plan
-from mjsim.importing.houses.values import HouseOptions, NamedRoom, SourceScene, left_out
-from mjsim.importing.surface import Floats
-from mjsim.importing.values import ImportDecision
 
 SUFFIXES = (".json",)
 _ON = 0.05  # m from a wall, within which an opening is in it

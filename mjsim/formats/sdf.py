@@ -11,11 +11,11 @@ import numpy as np
 import trimesh
 from trimesh.transformations import compose_matrix
 
-from mjsim.importing.houses.meshes import primitive, read_parts
-from mjsim.importing.houses.values import HouseOptions, Missing, Piece, SourceScene, left_out, numbers
-from mjsim.importing.reading import PLAIN
-from mjsim.importing.surface import Floats, Surface
-from mjsim.importing.values import ImportDecision
+from mjsim.formats.scene.mesh_files import PLAIN
+from mjsim.formats.scene.meshes import primitive, read_parts
+from mjsim.formats.scene.options import ImportDecision
+from mjsim.formats.scene.source_scene import HouseOptions, Missing, Piece, SourceScene, left_out, numbers
+from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError
 

@@ -1,0 +1,1 @@
+"""House JSON of ProcTHOR, read and written."""
