@@ -98,8 +98,8 @@ def _add_house(kinds: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra()  # then trimesh, CoACD and OpenGL are loaded: other commands start fast
-    from mjsim.importing.house_extension import Entry, HouseExtension
-    from mjsim.importing.mesh_import import add_mesh
+    from mjsim.importing.object.house_extension import Entry, HouseExtension
+    from mjsim.importing.object.mesh_import import add_mesh
 
     entry = Entry.named(arguments.name or arguments.file.stem, arguments.category)
     options = ImportOptions(arguments.units, arguments.up, arguments.scale, arguments.mass, arguments.density)
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
 def run_house(arguments: argparse.Namespace) -> int:
     require_extra()
     from mjsim.formats.scene.source_scene import HouseOptions
-    from mjsim.importing.houses.house_import import import_house
+    from mjsim.importing.house.house_import import import_house
 
     options = HouseOptions(
         arguments.units,

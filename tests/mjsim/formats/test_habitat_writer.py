@@ -12,7 +12,7 @@ from mjsim.formats.scene.source_scene import HouseOptions
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
-from mjsim.importing.houses.house_import import import_house
+from mjsim.importing.house.house_import import import_house
 
 Z_TO_Y = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 

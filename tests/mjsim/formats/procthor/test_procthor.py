@@ -13,7 +13,7 @@ from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import floor_plan_of
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
-from mjsim.importing.houses.house_import import import_house
+from mjsim.importing.house.house_import import import_house
 from mjsim.values.errors import AssetError
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_dilation, label
 
 from mjsim.formats.scene.source_scene import NamedRoom, Piece, merged_rectangles, words_of
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.houses.plan import CELL, Mask, Plan, clearance
+from mjsim.importing.house.plan import CELL, Mask, Plan, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 

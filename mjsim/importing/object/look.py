@@ -10,8 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from mjsim.formats.scene.surface import Floats, Ints, Surface
-from mjsim.importing.atlas import Atlas
-from mjsim.importing.solid import is_closed, simplified
+from mjsim.importing.object.atlas import Atlas
+from mjsim.importing.object.solid import is_closed, simplified
 
 MAX_TRIANGLES = 1400
 _SAMPLES = 200_000  # points of the file's surface among which the nearest is looked for

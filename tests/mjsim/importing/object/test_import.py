@@ -23,14 +23,14 @@ from mjsim.formats.scene.options import ImportOptions
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.object_rules import check_object
-from mjsim.importing import house_extension
-from mjsim.importing.atlas import SIDE, Atlas
-from mjsim.importing.house_extension import Entry, HouseExtension, held_in
-from mjsim.importing.mesh_import import add_mesh
-from mjsim.importing.object_import import import_object
-from mjsim.importing.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width
-from mjsim.importing.resting import STEADY, resting_pose
-from mjsim.importing.weight import weigh
+from mjsim.importing.object import house_extension
+from mjsim.importing.object.atlas import SIDE, Atlas
+from mjsim.importing.object.house_extension import Entry, HouseExtension, held_in
+from mjsim.importing.object.mesh_import import add_mesh
+from mjsim.importing.object.object_import import import_object
+from mjsim.importing.object.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width
+from mjsim.importing.object.resting import STEADY, resting_pose
+from mjsim.importing.object.weight import weigh
 from mjsim.support.files import remove_leftovers
 from mjsim.values.errors import AssetError, RenderError
 from mjsim.values.options import WorldOptions
@@ -455,7 +455,7 @@ def test_a_failure_while_installing_leaves_all_as_it_was(tmp_path, monkeypatch, 
     def fail(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("mjsim.importing.house_extension.load_catalogue", fail)
+    monkeypatch.setattr("mjsim.importing.object.house_extension.load_catalogue", fail)
     with pytest.raises(OSError, match="disk full"):
         add_mesh(
             brick(tmp_path), extension, Entry.named("brick", "toys"), ImportOptions(mass=0.4), force=force
@@ -496,7 +496,7 @@ def test_without_opengl_an_object_is_imported_without_its_picture(tmp_path, monk
     def fail(*_):
         raise RenderError("no OpenGL")
 
-    monkeypatch.setattr("mjsim.importing.mesh_import.write_preview", fail)
+    monkeypatch.setattr("mjsim.importing.object.mesh_import.write_preview", fail)
     assert report(add(tmp_path, tmp_path / "own"), "preview") == "none: no OpenGL"
     written = json.loads((tmp_path / "own/brick/report.json").read_text(encoding="utf-8"))
     assert written[-1]["reason"] == "no OpenGL"

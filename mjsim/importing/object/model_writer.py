@@ -10,8 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.look import Look
-from mjsim.importing.object_import import ImportedObject
+from mjsim.importing.object.look import Look
+from mjsim.importing.object.object_import import ImportedObject
 from mjsim.values.errors import AssetError
 
 MODEL = "object.xml"

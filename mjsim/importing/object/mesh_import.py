@@ -7,11 +7,11 @@ from pathlib import Path
 from mjsim.formats.scene.options import ImportDecision, ImportOptions
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_object
-from mjsim.importing.grip import MAX_OFFSET
-from mjsim.importing.house_extension import Entry, HouseExtension
-from mjsim.importing.model_writer import write_model
-from mjsim.importing.object_import import ImportedObject, import_object
-from mjsim.importing.preview import write_preview
+from mjsim.importing.object.grip import MAX_OFFSET
+from mjsim.importing.object.house_extension import Entry, HouseExtension
+from mjsim.importing.object.model_writer import write_model
+from mjsim.importing.object.object_import import ImportedObject, import_object
+from mjsim.importing.object.preview import write_preview
 from mjsim.values.errors import AssetError, RenderError
 
 PREVIEW, REPORT = "preview.png", "report.json"

@@ -8,7 +8,7 @@ import scipy.spatial
 import trimesh
 
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.parts import MIN_WIDTH
+from mjsim.importing.object.parts import MIN_WIDTH
 
 STEADY = math.radians(12.0)  # an object that tips over when tilted by less does not stand
 _CONTACT = 0.0005  # m above the lowest point that touches the floor

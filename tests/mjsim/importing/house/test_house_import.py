@@ -17,7 +17,7 @@ from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.checked_model import Compiled
-from mjsim.importing.houses.house_import import import_house
+from mjsim.importing.house.house_import import import_house
 from mjsim.values.errors import AssetError
 
 

@@ -12,8 +12,8 @@ from mjsim.formats.scene.source_scene import Bin
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue, Receptacle
 from mjsim.house.validation.checked_model import Compiled, compile_model
-from mjsim.importing.houses.plan import BODY, CELL, Mask, Plan, clearance
-from mjsim.importing.houses.rooms import Rooms
+from mjsim.importing.house.plan import BODY, CELL, Mask, Plan, clearance
+from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
 AREA = 5.0  # m^2 of walkable floor for each bin

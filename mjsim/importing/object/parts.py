@@ -9,7 +9,7 @@ import trimesh
 
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import THIN
-from mjsim.importing.solid import Solid, simplified
+from mjsim.importing.object.solid import Solid, simplified
 
 MAX_PARTS = 6
 MAX_VERTICES = 64  # of a part

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt, label
 
 from mjsim.formats.scene.source_scene import MAX_SIDE, unit_of
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.houses.solids import Solid
+from mjsim.importing.house.solids import Solid
 from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m

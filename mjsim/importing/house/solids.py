@@ -12,7 +12,7 @@ from scipy.spatial import QhullError
 
 from mjsim.formats.scene.source_scene import Piece, merged_rectangles
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.parts import _few_vertices
+from mjsim.importing.object.parts import _few_vertices
 
 BUDGET = 1500  # geoms that collide
 LOW, HIGH = 0.051, 1.9  # m; what ends below is walked over, what begins above is only seen

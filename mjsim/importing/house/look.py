@@ -10,9 +10,9 @@ import trimesh
 
 from mjsim.formats.scene.source_scene import Piece
 from mjsim.formats.scene.surface import Floats, Surface, cleaned, joined
-from mjsim.importing.houses.plan import Mask
-from mjsim.importing.look import Look, corner_normals
-from mjsim.importing.solid import is_closed
+from mjsim.importing.house.plan import Mask
+from mjsim.importing.object.look import Look, corner_normals
+from mjsim.importing.object.solid import is_closed
 
 BUDGET = 150_000  # triangles of a house
 _LEAST = 100  # triangles that every mesh keeps

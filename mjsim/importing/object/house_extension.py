@@ -17,7 +17,7 @@ from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE, parse_house
 from mjsim.house.compiled.house import compiled_house
-from mjsim.importing.model_writer import MODEL
+from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 

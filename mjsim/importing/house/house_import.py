@@ -26,14 +26,14 @@ from mjsim.formats.sdf import read_sdf
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.check import Report, check_house_name
 from mjsim.house.validation.findings import Finding, errors
-from mjsim.importing.houses.bins import place_bins
-from mjsim.importing.houses.look import make_looks
-from mjsim.importing.houses.plan import Plan, make_plan, too_large
-from mjsim.importing.houses.rooms import find_rooms, read_rooms
-from mjsim.importing.houses.solids import HIGH, LOW, Solids, make_solids
-from mjsim.importing.houses.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
-from mjsim.importing.houses.writer import ImportedHouse, set_points, write_house
-from mjsim.importing.model_writer import write_png
+from mjsim.importing.house.bins import place_bins
+from mjsim.importing.house.look import make_looks
+from mjsim.importing.house.plan import Plan, make_plan, too_large
+from mjsim.importing.house.rooms import find_rooms, read_rooms
+from mjsim.importing.house.solids import HIGH, LOW, Solids, make_solids
+from mjsim.importing.house.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
+from mjsim.importing.house.writer import ImportedHouse, set_points, write_house
+from mjsim.importing.object.model_writer import write_png
 from mjsim.support.files import work_folder
 from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError

@@ -15,11 +15,11 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE
-from mjsim.importing.houses.look import DrawnMesh, picture_key
-from mjsim.importing.houses.plan import Plan
-from mjsim.importing.houses.rooms import Rooms
-from mjsim.importing.houses.solids import Solid
-from mjsim.importing.model_writer import comment, look_lines, write_png
+from mjsim.importing.house.look import DrawnMesh, picture_key
+from mjsim.importing.house.plan import Plan
+from mjsim.importing.house.rooms import Rooms
+from mjsim.importing.house.solids import Solid
+from mjsim.importing.object.model_writer import comment, look_lines, write_png
 
 MODEL = "house.xml"
 MESHES = "meshes"

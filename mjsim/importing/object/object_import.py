@@ -11,13 +11,13 @@ from mjsim.formats.scene.mesh_files import missing_colours, read_surface
 from mjsim.formats.scene.options import ImportDecision, ImportOptions
 from mjsim.formats.scene.surface import Floats, Surface, cleaned
 from mjsim.house.validation.object_rules import SIZE
-from mjsim.importing.grip import Grip, find_grip
-from mjsim.importing.look import Look, make_look
-from mjsim.importing.parts import Parts, convex_parts
-from mjsim.importing.resting import STEADY, RestingPose, foot, resting_pose
-from mjsim.importing.scaling import Scaling, scaling
-from mjsim.importing.solid import MAX_TRIANGLES, Solid, close, simplified
-from mjsim.importing.weight import Weight, weigh
+from mjsim.importing.object.grip import Grip, find_grip
+from mjsim.importing.object.look import Look, make_look
+from mjsim.importing.object.parts import Parts, convex_parts
+from mjsim.importing.object.resting import STEADY, RestingPose, foot, resting_pose
+from mjsim.importing.object.scaling import Scaling, scaling
+from mjsim.importing.object.solid import MAX_TRIANGLES, Solid, close, simplified
+from mjsim.importing.object.weight import Weight, weigh
 from mjsim.values.errors import AssetError
 
 _COARSE = 0.005  # of the longest side, greatest distance between numbers of 32 bits

@@ -7,7 +7,7 @@ import numpy as np
 from mjsim.formats.scene.options import ImportDecision
 from mjsim.formats.scene.source_scene import Piece, left_out
 from mjsim.house.validation.object_rules import SIZE
-from mjsim.importing.houses.solids import LOW
+from mjsim.importing.house.solids import LOW
 from mjsim.values.errors import AssetError
 
 _STOREY = 2.1  # m above a floor, from where on another floor is another storey

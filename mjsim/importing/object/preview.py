@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.model_files import read_model
-from mjsim.importing.model_writer import write_png
+from mjsim.importing.object.model_writer import write_png
 from mjsim.render.pictures import draw_picture
 from mjsim.values.errors import AssetError
 
