@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from mjsim.generator.openings import open_up, portions
 from mjsim.generator.plan import draw_rooms
 from mjsim.generator.programme import NEEDS, draw_programme
-from mjsim.generator.values import ROOMS, SIDES, WALL, FloorPlan, Rectangle
+from mjsim.generator.values import SIDES, WALL, FloorPlan, Rectangle
+from mjsim.house.catalogue.generated_names import ROOMS
 from mjsim.values.errors import HouseError
 
 CASES = given(seed=st.integers(0, 10**6), rooms=st.integers(1, 7))
