@@ -15,8 +15,8 @@ from mjsim.house.scene.sampling import points_that_fit, sample_episode
 from mjsim.house.scene.scene import assemble
 from mjsim.house.validation.checked_model import Compiled, compile_model
 from mjsim.house.validation.findings import Finding, errors
-from mjsim.house.validation.object_rules import check_object
-from mjsim.house.validation.receptacle_rules import check_receptacle
+from mjsim.house.validation.object_rules import check_compiled_object
+from mjsim.house.validation.receptacle_rules import check_compiled_receptacle
 from mjsim.house.validation.validate import check_house, require_usable
 from mjsim.house.validation.views import Drawing, floor_view, side_views
 from mjsim.values.episode import POINTS, Episode
@@ -146,13 +146,16 @@ def _check_model(path: Path, load: Load) -> Report:
         raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
     bodies = {e.get("name") for e in elements(path) if e.tag == "body"}
     if "receptacle" in bodies:
-        findings, kind = check_receptacle(path), "receptacle"
+        kind, rules = "receptacle", check_compiled_receptacle
     elif "object" in bodies or not path.with_name(CATALOGUE).is_file():
-        findings, kind = check_object(path), "object"
+        kind, rules = "object", check_compiled_object
     else:
         return check_house_name(str(path.with_name(CATALOGUE)), load)
-    compiled = compile_model(kind, path)
-    if not isinstance(compiled, Compiled) or not len(compiled.solid):
+    compiled = compile_model(f"{kind} {path.stem}", path)
+    if not isinstance(compiled, Compiled):
+        return Report(kind, str(path), tuple(compiled))
+    findings = rules(compiled)
+    if not len(compiled.solid):
         return Report(kind, str(path), tuple(findings))
     size = np.ptp(compiled.extent(compiled.solid), axis=0)
     facts = {

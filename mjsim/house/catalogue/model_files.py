@@ -3,7 +3,8 @@
 import hashlib
 import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -11,6 +12,41 @@ import mujoco
 from mjsim.house.catalogue.assets import models_root
 from mjsim.support.files import is_file, read_bytes
 from mjsim.values.errors import AssetError
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFile:
+    """An MJCF file, read with everything that it includes or refers to.
+
+    Attributes:
+        path: The file.
+        elements: Its elements and those of the files that it includes; none of files that are not XML.
+    """
+
+    path: Path
+    elements: tuple[ET.Element, ...]
+
+    @classmethod
+    def read(cls, path: Path) -> "ModelFile":
+        """Read a file, and check that it and the files that it leads to can be read.
+
+        Raises:
+            OSError: The file cannot be read.
+            UnicodeDecodeError: It is not UTF-8.
+            AssetError: A file that it leads to cannot be read. One that is missing is reported by `spec`.
+        """
+        content = read_bytes(path)
+        content.decode("utf-8-sig")
+        files = {str(path): content}
+        elements = tuple(_parsed(content, str(path.parent), files))
+        _read_assets(path.parent, elements, files)
+        return cls(path, elements)
+
+    def spec(self) -> mujoco.MjSpec:
+        """An editable model with absolute names of asset files; MuJoCo's ValueError if it refuses the file."""
+        spec = mujoco.MjSpec.from_file(str(self.path))
+        _name_files(spec, self.path.parent)
+        return spec
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
@@ -21,11 +57,11 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
         raise AssetError(f"cannot read model {path}: {error}") from error
     if body is not None and (spec.body(body) is None or spec.body(body).parent != spec.worldbody):
         raise AssetError(f"model {path} has no top-level body {body!r}")
-    name_files(spec, path.parent)
+    _name_files(spec, path.parent)
     return spec
 
 
-def name_files(spec: mujoco.MjSpec, folder: Path) -> None:
+def _name_files(spec: mujoco.MjSpec, folder: Path) -> None:
     """Name the asset files of a spec absolutely, in place; `folder` is that of its file."""
     for mesh in spec.meshes:
         mesh.file = _absolute(folder, spec.compiler.meshdir, mesh.file)
@@ -59,15 +95,7 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
     """
     files: dict[str, bytes] = {}
     for model in models:
-        elements = list(_elements(str(model), str(model.parent), files))
-        settings = {name: value for e in elements if e.tag == "compiler" for name, value in e.items()}
-        for element in elements:
-            for name in [name for name in element.attrib if name.startswith("file")]:
-                kind = "texturedir" if element.tag == "texture" else "meshdir"
-                folder = settings.get(kind, settings.get("assetdir", ""))
-                file = f"{model.parent}/{folder}/{element.get(name)}"
-                if not _read(file, files) and element.tag == "texture":
-                    _read(_texture(model.parent, folder, element.get(name, "")), files)
+        _read_assets(model.parent, list(_elements(str(model), str(model.parent), files)), files)
     # In the order in which they are referred to: two files that swap their contents are another house.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
@@ -75,16 +103,32 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
 
 def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
     """All elements of an MJCF file in a folder and of the files that it includes; adds these to `files`."""
-    if path in files or not _read(path, files):
-        return
+    if path not in files and _read(path, files):
+        yield from _parsed(files[path], folder, files)
+
+
+def _parsed(content: bytes, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
+    """Like `_elements`, for the content of a file in a folder."""
     try:
-        root = ET.fromstring(files[path])
+        root = ET.fromstring(content)
     except ET.ParseError:
         return
     for element in root.iter():
         yield element
         if element.tag == "include":
             yield from _elements(f"{folder}/{element.get('file')}", folder, files)
+
+
+def _read_assets(folder: Path, elements: Sequence[ET.Element], files: dict[str, bytes]) -> None:
+    """Add the files that the elements of a model in a folder refer to."""
+    settings = {name: value for e in elements if e.tag == "compiler" for name, value in e.items()}
+    for element in elements:
+        for name in [name for name in element.attrib if name.startswith("file")]:
+            kind = "texturedir" if element.tag == "texture" else "meshdir"
+            place = settings.get(kind, settings.get("assetdir", ""))
+            found = _read(f"{folder}/{place}/{element.get(name)}", files)
+            if not found and element.tag == "texture":
+                _read(_texture(folder, place, element.get(name, "")), files)
 
 
 def _read(path: str, files: dict[str, bytes]) -> bool:

@@ -10,10 +10,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.catalogue.model_files import content_hash, elements, name_files
+from mjsim.house.catalogue.model_files import ModelFile
 from mjsim.house.compiled.footprint import outline_points
 from mjsim.house.validation.findings import Finding
-from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError
 
 MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
@@ -93,14 +92,11 @@ class Compiled:
 def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
     """Compile an MJCF file on its own, or say why that cannot be done."""
     try:
-        read_text(path)
-        content_hash("", [path])  # reads all that the file refers to, or says why not
+        file = ModelFile.read(path)
         # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
-        if found := list(check_numbers(subject, path)):
+        if found := list(check_numbers(subject, file)):
             return found
-        spec = mujoco.MjSpec.from_file(str(path))
-        name_files(spec, path.parent)
-        return Compiled.of(subject, path, spec.compile())
+        return Compiled.of(subject, path, file.spec().compile())
     except OSError as error:
         message, remedy = f"{path} cannot be read: {error.strerror}", "correct the path"
     except AssetError as error:
@@ -112,9 +108,9 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
     return [Finding("file", subject, message, remedy, file=path.name)]
 
 
-def check_numbers(subject: str, path: Path) -> Iterator[Finding]:
+def check_numbers(subject: str, model: ModelFile) -> Iterator[Finding]:
     """Numbers in the text that are not finite or absurdly large: MuJoCo takes some of them for missing."""
-    for element in elements(path):
+    for element in model.elements:
         for name, value in element.items():
             if name in _TEXT or element.tag in ("include", "text"):
                 continue
@@ -125,7 +121,7 @@ def check_numbers(subject: str, path: Path) -> Iterator[Finding]:
                     subject,
                     f"<{element.tag} {label}> has {name}={bad}",
                     "give a finite number in metres, kilograms, seconds or radians",
-                    file=path.name,
+                    file=model.path.name,
                 )
 
 

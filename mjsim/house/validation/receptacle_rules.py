@@ -25,8 +25,11 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 def check_receptacle(path: Path, key: str | None = None) -> list[Finding]:
     """All that is wrong with a receptacle's MJCF file; its `key` in the catalogue is by default the file's name."""
     compiled = compile_model(f"receptacle {key or path.stem}", path)
-    if not isinstance(compiled, Compiled):
-        return compiled
+    return check_compiled_receptacle(compiled) if isinstance(compiled, Compiled) else compiled
+
+
+def check_compiled_receptacle(compiled: Compiled) -> list[Finding]:
+    """All that is wrong with a compiled receptacle."""
     found = [*check_structure(compiled, "receptacle"), *_sites(compiled)]
     return found if errors(found) else [finding for rule in RULES for finding in rule(compiled)]
 
