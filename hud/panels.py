@@ -61,10 +61,15 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, when_empty: tuple[str, str],
     face, colour = (theme.LABEL, theme.TEXT) if held else (theme.DETAIL, theme.QUIET)
     lines: tuple[str, ...] = ()
     # A long name gets a wider slot at the cost of the view between the hands.
-    for size in (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY,):
+    for size in (
+        (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY, theme.SLOT_WIDTH)
+    ):
         width = min(px(size), (canvas.width - px(theme.GAP)) // 2)
         room = width - px(theme.PADDING) - inset
-        lines = when_empty if slot.label is None else canvas.typeface.wrap(slot.label, face, room, 2)
+        if slot.label is None:
+            lines = tuple(canvas.typeface.fit(line, face, room) for line in when_empty)
+        else:
+            lines = canvas.typeface.wrap(slot.label, face, room, 2)
         if not any(line.endswith(ELLIPSIS) for line in lines):
             break
     left = 0 if at_the_left else canvas.width - width

@@ -8,7 +8,7 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 @dataclass(frozen=True)
 class HudTexts:
-    """All words that the HUD draws.
+    """All words that are drawn into the picture.
 
     In `{object}` and `{receptacle}` stands a label as it reads within an English sentence ("blue mug"), in `{Object}`
     and `{Receptacle}` the label itself ("Blue mug").
@@ -32,6 +32,11 @@ class HudTexts:
     left_hand: str
     right_hand: str
     empty: str
+    # Floor plan with the paths of a trial
+    path_planned: str  # {metres}
+    path_walked: str  # {metres}
+    path_start: str
+    recorded: str
     # Stand-ins for labels in messages
     object: str
     receptacle: str

@@ -8,6 +8,7 @@ from experiments.cli.options import (
     add_command,
     add_force,
     add_frame,
+    add_language,
     add_setting,
     film_config,
     seconds,
@@ -32,6 +33,7 @@ def add_parser(commands: Any) -> None:
     )
     add_force(parser)
     add_frame(parser)
+    add_language(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,13 +42,21 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out.suffix != ".mp4":
         raise ConfigError(f"cannot film to {arguments.out}: name a file that ends in .mp4")
     check_file(arguments.out, replace=arguments.force)
-    frames = film_house(arguments.house, arguments.out, film_config(arguments), arguments.seconds)
+    frames = film_house(
+        arguments.house, arguments.out, film_config(arguments), arguments.seconds, arguments.language
+    )
     print(f"{arguments.out} (frames {frames})")
     return 0
 
 
-def film_house(name: str, path: Path, film: FilmConfig | None = None, seconds: float | None = None) -> str:
-    """Film the house with a name, with a progress bar; the SHA-256 of the frames."""
+def film_house(
+    name: str,
+    path: Path,
+    film: FilmConfig | None = None,
+    seconds: float | None = None,
+    language: str = "en",
+) -> str:
+    """Film the house with a name and captions in a language, with a progress bar; the SHA-256 of the frames."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     from experiments.cli.terminal import error_console, progress_bars
@@ -60,10 +70,11 @@ def film_house(name: str, path: Path, film: FilmConfig | None = None, seconds: f
         TextColumn("left"),
         TimeRemainingColumn(),
     )
+    house = House.load(name)
     with progress_bars(error_console(), *columns) as bars:
         bar = bars.add_task("frames", total=None)
         return write_flythrough(
-            House.load(name),
+            house.in_language(language, house.texts),  # captions are labels only
             path,
             film or FilmConfig(),
             seconds=seconds,

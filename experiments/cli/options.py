@@ -224,6 +224,13 @@ def add_frame(
     )
 
 
+def add_language(parser: argparse.ArgumentParser) -> None:
+    """Add `--language`."""
+    parser.add_argument(
+        "--language", default="en", metavar="LANG", help="language of the words in the film (default: en)"
+    )
+
+
 def film_config(arguments: argparse.Namespace) -> FilmConfig:
     """The options of `add_frame`."""
     width, height = arguments.size

@@ -13,6 +13,7 @@ from experiments.cli.options import (
     add_command,
     add_force,
     add_frame,
+    add_language,
     film_config,
     seconds,
 )
@@ -76,6 +77,7 @@ def add_parser(commands: Any) -> None:
         size=None,
         otherwise=" (default: 640x480; of a session that a browser drew, the shape of its page)",
     )
+    add_language(parser)
     add_force(parser, "replace a video that exists")
 
 
@@ -134,6 +136,7 @@ def run(arguments: argparse.Namespace) -> int:
                 film=film,
                 assistance=arguments.assistance,
                 catalogue=arguments.house,
+                language=arguments.language,
                 on_progress=lambda done, total: bars.update(bar, completed=done, total=total),
             )
     except ReplayError as error:

@@ -172,6 +172,11 @@ class Study:
     rehearsal: bool = False  # whether all its people are simulated
 
     @property
+    def words(self) -> Mapping[str, Mapping[str, str]]:
+        """Its texts by section and name, without items of forms."""
+        return {name: section.words for name, section in self.texts.items()}
+
+    @property
     def people(self) -> int:
         return sum(len(cell.trials) for cell in self.cells)
 

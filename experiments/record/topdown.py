@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.record.records import Event
 from hud.text import Typeface
+from hud.texts import HudTexts, filled
 from hud.theme import Face
 from mjsim.support.files import replacing
 from mjsim.support.kernels import cache_base
@@ -51,8 +52,8 @@ def draw_topdown(
     """
     planned = planned_path(house, episode, plan)
     lines = {
-        f"planned at the start, {_length(planned):.1f} m": (planned, PLANNED),
-        f"walked, {_length(walked):.1f} m": (walked, WALKED),
+        _with_length(house.texts.path_planned, planned, house.texts): (planned, PLANNED),
+        _with_length(house.texts.path_walked, walked, house.texts): (walked, WALKED),
     }
     drawing = _drawn_task(house, episode, lines, walked[0])
     drawing.text(origin, np.array([drawing.width - MARGIN - 30.0, MARGIN / 2]), Face(12, 500), ORIGIN)
@@ -89,6 +90,7 @@ def _drawn_task(
     present = {o.category for o in episode.objects}
     drawing.legend(
         {label: colour for label, (_, colour) in lines.items()},
+        house.texts.path_start,
         [(colour, category.label) for colour, category in kinds if category.key in present],
     )
     return drawing
@@ -164,11 +166,11 @@ class _Drawing:
             self._cover(cv2.dilate(mask, np.ones((5, 5), np.uint8)), left, top, WHITE)
         self._cover(mask, left, top, colour)
 
-    def legend(self, lines: Mapping[str, str], categories: Sequence[tuple[str, str]]) -> None:
+    def legend(self, lines: Mapping[str, str], start: str, categories: Sequence[tuple[str, str]]) -> None:
         """Colours of ways by label, the start, and the colours of the categories, column by column."""
         draws: list[tuple[Callable[[_Points], None], str]] = [
             *((functools.partial(self._sample, colour=colour), label) for label, colour in lines.items()),
-            (self.star, "start"),
+            (self.star, start),
             *((functools.partial(self.dot, colour=tone), label) for tone, label in categories),
         ]
         for number, (draw, label) in enumerate(draws):
@@ -227,6 +229,10 @@ def _fixed(parts: Sequence[_Points]) -> list[NDArray[np.int32]]:
 def _rgb(colour: str) -> tuple[int, int, int]:
     red, green, blue = bytes.fromhex(colour[1:])
     return red, green, blue
+
+
+def _with_length(text: str, points: _Points, texts: HudTexts) -> str:
+    return filled(text, metres=f"{_length(points):.1f}".replace(".", texts.decimal))
 
 
 def _length(points: NDArray[Any]) -> float:

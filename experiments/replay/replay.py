@@ -95,6 +95,7 @@ def replay(
     assistance: str | None = None,
     house: House | None = None,
     catalogue: str | None = None,
+    language: str = "en",
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> ReplayReport:
     """Simulate a run again and compare every control step with the record.
@@ -108,6 +109,7 @@ def replay(
             recorded ones in any case.
         house: The house of the run, if it is loaded already.
         catalogue: Where its catalogue lies now, if not where it was; its content must be the recorded one.
+        language: Language of the words in the film.
         on_progress: Called with the numbers of replayed and of recorded control steps.
 
     Raises:
@@ -123,7 +125,7 @@ def replay(
     duration = float(record.trajectory["time"][-1])
     if start > round(duration, 6):  # the log is rounded like that
         raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
-    house = house or _house_of(directory, record, catalogue)
+    house = (house or _house_of(directory, record, catalogue)).in_language(language)
     shown = assistance or str(record.start["assistance"])
     replayer = Replayer(directory, record, house, start=start, assistance=shown)
     with ExitStack() as stack:

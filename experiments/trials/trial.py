@@ -15,7 +15,7 @@ from experiments.house import House
 from experiments.procedure.familiarise import Familiarisation, familiarise
 from experiments.record import records
 from experiments.record.export import NOTHING_FILMED, save_record
-from experiments.record.origin import origin_of
+from experiments.record.origin import RECORDED, origin_of
 from experiments.record.phases import TRAINING
 from experiments.record.reader import Record
 from experiments.record.records import EventLog
@@ -115,6 +115,7 @@ def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
         return None
     try:
         origin = origin_of([record.start["user"]])
+        origin = house.texts.recorded if origin == RECORDED else origin
         with work_folder(Path(os.path.realpath(run)).parent) as folder:
             walked = record.trajectory["position"]
             draw_topdown(folder / records.TOPDOWN, house, record.episode, record.plans[0], walked, origin)

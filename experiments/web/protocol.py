@@ -146,6 +146,7 @@ class Open(WireMessage, frozen=True):
 
     `restarted` tells that the worker before has died, `as_inputs_come` that control steps are taken as soon as their
     inputs are promised, faster than real time, as in a rehearsal, and `floor_plan` that one of the task is drawn.
+    `language` is that of the labels and of the HUD, whose words `texts` replaces if it is not empty.
     """
 
     folder: str
@@ -155,6 +156,8 @@ class Open(WireMessage, frozen=True):
     restarted: bool = False
     as_inputs_come: bool = False
     floor_plan: bool = True
+    language: str = "en"
+    texts: dict[str, str] = {}
 
 
 class State(WireMessage, frozen=True):

@@ -174,5 +174,5 @@ def _film(study: "Study", arguments: argparse.Namespace) -> Path | None:
     if not path.is_file():
         from experiments.cli.flythrough import film_house
 
-        film_house(study.cells[0].trial(0).house, path)
+        film_house(study.cells[0].trial(0).house, path, language=study.settings.language)
     return path

@@ -27,7 +27,7 @@ from experiments.people.study_file import PLAYED, Study
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Guards, Network, allowed_hosts
-from experiments.web.server.pages import page
+from experiments.web.server.pages import page, trial_texts
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
@@ -212,7 +212,7 @@ class ResearcherServer:
         person = await self._found(request.path_params["number"])
         if person is None:
             return self._message(request, 404, *UNKNOWN)
-        return self._page(request, who, "watch", person=person)
+        return self._page(request, who, "watch", person=person, texts=trial_texts(self._study.words))
 
     async def _watch(self, socket: WebSocket) -> None:
         who = await self._access.who(socket)

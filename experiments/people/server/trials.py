@@ -17,7 +17,7 @@ from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.capacity import Capacity, usable_cores
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.meter import Meter
-from experiments.web.server.pages import page
+from experiments.web.server.pages import page, trial_texts
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Sessions
 from experiments.web.server.visits import PLAYED, Visit
@@ -68,7 +68,15 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(
-            pool, self._limit, settings.limits.idle, self._minimum, meter, capacity, floor_plans=False
+            pool,
+            self._limit,
+            settings.limits.idle,
+            self._minimum,
+            meter,
+            capacity,
+            floor_plans=False,
+            language=settings.language,
+            texts=self._study.words["hud"],
         )
         self._usual = 60.0 * settings.minutes  # of the whole study, until trials have ended
         self._sockets: Counter[int] = Counter()  # by person
@@ -88,6 +96,8 @@ class Trials:
         return page(
             request,
             "play",
+            lang=self._study.settings.language,
+            texts=trial_texts(self._study.words),
             trial=visit.phase,
             objects=settings["objects"],
             draw=settings["draw"],

@@ -21,12 +21,13 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError
+from experiments.house import read_words
 from experiments.procedure.comprehension import Question
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, Rate, allowed_hosts
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.pages import message_page, page
+from experiments.web.server.pages import message_page, page, trial_texts
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.readings import Readings
 from experiments.web.server.scene_files import scene_route
@@ -205,6 +206,7 @@ class PlayServer:
             return page(
                 request,
                 "play",
+                texts=trial_texts(read_words()),
                 trial=visit.phase,
                 objects=settings["objects"],
                 draw=settings["draw"],
@@ -213,9 +215,9 @@ class PlayServer:
                 xr=self._config.xr,
             )
         again = visit.settings(TASK)["episode"] is None  # else there is but one, whose best way was shown
-        return page(
-            request, "result", metrics=visit.metrics(TASK), again=again, token=request.path_params["token"]
-        )
+        words, token = read_words(), request.path_params["token"]
+        texts = {**words["hud"], **words["result"]}
+        return page(request, "result", texts=texts, metrics=visit.metrics(TASK), again=again, token=token)
 
     def _film(self, request: Request) -> Response:
         visit = self._visits.find(request.path_params["token"])

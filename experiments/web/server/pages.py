@@ -1,6 +1,7 @@
 """The pages, from the Jinja2 templates of the client."""
 
 import functools
+from collections.abc import Mapping
 from typing import Any
 
 from starlette.requests import Request
@@ -9,6 +10,7 @@ from starlette.templating import Jinja2Templates
 
 from experiments.web.modules import STATIC, modules_of
 from experiments.web.server.static_files import static_url
+from hud.texts import filled
 
 CLIENT = STATIC.parent
 
@@ -25,7 +27,7 @@ def _modules(entry: str) -> tuple[str, ...]:
 
 
 _templates = Jinja2Templates(CLIENT / "templates")
-_templates.env.filters["duration"] = _duration
+_templates.env.filters.update(duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
 _templates.env.auto_reload = False  # would look at the file for each page
@@ -39,3 +41,8 @@ def page(request: Request, name: str, status: int = 200, **values: Any) -> Respo
 def message_page(request: Request, status: int, title: str, text: str) -> Response:
     """A page with a title and a sentence."""
     return page(request, "message", status, title=title, text=text)
+
+
+def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Texts of the page of a trial, by name, from those of a language by section."""
+    return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -81,9 +81,12 @@ class PlayedSession:
         *,
         as_inputs_come: bool = False,
         floor_plan: bool = True,
+        language: str = "en",
+        texts: Mapping[str, str] | None = None,
     ) -> None:
         self.visit, self._minimum, self._scenes = visit, minimum, scenes
         self._as_inputs_come, self._floor_plan = as_inputs_come, floor_plan
+        self._language, self._texts = language, dict(texts or {})
         self._meter = meter or Meter()
         self.browser: Browser | None = None
         self.heard = time.monotonic()
@@ -253,6 +256,8 @@ class PlayedSession:
             visit.before(trial),
             as_inputs_come=self._as_inputs_come,
             floor_plan=self._floor_plan and trial == TASK,
+            language=self._language,
+            texts=self._texts,
         )
         while crashes < MAX_CRASHES:
             self._set(State())

@@ -21,6 +21,7 @@ class Sessions:
     """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back.
 
     With a `capacity`, the limit follows what the machine holds. `floor_plans` adds one to the run of each task.
+    `language` is that of the HUD, whose words `texts` replaces.
     """
 
     def __init__(
@@ -33,9 +34,12 @@ class Sessions:
         capacity: Capacity | None = None,
         *,
         floor_plans: bool = True,
+        language: str = "en",
+        texts: Mapping[str, str] | None = None,
     ) -> None:
         self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
         self._meter, self._capacity, self._floor_plans = meter, capacity, floor_plans
+        self._language, self._texts = language, texts
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
@@ -51,6 +55,8 @@ class Sessions:
                 self._meter,
                 as_inputs_come=as_inputs_come,
                 floor_plan=self._floor_plans,
+                language=self._language,
+                texts=self._texts,
             )
         return self._sessions[visit.name]
 

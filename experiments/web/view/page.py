@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 from jinja2 import Environment, FileSystemLoader
 
-from experiments.house import House
+from experiments.house import House, read_words
 from experiments.record.reader import Record
 from experiments.replay.replay import replay
 from experiments.replay.replayer import Replayer
 from experiments.web.modules import STATIC, modules_of
-from experiments.web.server.pages import CLIENT
+from experiments.web.server.pages import CLIENT, trial_texts
 from experiments.web.view import timeline
 from experiments.web.view.recorder import RunRecorder
 from experiments.web.worker.encoders import data_url
@@ -64,7 +64,9 @@ def view_page(
 def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
     """HTML of the page that shows a run as it is recorded, in a scene of these files; `values` are the template's."""
     urls = {name: _data_url(name, content) for name, content in scene.items()}
-    return own_page("view.html", "view/view.js", title=title, run=_packed(run), scene=_packed(urls), **values)
+    texts = trial_texts(read_words())
+    packed = {"run": _packed(run), "scene": _packed(urls)}
+    return own_page("view.html", "view/view.js", title=title, texts=texts, **packed, **values)
 
 
 def own_page(template: str, entry: str, **values: Any) -> str:

@@ -34,6 +34,7 @@ from experiments.trials.trial import draw_floor_plan
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.controls import Controls, Input, control_step
 from experiments.web.server.visits import JOURNALS
+from hud.texts import HudTexts
 from mjsim.house.scene.scene import compose
 from mjsim.values.actions import Action
 from mjsim.values.options import WorldOptions
@@ -101,9 +102,12 @@ class LiveSession:
         config: The trial; None for the one in the journal.
         viewer: Sees every control step.
         before: The phases before this one, as in the events `phase_ended`.
+        language: Language of the labels and of the HUD.
+        texts: Words of the HUD; None for those of the language.
 
     Attributes:
         config: The trial.
+        shown: The house with labels in the language.
         world: The world.
         session: The session.
         resumed: Whether an earlier process started it.
@@ -120,6 +124,8 @@ class LiveSession:
         viewer: Viewer | None = None,
         *,
         before: Sequence[dict[str, Any]] = (),
+        language: str = "en",
+        texts: HudTexts | None = None,
     ) -> None:
         self._journal = journal
         config = _config_in(journal) or config
@@ -128,6 +134,7 @@ class LiveSession:
         self.config: TrialConfig = config
         person = draw_person(config)
         self.house = house.for_person(person)
+        self.shown = self.house.in_language(language, texts)
         self.scene = compose(trial_episode(config, self.house), self.house.catalogue, person=person)
         if not journal.entries:
             journal.append(Header(config.settings(), self.scene.episode.to_json()))
@@ -149,7 +156,7 @@ class LiveSession:
         log = EventLog()
         self.session, _ = prepare_session(
             config,
-            self.house,
+            self.shown,
             self.scene,
             log,
             viewer,

@@ -44,6 +44,7 @@ from experiments.web.worker.live_session import (
     save_run,
 )
 from experiments.web.worker.viewer import BrowserViewer
+from hud.texts import HudTexts
 
 
 class Worker:
@@ -109,7 +110,8 @@ class Worker:
         folder, run, house = Path(opened.folder), Path(opened.run), houses.house(config.house)
         if not is_run(run):
             self._play(opened, control, config, house)
-        save_run(folder, run, house, floor_plan=opened.floor_plan)
+        shown = house.in_language(opened.language, _texts(opened))
+        save_run(folder, run, shown, floor_plan=opened.floor_plan)
         remove_journal(folder, run)
         control.apply(Trigger.END)
         self._send(Saved())
@@ -119,7 +121,15 @@ class Worker:
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
             if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it by now
-                live = LiveSession(journal, house, config, viewer, before=opened.before)
+                live = LiveSession(
+                    journal,
+                    house,
+                    config,
+                    viewer,
+                    before=opened.before,
+                    language=opened.language,
+                    texts=_texts(opened),
+                )
                 pictures = partial(houses.encoded_pictures, config.house, "minimap" in config.assistance)
                 with closing(Drawer(live.scene, pictures, self._send, control)) as drawer:
                     viewer.live, viewer.drawer = live, drawer
@@ -135,3 +145,8 @@ class Worker:
                     reason = clock.run()
                     viewer.live = viewer.drawer = None
                 live.end(reason)
+
+
+def _texts(opened: Open) -> HudTexts | None:
+    """Words of the HUD that replace those of the language."""
+    return HudTexts(**opened.texts) if opened.texts else None

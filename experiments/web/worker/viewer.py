@@ -131,7 +131,7 @@ class BrowserViewer(Viewer):
         yield Busy(seen.busy) if self._snapshots is None else Markers(state.markers)
 
     def _moment(self, live: LiveSession, seen: Observation, state: HudState, step: int) -> Moment:
-        rooms = live.house.rooms
+        rooms = live.shown.rooms
         clock = None if state.clock is None else float(math.floor(state.clock))
         room = rooms.label(rooms.room_at(seen.position))
         return Moment(step, clock, room, self._reach(live, seen), state.pointer, state.minimap)
@@ -141,7 +141,7 @@ class BrowserViewer(Viewer):
         result = live.world.answer(act(live.world.answer))
         if not result.applied or result.object is None or (camera := self.camera(live.world)) is None:
             return None
-        catalogue, episode = live.house.catalogue, live.scene.episode
+        catalogue, episode = live.shown.catalogue, live.scene.episode
         model = next(item.model for item in episode.objects if item.name == result.object)
         place: Any
         if isinstance(result.action, Pick):

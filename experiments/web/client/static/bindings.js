@@ -3,14 +3,14 @@
 /** @import { Input } from "./protocol.js" */
 
 import { load, save } from "./store.js";
+import { textOf } from "./texts.js";
 
 /**
  * @typedef {Partial<Record<"forward" | "left" | "turn" | "look", number>>} Axes from -1 to 1
  * @typedef {object} Action a row of the table of controls
  * @property {string} name
- * @property {string} text
  * @property {string[]} keys default keys
- * @property {string} pad where it is on a gamepad
+ * @property {string} pad button of a gamepad, or name of the text for a stick
  * @property {Axes} [axes] held while the key is down
  * @property {number} [button] of a gamepad
  * @property {NonNullable<Input["press"]>} [press]
@@ -22,25 +22,27 @@ const NAME = "mjsim-keys";
 
 /** @type {Action[]} */
 export const ACTIONS = [
-  { name: "forward", text: "Walk forward", keys: ["KeyW", "ArrowUp"], pad: "left stick", axes: { forward: 1 } },
-  { name: "back", text: "Walk back", keys: ["KeyS", "ArrowDown"], pad: "left stick", axes: { forward: -1 } },
-  { name: "left", text: "Step left", keys: ["KeyA"], pad: "left stick", axes: { left: 1 } },
-  { name: "right", text: "Step right", keys: ["KeyD"], pad: "left stick", axes: { left: -1 } },
-  { name: "turnLeft", text: "Turn left", keys: ["ArrowLeft"], pad: "right stick", axes: { turn: 1 } },
-  { name: "turnRight", text: "Turn right", keys: ["ArrowRight"], pad: "right stick", axes: { turn: -1 } },
-  { name: "lookUp", text: "Look up", keys: ["KeyR"], pad: "right stick", axes: { look: 1 } },
-  { name: "lookDown", text: "Look down", keys: ["KeyF"], pad: "right stick", axes: { look: -1 } },
-  { name: "act", text: "Pick up or put into the bin", keys: ["KeyE"], pad: "A", button: 0, press: "act" },
-  { name: "leftHand", text: "Left hand: pick up, or put into the bin", keys: ["Digit1"], pad: "X", button: 2, press: "left hand" },
-  { name: "rightHand", text: "Right hand: pick up, or put into the bin", keys: ["Digit2"], pad: "B", button: 1, press: "right hand" },
-  { name: "listUp", text: "List up", keys: ["PageUp"], pad: "LB", button: 4, rows: -1 },
-  { name: "listDown", text: "List down", keys: ["PageDown"], pad: "RB", button: 5, rows: 1 },
-  { name: "pause", text: "Pause", keys: ["KeyP"], pad: "start", button: 9 },
-  { name: "help", text: "This table", keys: ["KeyH"], pad: "back", button: 8 },
+  { name: "forward", keys: ["KeyW", "ArrowUp"], pad: "left_stick", axes: { forward: 1 } },
+  { name: "back", keys: ["KeyS", "ArrowDown"], pad: "left_stick", axes: { forward: -1 } },
+  { name: "left", keys: ["KeyA"], pad: "left_stick", axes: { left: 1 } },
+  { name: "right", keys: ["KeyD"], pad: "left_stick", axes: { left: -1 } },
+  { name: "turnLeft", keys: ["ArrowLeft"], pad: "right_stick", axes: { turn: 1 } },
+  { name: "turnRight", keys: ["ArrowRight"], pad: "right_stick", axes: { turn: -1 } },
+  { name: "lookUp", keys: ["KeyR"], pad: "right_stick", axes: { look: 1 } },
+  { name: "lookDown", keys: ["KeyF"], pad: "right_stick", axes: { look: -1 } },
+  { name: "act", keys: ["KeyE"], pad: "A", button: 0, press: "act" },
+  { name: "leftHand", keys: ["Digit1"], pad: "X", button: 2, press: "left hand" },
+  { name: "rightHand", keys: ["Digit2"], pad: "B", button: 1, press: "right hand" },
+  { name: "listUp", keys: ["PageUp"], pad: "LB", button: 4, rows: -1 },
+  { name: "listDown", keys: ["PageDown"], pad: "RB", button: 5, rows: 1 },
+  { name: "pause", keys: ["KeyP"], pad: "start", button: 9 },
+  { name: "help", keys: ["KeyH"], pad: "back", button: 8 },
 ];
 
 /** @type {Record<string, string>} */
-const KEY_NAMES = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→", PageUp: "Page up", PageDown: "Page down" };
+const ARROWS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
+/** @type {Record<string, string>} */
+const NAMED = { PageUp: "page_up", PageDown: "page_down" };
 
 export class Bindings {
   /** @type {Map<string, string[]>} */
@@ -68,7 +70,7 @@ export class Bindings {
    * @param {string} name of the action
    */
   label(name) {
-    return this.#keys.get(name)?.map(keyName).join(" or ") || "none";
+    return this.#keys.get(name)?.map(keyName).join(` ${textOf("or")} `) || textOf("no_key");
   }
 
   /**
@@ -98,5 +100,10 @@ export async function learnLayout() {
 }
 
 /** @param {string} code */
-export const keyName = (code) =>
-  KEY_NAMES[code] ?? layout.get(code)?.toUpperCase() ?? code.replace(/^(Key|Digit)/, "");
+export function keyName(code) {
+  if (NAMED[code]) return textOf(NAMED[code]);
+  return ARROWS[code] ?? layout.get(code)?.toUpperCase() ?? code.replace(/^(Key|Digit)/, "");
+}
+
+/** What an action is called. @param {Action} action */
+export const actionText = (action) => textOf(`action_${action.name}`);

@@ -1,25 +1,22 @@
-// The texts of all dialogs.
+// The contents of all dialogs.
+
+import { textOf } from "./texts.js";
 
 /** @typedef {{ title: string, texts: string[], buttons?: [string, string][] }} Dialog buttons: label and action */
 
-/** @type {Record<string, string>} */
-const PAUSED = {
-  asked: "The clock is stopped.",
-  hidden: "Paused while the page was hidden.",
-  silent: "Paused while there was no connection.",
-  disconnected: "Paused while there was no connection.",
-  restarted: "Paused while the session was restored.",
-  "taken over": "Paused while the session moved to this page.",
-};
-
-/** @type {[string, string][]} */
-const SKIP = [["Skip the training", "leave"]];
-
-/** @param {boolean} interrupted @returns {Dialog} */
-export const loading = (interrupted) => ({
-  title: "One moment",
-  texts: [interrupted ? "Your session is being restored. Nothing is lost." : "The apartment is being loaded."],
+/**
+ * A dialog of a title, a text and at most one button.
+ * @param {string} title @param {string} content @param {string} [label] of the button @param {string} [action]
+ * @returns {Dialog}
+ */
+const dialog = (title, content, label, action) => ({
+  title: textOf(title),
+  texts: [textOf(content)],
+  buttons: label && action ? [[textOf(label), action]] : [],
 });
+
+/** @param {boolean} interrupted */
+export const loading = (interrupted) => dialog("one_moment", interrupted ? "restoring" : "loading");
 
 /**
  * @param {string} trial
@@ -31,102 +28,67 @@ export const loading = (interrupted) => ({
 export function instructions(trial, objects, controls, skippable) {
   if (trial === "training") {
     return {
-      title: "Training",
-      texts: ["Find one object, pick it up and put it into its bin. There is no time limit.", controls],
-      buttons: [["Start the training", "run"], ...(skippable ? SKIP : [])],
+      title: textOf("training"),
+      texts: [textOf("training_text"), controls],
+      buttons: [[textOf("start_training"), "run"], ...(skippable ? skip() : [])],
     };
   }
-  const what = objects === 1 ? "Put the object into its bin" : `Put all ${objects} objects into their bins`;
+  const task = objects === 1 ? textOf("task_one") : textOf("task_many", { count: objects });
   return {
-    title: "Your task",
-    texts: [`${what} as fast as you can. The clock starts when you choose Start.`],
-    buttons: [["Start", "run"]],
+    title: textOf("task"),
+    texts: [`${task} ${textOf("clock_starts")}`],
+    buttons: [[textOf("start"), "run"]],
   };
 }
 
-export const TOUCH_CONTROLS =
-  "Walk and turn with the buttons at the lower left. Drag across the view to look around. “Pick or place” picks up an object or puts it into its bin. “Help” shows all controls.";
+/** @returns {[string, string][]} */
+const skip = () => [[textOf("skip_training"), "leave"]];
 
 /** @param {(action: string) => string} key names of the keys of an action */
-export const keyControls = (key) =>
-  `Walk with ${key("forward")}, ${key("left")}, ${key("back")}, ${key("right")}. Turn with the mouse, or with ${key("turnLeft")} and ${key("turnRight")}. ${key("act")} picks up an object or puts it into its bin. ${key("help")} shows all keys.`;
+export function keyControls(key) {
+  const names = ["forward", "left", "back", "right", "turnLeft", "turnRight", "act", "help"];
+  return textOf("keys_text", Object.fromEntries(names.map((name) => [name, key(name)])));
+}
 
-/** @param {string} reason @returns {Dialog} */
-export const paused = (reason) => ({
-  title: "Paused",
-  texts: [PAUSED[reason] ?? ""],
-  buttons: [["Continue", "run"]],
-});
+/** @param {string} reason */
+export const paused = (reason) => dialog("paused", `paused_${reason.replace(" ", "_")}`, "next", "run");
 
-/** @param {string} trial @param {number} left s until it may be ended @returns {Dialog} */
-export const ending = (trial, left) =>
+/** @param {number} left s until it may be ended @returns {Dialog} */
+export const ending = (left) =>
   left > 0
-    ? { title: "Not yet", texts: [`You can end the ${trial} in ${left} s.`], buttons: [["Continue", "hide"]] }
+    ? {
+        title: textOf("end_later"),
+        texts: [textOf("end_later_text", { seconds: left })],
+        buttons: [[textOf("next"), "hide"]],
+      }
     : {
-        title: `End the ${trial} now?`,
-        texts: ["What you did so far is kept."],
-        buttons: [["Continue", "hide"], [`End the ${trial}`, "leave"]],
+        title: textOf("end_now"),
+        texts: [textOf("end_now_text")],
+        buttons: [[textOf("next"), "hide"], [textOf("end_part"), "leave"]],
       };
 
 /** @param {string} reason @param {boolean} saved @returns {Dialog} */
 export const over = (reason, saved) => ({
-  title: reason === "all delivered" ? "All done" : "This part is over",
-  texts: ["The next page opens in a moment."],
-  buttons: saved ? [["Continue", "reload"]] : [],
+  title: textOf(reason === "all delivered" ? "all_done" : "part_over"),
+  texts: [textOf("next_page")],
+  buttons: saved ? [[textOf("next"), "reload"]] : [],
 });
 
 /** @param {number} position @returns {Dialog} */
 export const queue = (position) => ({
-  title: "All places are taken",
-  texts: [
-    position === 1 ? "You are next." : `You are number ${position} in the queue.`,
-    "Please keep this page open. It continues by itself.",
-  ],
+  title: textOf("queue_title"),
+  texts: [position === 1 ? textOf("queue_next") : textOf("queue_place", { place: position }), textOf("queue_wait")],
 });
 
 /** @param {string} reason @returns {Dialog} */
 export const cannotDraw = (reason) => ({
-  title: "This browser cannot draw the apartment",
-  texts: [`It needs WebGL 2 (${reason}). Please try another browser, or another computer.`],
+  title: textOf("cannot_draw"),
+  texts: [textOf("cannot_draw_text", { reason })],
 });
 
-/** @type {Dialog} */
-export const OCCUPIED = {
-  title: "This session is open in another page",
-  texts: ["Only one page at a time can show it."],
-  buttons: [["Continue here", "takeover"]],
-};
-
-/** @type {Dialog} */
-export const REPLACED = {
-  title: "This session continues in another page",
-  texts: ["You can close this page."],
-  buttons: [["Continue here", "reload"]],
-};
-
-/** @type {Dialog} */
-export const OFFLINE = {
-  title: "No connection",
-  texts: ["The clock is paused. This page reconnects by itself. Nothing is lost."],
-};
-
-/** @type {Dialog} */
-export const CLOSED = {
-  title: "The connection was closed",
-  texts: ["Your session is kept."],
-  buttons: [["Reconnect", "reload"]],
-};
-
-/** @type {Dialog} */
-export const IDLE = {
-  title: "You were away for a long time",
-  texts: ["Your session is kept."],
-  buttons: [["Continue", "reload"]],
-};
-
-/** @param {string} message @returns {Dialog} */
-export const failed = (message) => ({
-  title: "Something went wrong",
-  texts: [message],
-  buttons: [["Try again", "reload"]],
-});
+export const occupied = () => dialog("occupied", "occupied_text", "continue_here", "takeover");
+export const replaced = () => dialog("replaced", "replaced_text", "continue_here", "reload");
+export const offline = () => dialog("offline", "offline_text");
+export const closed = () => dialog("closed", "session_kept", "reconnect", "reload");
+export const idle = () => dialog("idle", "session_kept", "next", "reload");
+export const failed = () => dialog("failed", "failed_text", "try_again", "reload");

@@ -2,8 +2,9 @@
 
 /** @import { Action, Bindings } from "./bindings.js" */
 
-import { ACTIONS, keyName } from "./bindings.js";
+import { ACTIONS, actionText, keyName } from "./bindings.js";
 import { made, within } from "./dom.js";
+import { textOf } from "./texts.js";
 
 export class Help {
   #dialog;
@@ -25,7 +26,7 @@ export class Help {
     this.#part("#help-reset").addEventListener("click", () => {
       bindings.reset();
       this.#fill();
-      this.#report("All keys were reset.");
+      this.#report(textOf("keys_reset"));
     });
   }
 
@@ -53,19 +54,20 @@ export class Help {
   /** @param {Action} action */
   #row(action) {
     const row = document.createElement("tr");
-    const what = made("th", action.text);
+    const name = actionText(action);
+    const what = made("th", name);
     what.scope = "row";
-    const change = made("button", "Change");
+    const change = made("button", textOf("change"));
     change.type = "button";
     change.dataset.action = action.name;
-    change.setAttribute("aria-label", `Change the key for: ${action.text}`);
+    change.setAttribute("aria-label", textOf("change_key", { action: name }));
     change.addEventListener("click", () => {
       this.#changing = action;
-      this.#report(`Press the new key for: ${action.text}. Esc keeps the old one.`);
+      this.#report(textOf("press_key", { action: name }));
     });
     const cell = document.createElement("td");
     cell.append(change);
-    const pad = made("td", action.pad);
+    const pad = made("td", action.axes ? textOf(action.pad) : action.pad);
     pad.className = "pads";
     row.append(what, made("td", this.#bindings.label(action.name)), pad, cell);
     return row;
@@ -85,7 +87,7 @@ export class Help {
     if (event.code === "Escape") return this.#report("");
     this.#bindings.bind(action, event.code);
     this.#fill();
-    this.#report(`${action.text}: ${keyName(event.code)}`);
+    this.#report(`${actionText(action)}: ${keyName(event.code)}`);
     this.#part(`[data-action="${action.name}"]`).focus();
   }
 

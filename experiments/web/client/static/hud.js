@@ -4,6 +4,7 @@
 
 import { byId, made } from "./dom.js";
 import { drawMap } from "./map.js";
+import { textOf } from "./texts.js";
 
 const CONTEXT = 2; // rows above the current one that stay in sight
 const LATEST = 200; // ms that a moment waits for its frame
@@ -44,7 +45,7 @@ export class Hud {
     byId("list", HTMLElement).replaceChildren(...state.checklist.map((item) => this.#row(item)));
     byId("bins", HTMLElement).replaceChildren(...state.bins.map((bin) => this.#bin(bin)));
     byId("hands", HTMLElement).replaceChildren(...this.#hands(state.inventory));
-    byId("progress", HTMLElement).textContent = `${state.delivered} / ${state.total} put away`;
+    byId("progress", HTMLElement).textContent = textOf("progress", { count: state.delivered, all: state.total });
     const text = state.message ? `${SYMBOLS[state.message.kind]} ${state.message.text}` : "";
     const bar = byId("message", HTMLElement);
     if (bar.textContent !== text) bar.textContent = text; // the same text again would be read again
@@ -89,7 +90,8 @@ export class Hud {
     this.reach = reach !== null;
     mark.hidden = !reach;
     if (!reach) return;
-    const what = reach.receptacle ? `Put ${reach.object} into ${reach.receptacle}` : `Pick up ${reach.object}`;
+    const values = { Object: reach.object, Receptacle: reach.receptacle ?? "" };
+    const what = textOf(reach.receptacle ? "put_into" : "pick_up_object", values);
     mark.replaceChildren(made("kbd", this.#key()), made("span", what));
     this.moveReach(reach.at);
   }
@@ -105,8 +107,9 @@ export class Hud {
 
   /** @param {ChecklistItem} item */
   #row(item) {
-    const words = [made("b", item.text), made("small", item.carried ? "In your hand" : item.detail.replace("\n", " "))];
-    if (item.done && !item.carried) words.unshift(hidden("Done: "));
+    const detail = item.carried ? textOf("in_hand") : item.detail.replace("\n", " ");
+    const words = [made("b", item.text), made("small", detail)];
+    if (item.done && !item.carried) words.unshift(hidden(`${textOf("item_done")}: `));
     const row = this.#listed(item.picture, words);
     if (item.number !== null) row.prepend(made("i", `${item.number}`));
     row.append(...this.#picture(item.target_picture));
@@ -122,9 +125,9 @@ export class Hud {
 
   /** @param {(InventorySlot | null)[]} slots */
   #hands(slots) {
-    const names = slots[0] ? ["Left hand", "Right hand"] : ["", "Hand"];
+    const names = slots[0] ? [textOf("left_hand"), textOf("right_hand")] : ["", textOf("hand")];
     return slots.flatMap((slot, i) =>
-      slot ? [this.#listed(slot.picture, [made("small", names[i] ?? ""), made("b", slot.label ?? "empty")])] : [],
+      slot ? [this.#listed(slot.picture, [made("small", names[i] ?? ""), made("b", slot.label ?? textOf("empty"))])] : [],
     );
   }
 
@@ -156,8 +159,10 @@ export class Hud {
 /** @param {ChecklistItem[]} items */
 function countText(items) {
   const left = items.filter((item) => !item.done).length;
-  if (!left) return "done";
-  return items[0]?.number === null ? `${left} left` : `step ${items.length - left + 1} of ${items.length}`;
+  const numbered = items.some((item) => item.number !== null);
+  if (!left) return textOf(numbered ? "done" : "none_left");
+  if (!numbered) return textOf("left", { count: left });
+  return textOf("next_step", { number: items.length - left + 1, count: items.length });
 }
 
 /** @param {string} text for screen readers alone */

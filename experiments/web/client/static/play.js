@@ -21,10 +21,10 @@ import { BEAT_PERIOD, DISPLAY_PERIOD, MAX_SILENCE, TOO_MUCH } from "./protocol.j
 import { Session } from "./session.js";
 import { Settings } from "./settings.js";
 import { Sounds } from "./sounds.js";
+import { textOf } from "./texts.js";
 import { rememberVisit } from "./visit.js";
 
 const DONE = 1500; // ms for which the end of a trial is shown
-const BUSY = "Busy: your hands are moving";
 const TICK = 20; // ms between two looks at the clock; pages in the background get no pictures to draw
 
 const page = byId("play", HTMLElement);
@@ -61,7 +61,7 @@ const inputs = new Inputs((values) => {
   picture.add(input);
   if (!values.press) return;
   pressed = input.number;
-  if (picture.drawn) showBusy("One moment");
+  if (picture.drawn) showBusy("one_moment");
 });
 const sounds = new Sounds();
 const bindings = new Bindings();
@@ -98,14 +98,14 @@ function take(message) {
       hud.expect(message);
       break;
     case "snapshot":
-      if (message.busy) showBusy(BUSY);
+      if (message.busy) showBusy("hands_moving");
       else if (message.input >= pressed) showBusy("");
       break;
     case "beat":
       if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
       break;
     case "busy":
-      showBusy(message.busy ? BUSY : "");
+      showBusy(message.busy ? "hands_moving" : "");
       break;
     case "saved":
       connection.close();
@@ -116,28 +116,28 @@ function take(message) {
       panel.show(dialogs.queue(message.position));
       break;
     case "occupied":
-      panel.show(dialogs.OCCUPIED);
+      panel.show(dialogs.occupied());
       break;
     case "replaced":
-      panel.show(dialogs.REPLACED);
+      panel.show(dialogs.replaced());
       break;
     case "error":
-      if (message.code === "idle") panel.show(dialogs.IDLE);
+      if (message.code === "idle") panel.show(dialogs.idle());
       else console.warn(`the server refused a message (${message.code}): ${message.message}`);
       break;
     case "closed":
       silent = false;
       if (!message.final) lose();
-      else if (message.code === TOO_MUCH) panel.show(dialogs.CLOSED);
+      else if (message.code === TOO_MUCH) panel.show(dialogs.closed());
   }
 }
 
-/** @param {string} text why a key does nothing now, or empty */
-function showBusy(text) {
+/** @param {string} name of the text that says why a key does nothing now, or empty */
+function showBusy(name) {
   const mark = byId("busy", HTMLElement);
-  mark.hidden = !text;
-  mark.textContent = text;
-  mark.classList.toggle("asked", text !== BUSY);
+  mark.hidden = !name;
+  mark.textContent = name && textOf(name);
+  mark.classList.toggle("asked", name !== "hands_moving");
 }
 
 /** @param {number} now ms */
@@ -172,7 +172,7 @@ function showState() {
       break;
     case "failed":
       connection.close();
-      panel.show(dialogs.failed(session.reason));
+      panel.show(dialogs.failed());
   }
 }
 
@@ -180,7 +180,7 @@ function lose() {
   inputs.release();
   session.lose();
   showState();
-  panel.show(dialogs.OFFLINE);
+  panel.show(dialogs.offline());
 }
 
 function watchLink() {
@@ -202,7 +202,7 @@ function report() {
 
 function showInstructions() {
   const touch = matchMedia("(pointer: coarse)").matches;
-  const controls = touch ? dialogs.TOUCH_CONTROLS : dialogs.keyControls((name) => bindings.label(name));
+  const controls = touch ? textOf("touch_text") : dialogs.keyControls((name) => bindings.label(name));
   const dialog = dialogs.instructions(trial, Number(objects), controls, performance.now() >= endable);
   if (panel.title !== dialog.title) panel.show(dialog);
 }
@@ -225,7 +225,7 @@ function pause(reason) {
 function askToEnd() {
   inputs.release();
   if (page.dataset["leave"]) location.assign(page.dataset["leave"]);
-  else panel.show(dialogs.ending(trial, Math.ceil((endable - performance.now()) / 1000)));
+  else panel.show(dialogs.ending(Math.ceil((endable - performance.now()) / 1000)));
 }
 
 function openHelp() {

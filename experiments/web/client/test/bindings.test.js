@@ -2,8 +2,12 @@
 import { beforeEach, describe, expect, test } from "vitest";
 
 import { ACTIONS, Bindings, keyName } from "../static/bindings.js";
+import { giveTexts } from "./page.js";
 
-beforeEach(() => localStorage.clear());
+beforeEach(() => {
+  localStorage.clear();
+  giveTexts();
+});
 
 /** @param {string} name */
 function action(name) {

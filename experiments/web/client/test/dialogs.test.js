@@ -1,8 +1,11 @@
 // @vitest-environment happy-dom
-import { describe, expect, test, vi } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import * as dialogs from "../static/dialogs.js";
 import { Panel } from "../static/panel.js";
+import { giveTexts } from "./page.js";
+
+beforeEach(giveTexts);
 
 describe("dialogs", () => {
   test.each(["asked", "hidden", "disconnected", "silent", "restarted", "taken over"])("say why a session is paused: %s", (reason) => {
@@ -30,9 +33,9 @@ describe("dialogs", () => {
     const ends = (/** @type {dialogs.Dialog} */ { buttons = [] }) => buttons.some(([, action]) => action === "leave");
     for (const early of [true, false]) {
       expect(ends(dialogs.instructions("training", 1, "", !early))).toBe(!early);
-      expect(ends(dialogs.ending("training", early ? 12 : 0))).toBe(!early);
+      expect(ends(dialogs.ending(early ? 12 : 0))).toBe(!early);
     }
-    expect(dialogs.ending("training", 12).texts[0]).toContain("in 12 s");
+    expect(dialogs.ending(12).texts[0]).toContain("in 12 s");
   });
 
   test("run the actions of their buttons", () => {

@@ -4,6 +4,7 @@ import { beforeEach, describe, expect, test, vi } from "vitest";
 import { HeadsetPage } from "../static/headset.js";
 import { Inputs } from "../static/inputs.js";
 import { Group, PerspectiveCamera } from "../static/vendor/three.js";
+import { giveTexts } from "./page.js";
 
 /** @import { World3D } from "../static/drawing/world.js" */
 /** @import { HudState } from "../static/protocol.js" */
@@ -123,14 +124,15 @@ describe("while it is worn", () => {
       inventory: [{ label: "Mug", picture: null }, { label: null, picture: null }], message: { text: "Picked up", kind: "info", opacity: 1 },
       markers: [], rerouted: false, delivered: 4, total: 10, clock: null, pointer: null, minimap: null, scroll: 0,
     });
+    giveTexts();
     page.show(hud, 61);
     expect(written).toEqual([]); // nobody wears it
     await worn();
     page.show(hud, 61);
     getContext.mockRestore();
-    expect(written.slice(0, 2)).toEqual(["4 of 10  |  1:01  |  Picked up", "Plan"]);
-    expect(written.slice(2, 5)).toEqual(["in hand: Object 4   Kitchen → Bin", "5. Object 5   Kitchen → Bin", "6. Object 6   Kitchen → Bin"]);
-    expect(written.slice(-2)).toEqual(["Left: Mug   Right: empty", "Bin: Kitchen left"]);
+    expect(written.slice(0, 2)).toEqual(["4 / 10 put away  |  1:01  |  Picked up", "Plan"]);
+    expect(written.slice(2, 5)).toEqual(["In your hand: Object 4   Kitchen → Bin", "5. Object 5   Kitchen → Bin", "6. Object 6   Kitchen → Bin"]);
+    expect(written.slice(-2)).toEqual(["Left hand: Mug   Right hand: empty", "Bin: Kitchen left"]);
   });
 });
 

@@ -53,7 +53,7 @@ describe("a key is changed", () => {
     key("KeyZ");
     expect(keys("forward")).toBe("Z");
     /** @type {HTMLElement} */ (dialog.querySelector("#help-reset")).click();
-    expect([keys("forward"), report()]).toEqual(["W or ↑", "All keys were reset."]);
+    expect([keys("forward"), report()]).toEqual(["W or ↑", "All keys are reset."]);
   });
 });
 

@@ -2,6 +2,7 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Hud } from "../static/hud.js";
+import { giveTexts } from "./page.js";
 
 /** @import { ChecklistItem, HudState, Moment } from "../static/protocol.js" */
 
@@ -31,6 +32,7 @@ describe("the display", () => {
     document.body.innerHTML =
       '<p id="progress"></p><p id="clock"></p><p id="room"></p><h2 id="list-title"></h2><ul id="list"></ul><div id="pointer" hidden></div>' +
       '<button id="reach" hidden></button><p id="message"></p><ul id="hands"></ul><ul id="bins"></ul><canvas id="map"></canvas>';
+    giveTexts();
     hud = new Hud(() => "E");
   });
 
@@ -44,7 +46,7 @@ describe("the display", () => {
 
   test("counts steps, progress, and says what the hands hold", () => {
     hud.show(state({ checklist: [item({ number: 1, done: true }), item({ number: 2, current: true })] }));
-    expect(part("list-title").textContent).toBe("Objects to find: step 2 of 2");
+    expect(part("list-title").textContent).toBe("Objects to find: step 2 / 2");
     expect(part("list").children[1]?.getAttribute("aria-current")).toBe("step");
     expect(part("progress").textContent).toBe("1 / 6 put away");
     expect(part("hands").textContent).toBe("Left handPanRight handempty");

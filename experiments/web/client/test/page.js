@@ -8,13 +8,32 @@ import { vi } from "vitest";
 import { FRAME_HEAD_BYTES } from "../static/protocol.js";
 
 const template = (name) => readFileSync(`templates/${name}.html`, "utf8");
+const sections = readFileSync("../../texts/en.toml", "utf8").split(/^\[(\w+)\]$/m);
+
+/** The English texts of the page of a trial, by name. */
+export const TEXTS = Object.fromEntries(
+  ["common", "hud", "trial"].flatMap((name) =>
+    [...sections[sections.indexOf(name) + 1].matchAll(/^(\w+) = ("""\n(?:.|\n)*?"""|".*")$/gm)].map(([, key, value]) => [
+      key,
+      JSON.parse(value.replace(/^"""\n|"""$/g, '"').replaceAll("\n", "\\n")),
+    ]),
+  ),
+);
+
+/** Writes the texts into a page, as the server does. */
+export function giveTexts() {
+  const json = { id: "texts", type: "application/json", textContent: JSON.stringify(TEXTS) };
+  document.body.append(Object.assign(document.createElement("script"), json));
+}
 
 /** The body of a template as the server gives it, without what its scripts do not need. @param {string} name @param {Record<string, string>} [data] of #play */
 export function showPage(name, data = {}) {
-  const [, tasks, side] = template("hud").match(/tasks\(\) %}(.*?){% endmacro.*side\(\) %}(.*?){% endmacro/s);
-  const text = template(name).replace("{{ hud.tasks() }}", tasks).replace("{{ hud.side() }}", side);
+  const [, tasks, side] = template("hud").match(/tasks\(\) %}(.*?){% endmacro.*side\(texts\) %}(.*?){% endmacro/s);
+  const text = template(name).replace("{{ hud.tasks() }}", tasks).replace("{{ hud.side(texts) }}", side);
   const [, body] = text.match(/(<main.*<\/main>)/s);
-  document.body.innerHTML = body.replace(/{[{%].*?[%}]}/g, "");
+  const filled = body.replace(/{{ texts\.(\w+) }}/g, (_, key) => TEXTS[key]);
+  document.body.innerHTML = filled.replace(/{[{%].*?[%}]}/g, "");
+  giveTexts();
   Object.assign(document.getElementById("play")?.dataset ?? {}, data);
 }
 

@@ -106,7 +106,7 @@ describe("a trial", () => {
     expect(title()).toBeNull();
     vi.advanceTimersByTime(60_000);
     part("end-button").click();
-    choose("End the task");
+    choose("End this part");
     expect(socket().all("leave")).toHaveLength(1);
   });
 

@@ -54,7 +54,7 @@ def visit(browser, server, look):
     page.keyboard.press("p")
     page.locator("#panel").wait_for(state="hidden")
     page.locator("#end-button").press("Enter")
-    page.get_by_role("heading", name="End the task now?").wait_for()
+    page.get_by_role("heading", name="End now?").wait_for()
     check()
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")

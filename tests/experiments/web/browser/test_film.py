@@ -46,7 +46,7 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
         page.hold("p")
         page.wait_for("document.getElementById('panel-title').textContent === 'Paused'")
         page.evaluate("document.getElementById('end-button').click()")
-        choose(page, "End the task")
+        choose(page, "End this part")
         page.wait_for("document.querySelector('h1').textContent === 'Your result'")
         run = server.visit(address) / "task"
     film = tmp_path / "film.mp4"

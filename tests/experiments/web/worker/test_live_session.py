@@ -47,10 +47,10 @@ def wandering(seed: int, steps: int):
         yield batch
 
 
-def play(folder, house, batches, *, config=None):
+def play(folder, house, batches, *, config=None, **language):
     """Play batches of inputs; the session, still open."""
     journal = open_journal(folder)
-    session = LiveSession(journal, house, config)
+    session = LiveSession(journal, house, config, **language)
     for batch in batches:
         session.step(batch)
     journal.sync()
@@ -88,6 +88,39 @@ def test_a_session_resumes_in_the_same_state_with_the_same_plan(house, tmp_path,
     assert state(resumed)[:3] == state(whole)[:3]
     for session in (whole, resumed):
         session.end("interrupted")
+
+
+def test_a_german_session_shows_german_and_leaves_the_bytes_of_an_english_one(house, tmp_path):
+    batches, shown = list(wandering(5, 260)), {}
+    config = msgspec.structs.replace(CONFIG, live=False)
+    for language in ("en", "de"):
+        session = play(tmp_path / language, house, batches, config=config, language=language)
+        state = session.session.assistant.hud_state(session.world.observation())
+        words = (
+            state.checklist_title,
+            state.bins[0].label,
+            state.bins[0].place,
+            session.shown.rooms.label("kitchen"),
+        )
+        shown[language] = words
+        session.end("interrupted")
+        run = tmp_path / f"{language}_run"
+        save_run(tmp_path / language, run, session.shown)
+        shown[run.name] = {
+            path.relative_to(run): path.read_bytes()
+            for path in run.rglob("*")
+            if path.is_file() and path.name not in (TOPDOWN, CHECKSUMS)
+        }
+    assert shown["en"] == ("Your plan", "Dish bin", "Kitchen, on the counter, beside the sink", "Kitchen")
+    assert shown["de"] == (
+        "Ihr Plan",
+        "Geschirrkorb",
+        "Küche, auf der Arbeitsplatte neben der Spüle",
+        "Küche",
+    )
+    assert Path(EVENTS) in shown["en_run"] and shown["de_run"] == shown["en_run"]
+    plans = [(tmp_path / f"{language}_run" / TOPDOWN).read_bytes() for language in ("en", "de")]
+    assert plans[0] != plans[1], "the floor plan is for the person"
 
 
 @pytest.mark.parametrize(("crashes", "planner"), [((), "ortools"), ((60, 61, 170), "exact")])

@@ -2,6 +2,8 @@
 
 /** @import { HudState } from "../protocol.js" */
 
+import { textOf } from "../texts.js";
+
 const ROWS = 6; // of the task list, from one before the current on
 const LINE = 48; // px
 const COLOURS = { ground: "#0d1118", text: "#f2f2f2", faint: "#9aa3b2", current: "#f0e442" };
@@ -22,15 +24,15 @@ export function drawPanel(canvas, hud, clock) {
   };
   context.fillStyle = COLOURS.ground;
   context.fillRect(0, 0, canvas.width, canvas.height);
-  line([`${hud.delivered} of ${hud.total}`, clock, hud.message?.text].filter(Boolean).join("  |  "), COLOURS.text);
+  line([textOf("progress", { count: hud.delivered, all: hud.total }), clock, hud.message?.text].filter(Boolean).join("  |  "), COLOURS.text);
   line(hud.checklist_title, COLOURS.text, true);
   const current = hud.checklist.findIndex((item) => item.current);
   const first = Math.max(0, Math.min(current - 1, hud.checklist.length - ROWS) + hud.scroll);
   for (const item of hud.checklist.slice(first, first + ROWS)) {
-    const mark = item.carried ? "in hand: " : item.done ? "done: " : item.number === null ? "" : `${item.number}. `;
+    const mark = item.carried ? `${textOf("in_hand")}: ` : item.done ? `${textOf("item_done")}: ` : item.number === null ? "" : `${item.number}. `;
     line(`${mark}${item.text}   ${item.detail.replace("\n", " ")}`, item.current ? COLOURS.current : item.done ? COLOURS.faint : COLOURS.text);
   }
-  const [left, right] = hud.inventory.map((slot) => slot?.label ?? "empty");
-  line(hud.inventory[0] ? `Left: ${left}   Right: ${right}` : `Hand: ${right}`, COLOURS.text, true);
+  const [left, right] = hud.inventory.map((slot) => slot?.label ?? textOf("empty"));
+  line(hud.inventory[0] ? `${textOf("left_hand")}: ${left}   ${textOf("right_hand")}: ${right}` : `${textOf("hand")}: ${right}`, COLOURS.text, true);
   line(hud.bins.map((bin) => `${bin.label}: ${bin.place.replace("\n", " ")}`).join("   "), COLOURS.faint);
 }
