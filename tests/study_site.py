@@ -90,7 +90,9 @@ def served(folder, settings="", researchers=ROLES, workers=20):
 
     async def main():
         site.loop = asyncio.get_running_loop()
-        site.store = await Store.open(f"sqlite:///{folder / 'study.db'}", "small", "0" * 64)
+        site.store = await Store.open(
+            f"sqlite:///{folder / 'study.db'}", "small", "0" * 64, password_memory_kib=64
+        )
         known = {one.name for one in await site.store.researchers.all()}
         for role in set(researchers) - known:
             await site.store.researchers.add(role, PASSWORD, role)

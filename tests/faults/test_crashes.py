@@ -11,7 +11,10 @@ from faults.conftest import FAST, PROBLEM
 
 @pytest.mark.parametrize(
     ("statement", "number"),
-    [("import ctypes; ctypes.string_at(0)", signal.SIGSEGV), ("os.abort()", signal.SIGABRT)],
+    [
+        ("import ctypes; ctypes.string_at(0)", signal.SIGSEGV),
+        pytest.param("os.abort()", signal.SIGABRT, marks=pytest.mark.slow),
+    ],
 )
 def test_a_run_whose_participant_crashes_names_it(statement, number, tmp_path, mjsim, own_module):
     own_module(participant(statement, after=30))

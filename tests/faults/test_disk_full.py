@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from experiments.errors import RecordError
 from experiments.record import records
@@ -51,13 +52,13 @@ def test_a_run_on_a_full_disk_is_kept_elsewhere(size, house, small_disk, tmp_pat
 
 def test_a_full_disk_costs_the_video_alone(house, small_disk):
     """The video is by far the largest file."""
-    disk, warnings = small_disk("400k"), []
-    out, film = disk / "out", FilmConfig(320, 240)
-    metrics = run_trial(BRIEF, out, film=film, topdown=False, house=house, on_warning=warnings.append)
-    assert metrics["ended"] == "all delivered" and metrics["frames_sha256"] is None
+    disk, warnings = small_disk("120k"), []
+    out, film, brief = disk / "out", FilmConfig(320, 240), structs.replace(BRIEF, time_limit=8.0)
+    metrics = run_trial(brief, out, film=film, topdown=False, house=house, on_warning=warnings.append)
+    assert metrics["ended"] == "time limit" and metrics["frames_sha256"] is None
     assert len(warnings) == 1 and warnings[0].startswith("no video: ")
     assert not (out / records.VIDEO).exists()
-    assert replay(out, house=house).ended == "all delivered"
+    assert replay(out, house=house).ended == "time limit"
 
 
 def full(*_args, **_options):

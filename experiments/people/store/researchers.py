@@ -15,6 +15,7 @@ from experiments.people.store.engine import Database
 from experiments.people.store.tables import login, researcher
 from experiments.people.store.values import Researcher, Role, utc_now
 
+PASSWORD_MEMORY_KIB = 65_536  # what hashing a password takes, by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
 _FIELDS = (
     researcher.c.id,
@@ -28,9 +29,9 @@ _FIELDS = (
 class Researchers:
     """Rows of `researcher` and `login`, which hold for every study of a database."""
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Database, memory_kib: int) -> None:
         self._database = database
-        self._hasher = PasswordHasher()
+        self._hasher = PasswordHasher(memory_cost=memory_kib)
 
     async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
         """Let somebody in. Raises StoreError if the name is taken or unusable, or the role unknown."""
@@ -136,7 +137,7 @@ class Researchers:
             return (await connection.execute(query)).first()
 
     async def _hash(self, password: str) -> str:
-        """It takes a tenth of a second and 64 MiB, on purpose; the server goes on meanwhile."""
+        """Hash in a thread, since the default memory makes it take a tenth of a second on purpose."""
         return await asyncio.to_thread(self._hasher.hash, password)
 
 

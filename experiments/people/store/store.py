@@ -21,7 +21,7 @@ from experiments.people.store.ledger import Ledger
 from experiments.people.store.part import new_id, note
 from experiments.people.store.people import People
 from experiments.people.store.phases import Phases
-from experiments.people.store.researchers import Researchers
+from experiments.people.store.researchers import PASSWORD_MEMORY_KIB, Researchers
 from experiments.people.store.tables import audit, study
 from experiments.people.store.upgrade import upgrade
 from experiments.people.store.values import AuditRow, StudyRow, StudyState, utc_now
@@ -37,26 +37,29 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         researchers: Who may see the researcher's page; the same for all studies of a database.
     """
 
-    def __init__(self, database: Database, study_id: int) -> None:
+    def __init__(self, database: Database, study_id: int, password_memory_kib: int) -> None:
         """See :meth:`open`."""
         super().__init__(database, study_id)
         self.ledger = Ledger(database, study_id)
-        self.researchers = Researchers(database)
+        self.researchers = Researchers(database, password_memory_kib)
 
     @classmethod
-    async def open(cls, url: str, study_name: str, file_hash: str) -> Self:
+    async def open(
+        cls, url: str, study_name: str, file_hash: str, *, password_memory_kib: int = PASSWORD_MEMORY_KIB
+    ) -> Self:
         """Open a database, make or upgrade its tables, and find or add the study.
 
         Args:
             url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
             study_name: Name of the study; one database may hold several.
             file_hash: SHA-256 of the study file, hexadecimal. Another one than before is noted in the audit log.
+            password_memory_kib: Memory that hashing a researcher's password takes. Tests use little.
         """
         database = Database(url)
         try:
             await database.check_durable()
             await upgrade(database)
-            return cls(database, await _study_id(database, study_name, file_hash))
+            return cls(database, await _study_id(database, study_name, file_hash), password_memory_kib)
         except BaseException:
             await database.close()
             raise

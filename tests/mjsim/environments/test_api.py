@@ -230,15 +230,16 @@ def test_a_copy_of_an_environment_continues_as_the_original_does(easy, duplicate
 
 
 def test_vectors_agree(easy):
-    logs = []
-    for mode, extra in (("sync", {}), ("async", {"context": "spawn"})):
+    """The second of two environments in this process does as one in another process, with the next seed."""
+    logs, plans = [], np.array([[FORWARD, PICK], [PICK, PLACE], [PLACE, FORWARD]])
+    for mode, extra, number in (("sync", {}, 2), ("async", {"context": "spawn"}, 1)):
         envs = gymnasium.make_vec(
-            ID, num_envs=2, vectorization_mode=mode, vector_kwargs=extra, actions="discrete", **easy
+            ID, num_envs=number, vectorization_mode=mode, vector_kwargs=extra, actions="discrete", **easy
         )
-        seen, _ = envs.reset(seed=3)
+        seen, _ = envs.reset(seed=5 - number)
         log = [seen]
-        for actions in ([FORWARD, PICK], [PICK, PLACE], [PLACE, FORWARD]):
-            seen, rewards, ended, cut, _ = envs.step(np.array(actions))
+        for actions in plans[:, 2 - number :]:
+            seen, rewards, ended, cut, _ = envs.step(actions)
             log.append({**seen, "reward": rewards, "ended": ended, "cut": cut})
         envs.close()
         logs.append(log)
@@ -247,7 +248,7 @@ def test_vectors_agree(easy):
     for one, other in zip(*logs, strict=True):
         assert one.keys() == other.keys()
         for name in one:
-            np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+            np.testing.assert_array_equal(one[name][1:], other[name], err_msg=name)
 
 
 def test_info_tells_what_happened(easy):

@@ -19,13 +19,18 @@ GPU = GlInfo("NVIDIA Corporation", "NVIDIA H100/PCIe/SSE2", "4.6.0", False)
 CPU = GlInfo("Mesa", "llvmpipe (LLVM 15.0.6, 256 bits)", "4.5", True)
 
 
-def test_report_of_this_machine_is_usable_and_truthful():
-    report = environment_report()
-    assert report.usable
-    assert report.versions["mujoco"] == mujoco.__version__
-    assert report.versions["numpy"] == np.__version__
-    assert report.gl is not None
-    assert report.gl.renderer in "\n".join(report.lines())
+@pytest.fixture(scope="module")
+def found():
+    """The report of this machine."""
+    return environment_report()
+
+
+def test_report_of_this_machine_is_usable_and_truthful(found):
+    assert found.usable
+    assert found.versions["mujoco"] == mujoco.__version__
+    assert found.versions["numpy"] == np.__version__
+    assert found.gl is not None
+    assert found.gl.renderer in "\n".join(found.lines())
 
 
 def test_the_report_says_how_much_compiled_code_there_is(tmp_path, monkeypatch):
@@ -72,14 +77,14 @@ def test_a_machine_without_opengl_still_gets_a_report():
     assert run.stdout.split() == ["False", "None", "True", "True", "True"]
 
 
-def test_missing_distribution_makes_the_report_unusable():
-    report = dataclasses.replace(environment_report(), versions={"mujoco": None})
+def test_missing_distribution_makes_the_report_unusable(found):
+    report = dataclasses.replace(found, versions={"mujoco": None})
     assert not report.usable
     assert "mujoco not installed" in report.lines()
 
 
-def test_dm_control_may_be_missing_where_it_cannot_be_installed_like_the_others(monkeypatch):
-    report = dataclasses.replace(environment_report(), versions={"dm-control": None})
+def test_dm_control_may_be_missing_where_it_cannot_be_installed_like_the_others(found, monkeypatch):
+    report = dataclasses.replace(found, versions={"dm-control": None})
     monkeypatch.setattr(diagnostics, "WITHOUT_LABMAZE", (3, 0))
     assert report.usable
     assert advise(report.versions, (), GPU)[0].endswith("pip install --no-deps dm-control")

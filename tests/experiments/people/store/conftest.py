@@ -75,7 +75,8 @@ async def _create(server, name):
 
 @pytest.fixture
 async def store(url):
-    opened = await Store.open(url, "pilot", HASH)
+    """An open store, in which hashing a password takes little memory and so little time."""
+    opened = await Store.open(url, "pilot", HASH, password_memory_kib=64)
     yield opened
     await opened.close()
 

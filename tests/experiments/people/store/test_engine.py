@@ -73,7 +73,7 @@ async def run(store, sql, **values):
     await store._database.write(work)
 
 
-@pytest.mark.parametrize("lines", [30, 101, 250])
+@pytest.mark.parametrize("lines", [101, *(pytest.param(n, marks=pytest.mark.slow) for n in (30, 250))])
 async def test_what_is_acknowledged_survives_a_kill(url, lines):
     command = [sys.executable, "-c", ACKNOWLEDGE, url]
     acknowledged = []

@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from experiments.errors import StoreError
+from experiments.people.store import Store
 
 pytestmark = pytest.mark.anyio
 
@@ -19,6 +20,14 @@ async def test_a_password_opens_and_is_not_kept(store):
     assert await store.researchers.check("bob", "correct horse") is None
     assert await store.researchers.all() == (ada,)
     assert "horse" not in repr(ada)
+
+
+async def test_passwords_are_hashed_with_the_memory_of_rfc_9106_by_default(tmp_path):
+    store = await Store.open(f"sqlite:///{tmp_path / 'study.db'}", "pilot", "0" * 64)
+    try:
+        assert (await store.researchers._hash("correct horse")).startswith("$argon2id$v=19$m=65536,t=3,")
+    finally:
+        await store.close()
 
 
 async def test_a_login_ends_by_time_by_logging_out_and_by_a_change(store):

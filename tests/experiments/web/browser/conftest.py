@@ -6,13 +6,21 @@ from benchmarks.support.chromium import CHROMIUM, chromium_browser
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
 
 
-@pytest.fixture
-def chromium():
+@pytest.fixture(scope="module")
+def shared_chromium():
     """A browser without a screen."""
     if not CHROMIUM.is_file():
         pytest.skip(f"no browser at {CHROMIUM}")
     with chromium_browser() as browser:
         yield browser
+
+
+@pytest.fixture
+def chromium(shared_chromium):
+    """A browser without a screen, and without a page or a cookie."""
+    yield shared_chromium
+    for context in shared_chromium.contexts:
+        context.close()
 
 
 @pytest.fixture

@@ -102,7 +102,10 @@ def elsewhere(browser, server, page, look):
     return found
 
 
-@pytest.mark.parametrize("look", [DESK, {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"}])
+DARK_PHONE = {**PHONE, "color_scheme": "dark", "reduced_motion": "reduce"}
+
+
+@pytest.mark.parametrize("look", [DESK, pytest.param(DARK_PHONE, marks=pytest.mark.slow)])
 def test_every_page_passes_axe_and_is_left_by_keys(tmp_path, chromium, look):
     film = tmp_path / "flythrough.mp4"
     with VideoWriter(film, width=64, height=48) as writer:

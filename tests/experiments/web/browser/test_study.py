@@ -53,7 +53,7 @@ def at_phase(folder, name, status="arrived"):
     database.close()
 
 
-@pytest.mark.parametrize("look", [DESK, PHONE])
+@pytest.mark.parametrize("look", [DESK, pytest.param(PHONE, marks=pytest.mark.slow)])
 def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
     url, folder = served
     page = chromium.new_context(**look).new_page()

@@ -29,6 +29,7 @@ from experiments.web.worker.live_session import (
     save_run,
 )
 from experiments.web.worker.main import Worker
+from planner.solver import SolveLimit
 
 pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 CONFIG = TrialConfig(objects=6, assistance="guided", seed=3, user="human", live=True, fidelity="event")
@@ -124,7 +125,8 @@ def test_a_german_session_shows_german_and_leaves_the_bytes_of_an_english_one(ho
 
 
 @pytest.mark.parametrize(("crashes", "planner"), [((), "ortools"), ((60, 61, 170), "exact")])
-def test_the_run_directory_of_a_session_replays(house, tmp_path, crashes, planner):
+def test_the_run_directory_of_a_session_replays(house, tmp_path, monkeypatch, crashes, planner):
+    monkeypatch.setattr("planner.solver_source.PROOF_LIMIT", SolveLimit(seconds=0.3))
     batches = list(wandering(5, 260))
     config = msgspec.structs.replace(CONFIG, planner=planner)
     session = play(tmp_path / "session", house, batches[: crashes[0] if crashes else 260], config=config)
