@@ -13,15 +13,14 @@ import numpy as np
 from scripted_workers import ScriptedPool
 
 from experiments.cli.server import http_server, listen, url_of
-from experiments.people.phases import phases_of_study
-from experiments.people.recruitment import recruiter
+from experiments.people.folders import VisitFolders
 from experiments.people.researcher.app import ResearcherServer, Watched
 from experiments.people.researcher.metrics import Metrics, Timed
-from experiments.people.server.app import Serving, StudyServer
+from experiments.people.server.app import ServerOptions, VisitServer
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
-from experiments.web.server.visits import Visits
+from experiments.people.study_plan import plan_of
 
 HOST = "127.0.0.1"
 PASSWORD = "correct horse battery"
@@ -80,6 +79,17 @@ class Site:
         return answer.headers["location"]
 
 
+class MadeInItsLoop:
+    """An application that is made in the event loop in which it runs, as its database has to be."""
+
+    def __init__(self, make):
+        self._make, self._app = make, None
+
+    async def __call__(self, scope, receive, send):
+        self._app = self._app or await self._make()
+        await self._app(scope, receive, send)
+
+
 @contextmanager
 def served(folder, settings="", researchers=ROLES, workers=20):
     """A study with `settings` added to its file, and researchers of these names and roles."""
@@ -98,11 +108,12 @@ def served(folder, settings="", researchers=ROLES, workers=20):
             await site.store.researchers.add(role, PASSWORD, role)
         metrics = Metrics()
         site.store.on_write(metrics.wrote)
-        visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
-        procedure = Procedure(site.study, phases_of_study(site.study), site.store, visits, rng)
+        folders, rng = VisitFolders(folder / "visits"), np.random.default_rng(0)
+        procedure = Procedure(plan_of(site.study, folder / "film.mp4"), site.store, folders, rng)
         proxies = (ip_network("127.0.0.1/32"),)
-        serving = Serving(b"secret", folder / "film.mp4", proxies, metrics, workers=workers)
-        server = StudyServer(procedure, recruiter(site.study.settings.recruitment), site.pool, serving)
+        server = VisitServer(
+            procedure, site.pool, ServerOptions(b"secret", proxies, metrics, workers=workers)
+        )
         site.people = server.app(HOST)
         watched = Watched(site.study, site.store, server.sessions, metrics)
         site.researchers = ResearcherServer(watched, proxies=proxies).app(HOST)

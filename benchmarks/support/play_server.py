@@ -13,8 +13,9 @@ from urllib.parse import urlsplit
 
 import httpx
 
+from experiments.people.tokens import token_hash
 from experiments.record.journal import JOURNAL
-from experiments.web.server.visits import JOURNALS, token_hash
+from experiments.record.run_directory import JOURNALS
 
 PATIENCE = 400.0  # s; a loaded machine may be slow, and may have to compile all kernels first
 TASK_ALONE = ("--phases", "task")  # words of a server whose visits consist of the task
@@ -70,8 +71,11 @@ class PlayProcess:
     def begin(self) -> str:
         """Begin a visit; its address."""
         origin = self.url.rstrip("/")
-        answer = httpx.post(f"{origin}/visits", headers={"Origin": origin}, timeout=PATIENCE)
-        return origin + answer.headers["location"]
+        with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=PATIENCE) as client:
+            path = client.post("/begin").headers["location"]
+            if 'value="story"' in client.get(path).text:
+                client.post(path, data={"phase": "story"}, follow_redirects=True)
+        return origin + path
 
     def visit(self, address: str) -> Path:
         """Folder of a visit."""

@@ -3,9 +3,9 @@
 import argparse
 import asyncio
 import socket
-from collections.abc import Sequence
+import tomllib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 
@@ -28,17 +28,20 @@ from experiments.cli.server import (
     prepare_process,
     serve,
 )
+from experiments.cli.study.database import DATABASE, sqlite_url
 from experiments.errors import ConfigError
-from experiments.procedure.comprehension import Question, read_questions
-from experiments.procedure.story import story_text
+from experiments.people.items import Item
 from experiments.record.origin import HUMAN
-from experiments.record.phases import FLYTHROUGH, PHASES, STORY, TASK, TRAINING, phases_of
+from experiments.record.phases import FLYTHROUGH, PHASES, STORY, TASK, phases_of
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
+from mjsim.support.files import read_text
 from planner.solver import SOLVERS, solver
 
+if TYPE_CHECKING:
+    from experiments.web.server.pool import WorkerPool
+
 OBJECTS = 6
-TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
 
 DESCRIPTION = """\
 Start a server on which people tidy the apartment in a browser: by keyboard and mouse, gamepad or touch. Prints its URL
@@ -82,6 +85,9 @@ def add_parser(commands: Any) -> None:
         metavar="S",
         help="seconds without a sign of the person after which the place is given to another one",
     )
+    group.add_argument(
+        "--language", default="en", metavar="TAG", help="language of the pages: en or de (default: en)"
+    )
     group.add_argument("--film", type=Path, metavar="FILE.mp4", help="film of the house to show first")
     group.add_argument(
         "--minimum",
@@ -94,23 +100,22 @@ def add_parser(commands: Any) -> None:
         "--questions",
         type=Path,
         metavar="FILE",
-        help="TOML file of questions about the story, to be answered before the visit begins (docs/play.md)",
+        help="TOML file of questions about the story, which have to be answered correctly (docs/play.md)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    trials = _trials(arguments)
+    task = task_of(arguments)
     if arguments.film is not None and not arguments.film.is_file():
         raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
     check_public_url(arguments.public_url)
-    questions = _questions(arguments)
+    questions_of(arguments)  # before anything is started
     with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
-        _serve(arguments, trials, questions, listener)
+        _serve(arguments, task, listener)
     return 0
 
 
-def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """Settings of the training and the task."""
+def task_of(arguments: argparse.Namespace) -> TrialConfig:
     if arguments.user != HUMAN:
         raise ConfigError(f"`mjsim play` is for a person; user {arguments.user} belongs to `mjsim run`")
     task = TrialConfig(
@@ -122,20 +127,17 @@ def _trials(arguments: argparse.Namespace) -> dict[str, dict[str, Any]]:
             "objects": OBJECTS,
             **given_options(arguments, ("objects", *PAGE_SETTINGS)),
             **trial_options(arguments),
-            "phases": ",".join(_phases(arguments)),
+            "phases": ",".join(shown_phases(arguments)),
         },
     )
-    from experiments.trials.training import training_config
-
     condition(task.assistance)
     condition(task.training_assistance)
     if task.planner not in SOLVERS:  # those are loaded by the workers
         solver(task.planner)
-    training = msgspec.structs.replace(training_config(task), time_limit=TRAINING_LIMIT)
-    return {TRAINING: training.settings(), TASK: task.settings()}
+    return task
 
 
-def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
+def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
     """The phases of a visit; a fly-through needs a film.
 
     Raises:
@@ -146,46 +148,62 @@ def _phases(arguments: argparse.Namespace) -> tuple[str, ...]:
     )
 
 
-def _questions(arguments: argparse.Namespace) -> Sequence[Question]:
-    """The questions about the story, after a check that the phases which options name are shown."""
-    named = {**arguments.minimum, **({STORY: 0.0} if arguments.questions else {})}
-    if missing := [name for name in named if name not in _phases(arguments)]:
+def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
+    """Return the questions of the TOML file of --questions: tables [[question]] with `text`, `choices` and `answer`.
+
+    Raises:
+        ConfigError: The file cannot be read or used, or a phase that the options are about is not shown.
+    """
+    path: Path | None = arguments.questions
+    named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
+    if missing := [name for name in named if name not in shown_phases(arguments)]:
         raise ConfigError(f"--minimum or --questions is about the phase {missing[0]}, which is not shown")
-    return read_questions(arguments.questions) if arguments.questions else ()
+    if path is None:
+        return ()
+    try:
+        asked = tomllib.loads(read_text(path)).get("question") or []
+        items = [
+            {"name": f"question_{number}", "kind": "choice", "text": one["text"]}
+            | {"choices": one["choices"], "right": one["answer"]}
+            for number, one in enumerate(asked, 1)
+        ]
+        found: tuple[Item, ...] = msgspec.convert(
+            items, Annotated[tuple[Item, ...], msgspec.Meta(min_length=1)]
+        )
+        return found
+    except OSError as error:
+        raise ConfigError(f"cannot read the questions {path}: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, msgspec.ValidationError) as error:
+        raise ConfigError(f"{path} has no questions: {error}") from error
 
 
-def _serve(
-    arguments: argparse.Namespace,
-    trials: dict[str, dict[str, Any]],
-    questions: Sequence[Question],
-    listener: socket.socket,
-) -> None:
+def _serve(arguments: argparse.Namespace, task: TrialConfig, listener: socket.socket) -> None:
     from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
 
     prepare_process()
-    pool = WorkerPool(trials[TASK]["house"])
+    pool = WorkerPool(task.house)
     pool.warm_up()  # in parallel to the imports that follow
+    asyncio.run(_serve_visits(arguments, task, pool, listener))
 
-    from experiments.web.server.app import PlayConfig, PlayServer
 
-    phases = _phases(arguments)
-    config = PlayConfig(
-        phases=phases,
-        trials=trials,
-        folder=arguments.out.absolute(),
-        sessions=arguments.sessions,
-        idle=max(arguments.idle, 1.0),
-        film=arguments.film,
-        story=story_text(None if arguments.story is None else Path(arguments.story))
-        if STORY in phases
-        else "",
-        minimum=arguments.minimum,
-        questions=questions,
-        proxies=arguments.trusted_proxy,
-        xr=arguments.xr,
-    )
-    app = PlayServer(config, pool).app(arguments.host, arguments.public_url)
-    asyncio.run(serve(app, listener, arguments))
+async def _serve_visits(
+    arguments: argparse.Namespace, task: TrialConfig, pool: "WorkerPool", listener: socket.socket
+) -> None:
+    import numpy as np
+
+    from experiments.cli.play_plan import NAME, plan_of_play
+    from experiments.people.folders import VisitFolders
+    from experiments.people.server.app import ServerOptions, VisitServer
+    from experiments.people.server.procedure import Procedure
+    from experiments.people.store import Store
+
+    store = await Store.open(sqlite_url(arguments.out / DATABASE), NAME, "0" * 64)
+    folders = VisitFolders(arguments.out.absolute())
+    procedure = Procedure(plan_of_play(arguments, task), store, folders, np.random.default_rng())
+    await procedure.adopt()
+    options = ServerOptions(proxies=arguments.trusted_proxy, workers=arguments.sessions)
+    app = VisitServer(procedure, pool, options).app(arguments.host, arguments.public_url)
+    await serve(app, listener, arguments)
 
 
 def _minimum(text: str) -> dict[str, float]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.people.items import Item
-from experiments.people.study_file import SURVEY, Study
+from experiments.people.plan import SURVEY
+from experiments.people.study_file import Study
 from experiments.study.measures import LIKERT_PREFIX
 from experiments.trials.dictionary import trial_columns
 

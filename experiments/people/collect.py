@@ -14,8 +14,9 @@ from typing import Any, TypeVar
 from experiments.errors import ConfigError, RecordError, ReplayError
 from experiments.people.copies import INDEX
 from experiments.people.items import Item
+from experiments.people.plan import SURVEY
 from experiments.people.store import Answer, Person, PhaseRow, Store, TrialRow
-from experiments.people.study_file import SURVEY, Study
+from experiments.people.study_file import Study
 from experiments.record.origin import REHEARSAL
 from experiments.record.phases import TASK
 from experiments.record.run_directory import is_run, visit_folders

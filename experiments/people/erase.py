@@ -13,10 +13,10 @@ from experiments.people import VISITS
 from experiments.people.collect import person_name, person_number, visit_name
 from experiments.people.copies import DATABASES, Copy, copies, forget_copies
 from experiments.people.export import DATA, RUNS
+from experiments.people.folders import VisitFolders
 from experiments.people.store import Person, Store, change_database
 from experiments.study.table import ANALYSIS, FILES
 from experiments.trials.table import NAME, read_rows, write_tables
-from experiments.web.server.visits import Visits
 from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
 LEFTOVER_S = 3600.0  # for which unfinished work may be that of a command on another machine
@@ -45,15 +45,13 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     if mine := [payment.key for payment in owed if payment.person_id == person.id]:
         raise StoreError(f"{name} is owed {', '.join(mine)}: pay first, then erase")
     told = await _erase_from_copies(store, folder, person, who)
-    visits = Visits(folder / VISITS)
+    visits = VisitFolders(folder / VISITS)
     played = any(row.person_id == person.id for row in await store.trials())
-    if played and not person.delete_wanted and not (visits.folder / person.token_hash).exists():
+    if played and not person.delete_wanted and not (visits.path / person.token_hash).exists():
         told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
     await asyncio.to_thread(visits.remove, person.token_hash)
-    if (visits.folder / person.token_hash).exists():
-        raise StoreError(
-            f"{visits.folder / person.token_hash} cannot be deleted; delete it, then erase again"
-        )
+    if (visits.path / person.token_hash).exists():
+        raise StoreError(f"{visits.path / person.token_hash} cannot be deleted; delete it, then erase again")
     await store.erase(person.id, who)
     return told
 

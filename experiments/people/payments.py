@@ -6,10 +6,11 @@ from decimal import ROUND_HALF_UP, Decimal
 
 from experiments.errors import StoreError
 from experiments.people.collect import person_name
+from experiments.people.plan import PLAYED
 from experiments.people.store import PaymentEvent, Person, Store, TrialRow
 from experiments.people.store.ledger import ONCE
 from experiments.people.store.values import PaymentKind
-from experiments.people.study_file import PLAYED, Pay, Study
+from experiments.people.study_file import Pay, Study
 from experiments.record.phases import TASK
 from experiments.session.endings import ALL_DELIVERED
 

@@ -14,6 +14,7 @@ import msgspec
 
 from experiments.errors import ConfigError
 from experiments.people.file_lines import at_line
+from experiments.people.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
 from experiments.people.texts import Texts, read_texts, story_file
 from experiments.procedure.story import story_text
 from experiments.record.origin import HUMAN
@@ -23,14 +24,8 @@ from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from mjsim.support.files import read_bytes
 
-CONSENT, DEVICE, COMPREHENSION, SURVEY = "consent", "device", "comprehension", "survey"
-DEBRIEFING, COMPLETION = "debriefing", "completion"
-PHASES = (CONSENT, DEVICE, STORY, FLYTHROUGH, COMPREHENSION, TRAINING, TASK, SURVEY, DEBRIEFING, COMPLETION)
-PLAYED = (TRAINING, TASK)
 PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
-Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=86400.0)]
-Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]  # scheme, host, port
@@ -54,16 +49,6 @@ class Pay(_Table, frozen=True):
     partial: bool = False  # whether who leaves, or never returns, once the task has begun receives a share
 
 
-class Device(_Table, frozen=True):
-    """What a participant's computer has to have."""
-
-    frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
-    latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
-    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # px of the window
-    height: Annotated[int, msgspec.Meta(ge=0)] = 500
-    keyboard: bool = True
-
-
 class Recruitment(_Table, frozen=True):
     """Where people come from, and what their platform expects back."""
 
@@ -81,25 +66,6 @@ class Recruitment(_Table, frozen=True):
             raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")
         if url.scheme == "http" and url.hostname not in HERE:
             raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
-
-
-class Limits(_Table, frozen=True):
-    """What ends a participation."""
-
-    idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
-    abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
-    timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends
-    attempts: Count = 3  # at the comprehension check
-    # how many items of the survey with a right answer may be answered wrongly; None screens nobody out
-    inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # after which personal data are deleted
-
-    def __post_init__(self) -> None:
-        if self.timed_out_after < self.abandoned_after:
-            raise ValueError(
-                f"timed_out_after is {self.timed_out_after:g} s; it cannot be less than abandoned_after, "
-                f"{self.abandoned_after:g} s"
-            )
 
 
 class Settings(_Table, frozen=True):
@@ -170,11 +136,6 @@ class Study:
     story: str
     exclusions: Exclusions | None
     rehearsal: bool = False  # whether all its people are simulated
-
-    @property
-    def words(self) -> Mapping[str, Mapping[str, str]]:
-        """Its texts by section and name, without items of forms."""
-        return {name: section.words for name, section in self.texts.items()}
 
     @property
     def people(self) -> int:

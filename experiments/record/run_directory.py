@@ -17,6 +17,7 @@ SAMPLE = 100  # number of folders in a batch that are looked into; looking into 
 TRIALS = "trials"  # folder of a batch
 PACKED = ".sqlar"  # suffix of an archive of runs
 VISIT = "visit.json"  # in the folder of each visit of `mjsim play`
+JOURNALS = "journals"  # folder of journals in the folder of a visit
 
 
 def is_run(directory: Path) -> bool:

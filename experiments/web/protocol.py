@@ -340,9 +340,7 @@ class Saved(WireMessage, frozen=True):
 
 
 class Queue(WireMessage, frozen=True):
-    """All places are taken; the session opens by itself when it is its turn. Position 1 is next."""
-
-    position: int
+    """All slots are taken. The page has to be loaded again, and then shows the queue."""
 
 
 class Occupied(WireMessage, frozen=True):

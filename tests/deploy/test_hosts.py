@@ -16,7 +16,7 @@ from benchmarks.support.play_server import PATIENCE, PlayProcess
 from benchmarks.support.ports import free_ports
 from experiments.people.store import Store, utc_now
 from experiments.people.store.hosts import SILENT
-from experiments.web.server.visits import token_hash
+from experiments.people.tokens import token_hash
 
 PEOPLE = 6
 NOWHERE = (404, 502)  # whichever host NGINX asks last

@@ -15,7 +15,7 @@ from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
     from experiments.people.readiness.dry_run import Walked
-    from experiments.people.recruitment.base import Recruiter
+    from experiments.people.recruiter import Recruiter
     from experiments.people.study_file import Study
     from experiments.web.server.pool import WorkerPool
 
@@ -47,14 +47,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Check; 1 if there is a problem."""
     study = people_study(arguments)
     require_extra("study")
-    from experiments.people.phases import phases_of_study
+    from experiments.people.phases import phases_of
     from experiments.people.readiness.costs import durations, simulate
     from experiments.people.readiness.problems import located, problems_of_file, problems_of_length
+    from experiments.people.study_plan import plan_of
     from experiments.web.server.pool import WorkerPool
 
     if arguments.out is not None and arguments.out.exists() and not arguments.out.is_dir():
         raise ConfigError(f"{arguments.out} is a file; name a folder for the pictures")
-    phases = phases_of_study(study)
+    phases = phases_of(plan_of(study, platform=_recruiter(study)))
     prepare_process()
     pool = WorkerPool(study.cells[0].trial(0).house)
     pool.warm_up()
@@ -80,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _recruiter(study: "Study") -> "Recruiter":
     """The study's platform, or an open link where its codes are missing."""
+    from experiments.people.recruiter import OpenLink
     from experiments.people.recruitment import recruiter
-    from experiments.people.recruitment.link import OpenLink
 
     try:
         return recruiter(study.settings.recruitment)

@@ -2,6 +2,7 @@
 
 import argparse
 import asyncio
+import functools
 import os
 import secrets
 import socket
@@ -21,7 +22,6 @@ from experiments.cli.server import (
 )
 from experiments.cli.study.database import DATABASE, add_database, people_study, sqlite_url
 from experiments.errors import ConfigError
-from experiments.record.origin import REHEARSAL
 from experiments.record.phases import FLYTHROUGH
 
 if TYPE_CHECKING:  # imported when the command runs, so that other commands start fast
@@ -71,15 +71,14 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     from experiments.people.copies import INDEX
-    from experiments.people.phases import phases_of_study
-    from experiments.people.recruitment import recruiter
+    from experiments.people.phases import phases_of
+    from experiments.people.study_plan import plan_of
 
     if arguments.rehearsal is not None:
         from experiments.people.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
-    phases_of_study(study)  # own ones may be missing
-    recruiter(study.settings.recruitment)  # codes may be missing
+    phases_of(plan_of(study))  # custom phases or codes of the platform may be missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
     prepare_process()  # the folder is nobody else's either
@@ -112,34 +111,32 @@ async def _serve(
 
     from experiments.people import VISITS
     from experiments.people.collect import check_people
-    from experiments.people.phases import phases_of_study
-    from experiments.people.recruitment import recruiter
+    from experiments.people.folders import VisitFolders
     from experiments.people.researcher.app import ResearcherServer, Watched
     from experiments.people.researcher.metrics import Metrics, Timed
-    from experiments.people.server.app import Serving, StudyServer
+    from experiments.people.retention import forget_daily
+    from experiments.people.server.app import ServerOptions, VisitServer
     from experiments.people.server.procedure import Procedure
     from experiments.people.store import Store
-    from experiments.web.server.visits import Visits
+    from experiments.people.study_plan import plan_of
 
     url = arguments.database or sqlite_url(arguments.out / DATABASE)
     store = await Store.open(url, study.settings.name, study.sha256)
     check_people(study, await store.people())
-    visits = Visits(arguments.out.absolute() / VISITS)
-    procedure = Procedure(study, phases_of_study(study), store, visits, np.random.default_rng())
+    folders = VisitFolders(arguments.out.absolute() / VISITS)
+    procedure = Procedure(plan_of(study, film), store, folders, np.random.default_rng())
     metrics = Metrics()
     store.on_write(metrics.wrote)
-    serving = Serving(
+    days = study.settings.limits.keep_days
+    options = ServerOptions(
         _secret(arguments.out),
-        film,
         arguments.trusted_proxy,
         metrics,
         arguments.host_name,
         arguments.workers,
+        [functools.partial(forget_daily, store, folders.path, days)] if days else [],
     )
-    platform = recruiter(study.settings.recruitment)
-    if study.rehearsal:
-        platform.platform = REHEARSAL
-    server = StudyServer(procedure, platform, pool, serving)
+    server = VisitServer(procedure, pool, options)
     app = Timed(server.app(arguments.host, arguments.public_url), metrics)
     beside, (listener, researchers) = [], listeners
     if researchers is not None:

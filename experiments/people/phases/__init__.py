@@ -1,47 +1,48 @@
-"""The phases of a study: what a participant goes through, one after the other."""
+"""Phases of a visit, which a participant goes through one after the other."""
 
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 
 from experiments.errors import ConfigError
-from experiments.people import study_file as names
-from experiments.people.phases.base import FormPhase, Phase, Story
+from experiments.people import plan as names
+from experiments.people.phases.base import FormPhase, Phase, Result, Story
 from experiments.people.phases.comprehension import Comprehension
 from experiments.people.phases.consent import Consent
 from experiments.people.phases.device import DeviceCheck
 from experiments.people.phases.played import Played
 from experiments.people.phases.survey import Survey
-from experiments.people.study_file import Study
+from experiments.people.plan import VisitPlan
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 
-KINDS: Mapping[str, Callable[[Study], Phase]] = {
-    names.CONSENT: lambda study: Consent(study, names.CONSENT, "consent"),
-    names.DEVICE: lambda study: DeviceCheck(study, names.DEVICE, "device"),
-    STORY: lambda study: Story(study, STORY),
-    FLYTHROUGH: lambda study: FormPhase(study, FLYTHROUGH, "study_film"),
-    names.COMPREHENSION: lambda study: Comprehension(study, names.COMPREHENSION, "comprehension"),
-    TRAINING: lambda study: Played(study, TRAINING),
-    TASK: lambda study: Played(study, TASK),
-    names.SURVEY: lambda study: Survey(study, names.SURVEY),
-    names.DEBRIEFING: lambda study: FormPhase(study, names.DEBRIEFING),
-    names.COMPLETION: lambda study: FormPhase(study, names.COMPLETION, "completion"),
+KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
+    names.CONSENT: lambda plan: Consent(plan, names.CONSENT, "consent"),
+    names.DEVICE: lambda plan: DeviceCheck(plan, names.DEVICE, "device"),
+    STORY: lambda plan: Story(plan, STORY),
+    FLYTHROUGH: lambda plan: FormPhase(plan, FLYTHROUGH, "study_film"),
+    names.COMPREHENSION: lambda plan: Comprehension(plan, names.COMPREHENSION, "comprehension"),
+    TRAINING: lambda plan: Played(plan, TRAINING),
+    TASK: lambda plan: Played(plan, TASK),
+    names.SURVEY: lambda plan: Survey(plan, names.SURVEY),
+    names.DEBRIEFING: lambda plan: FormPhase(plan, names.DEBRIEFING),
+    names.RESULT: lambda plan: Result(plan, names.RESULT, "result"),
+    names.COMPLETION: lambda plan: FormPhase(plan, names.COMPLETION, "completion"),
 }
 
 
-def phases_of_study(study: Study) -> Sequence[Phase]:
-    """The phases of a study, in order; own ones are given as `package.module:attribute` of what makes one.
+def phases_of(plan: VisitPlan) -> Sequence[Phase]:
+    """Make the phases of a plan, in order. A custom one is named by its factory, `package.module:attribute`.
 
     Raises:
         ConfigError: One cannot be loaded or made.
     """
-    return [_phase(name, study) for name in study.settings.phases]
+    return [_phase(name, plan) for name in plan.phases]
 
 
-def _phase(name: str, study: Study) -> Phase:
+def _phase(name: str, plan: VisitPlan) -> Phase:
     if name in KINDS:
-        return KINDS[name](study)
+        return KINDS[name](plan)
     try:
-        phase = pkgutil.resolve_name(name)(study)
+        phase = pkgutil.resolve_name(name)(plan)
     except Exception as error:  # user code may raise anything
         raise ConfigError(f"cannot make phase {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(phase, Phase):

@@ -8,7 +8,7 @@ from starlette.datastructures import ImmutableMultiDict
 
 from experiments.people.forms import form_of
 from experiments.people.items import Item
-from experiments.people.study_file import Study
+from experiments.people.plan import VisitPlan
 from experiments.people.texts import Section
 
 Outcome = Literal["next", "no_consent", "screened_out"]
@@ -25,14 +25,14 @@ class Visitor:
         shown_s: How long ago the phase was shown first, s.
         attempts: How many answers of it were refused.
         path: Of the person's pages.
-        assistance: Of the person's cell, or None before the assignment.
+        metrics: Metrics of the task, in the phase `result`.
     """
 
     answers: Answers
     shown_s: float
     attempts: int
     path: str
-    assistance: str | None = None
+    metrics: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Again:
 
 @runtime_checkable
 class Phase(Protocol):
-    """A phase of a study."""
+    """A phase of a visit."""
 
     name: str
 
@@ -76,15 +76,15 @@ class FormPhase:
     """A text, the items of a form, and a button.
 
     Args:
-        study: The study.
+        plan: Plan of the visit.
         name: Of the phase, and of the section of its texts.
         template: Of its page.
     """
 
-    def __init__(self, study: Study, name: str, template: str = "form") -> None:
+    def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
         self.name, self._template = name, template
-        self._study = study
-        self.texts: Section = study.texts[name]
+        self._plan = plan
+        self.texts: Section = plan.texts[name]
 
     @property
     def items(self) -> Sequence[Item]:
@@ -110,7 +110,7 @@ class FormPhase:
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         form = self._form(sent, visitor.answers)
         if not form.validate():
-            return Again(self._study.texts["common"]["faults"], {"form": form})
+            return Again(self._plan.texts["common"]["faults"], {"form": form})
         return Done(
             {
                 item.name: form[item.name].data
@@ -133,14 +133,25 @@ class FormPhase:
         }
 
     def _form(self, sent: FormData | None, answers: Answers) -> Any:
-        study = self._study
-        form = form_of(self.items, self.texts.scale, study.texts["common"], study.settings.language)
+        form = form_of(self.items, self.texts.scale, self._plan.texts["common"], self._plan.language)
         form.process(sent, data=dict(answers))
         return form
 
 
 class Story(FormPhase):
-    """The text of the study's story file."""
+    """The story as a text."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
-        return {"paragraphs": [part for part in self._study.story.split("\n\n") if part.strip()]}
+        return {"paragraphs": self._plan.story_paragraphs}
+
+
+class Result(FormPhase):
+    """Metrics of the task, and a link to play again unless the plan has only one episode."""
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:
+        return {
+            "metrics": visitor.metrics,
+            "path": visitor.path,
+            "again": bool(self._plan.recruiter.parameters),
+            "decimal": self._plan.texts["hud"]["decimal"],
+        }

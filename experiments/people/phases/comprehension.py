@@ -10,7 +10,7 @@ class Comprehension(FormPhase):
     """Questions about the story, which can be read again on the same page."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
-        return {"story": [part for part in self._study.story.split("\n\n") if part.strip()]}
+        return {"story": self._plan.story_paragraphs}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         """The answers, if all are right; after the last attempt the person is screened out."""
@@ -21,6 +21,6 @@ class Comprehension(FormPhase):
         answers = dict(read.answers)
         if not wrong:
             return Done(answers)
-        if visitor.attempts + 1 >= self._study.settings.limits.attempts:
+        if visitor.attempts + 1 >= self._plan.limits.attempts:
             return Done(answers, "screened_out")
         return Again(self.texts["wrong"], {"form": self._form(None, read.answers)})

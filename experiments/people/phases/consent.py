@@ -11,7 +11,7 @@ class Consent(FormPhase):
         if sent.get("agree") == "no":
             return Done({"agreed": False}, "no_consent")
         if sent.get("agree") != "yes":
-            return Again(self._study.texts["common"]["required"])
+            return Again(self._plan.texts["common"]["required"])
         read = super().read(visitor, sent)
         return Done({"agreed": True, **read.answers}) if isinstance(read, Done) else read
 

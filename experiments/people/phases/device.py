@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.people.phases.base import Again, Done, FormData, FormPhase, Visitor
-from experiments.people.study_file import Device
+from experiments.people.plan import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
 MAX_RENDERER = 200  # characters
@@ -35,20 +35,20 @@ class DeviceCheck(FormPhase):
     """A page that measures and sends what it found."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
-        return {"keyboard": self._study.settings.device.keyboard}
+        return {"keyboard": self._plan.device.keyboard}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
         """What was measured, if it suffices; who gives up is screened out."""
         measured = _measured(sent)
         if measured is None:
-            return Again(self._study.texts["common"]["needs_script"])
+            return Again(self._plan.texts["common"]["needs_script"])
         answers = {
             **measured.values,
             "keyboard": measured.keyboard,
             "webgl": measured.webgl,
             "renderer": measured.renderer,
         }
-        faults = measured.faults(self._study.settings.device, measured.webgl)
+        faults = measured.faults(self._plan.device, measured.webgl)
         if sent.get("give_up"):
             return Done({**answers, "faults": faults}, "screened_out" if faults else "next")
         if faults:
@@ -56,7 +56,7 @@ class DeviceCheck(FormPhase):
         return Done(answers)
 
     def example(self) -> dict[str, str]:
-        needed = self._study.settings.device
+        needed = self._plan.device
         fits = {"frames_per_s": max(needed.frames_per_s, 1.0), "latency_ms": needed.latency_ms}
         fits |= {"width": needed.width, "height": needed.height, "pixel_ratio": 1.0}
         return {**{name: str(value) for name, value in fits.items()}, "keyboard": "yes", "webgl": "yes"}

@@ -11,7 +11,7 @@ class Survey(FormPhase):
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         """The answers; whoever gives too many wrong ones is screened out where the study file says so."""
         read = super().read(visitor, sent)
-        allowed = self._study.settings.limits.inattentive
+        allowed = self._plan.limits.inattentive
         if isinstance(read, Again) or allowed is None:
             return read
         wrong = sum(item.is_wrong(read.answers.get(item.name)) for item in self.items)

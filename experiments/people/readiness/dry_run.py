@@ -14,20 +14,22 @@ from websockets.exceptions import WebSocketException
 
 from experiments.people import VISITS
 from experiments.people.collect import collect
-from experiments.people.phases import phases_of_study
+from experiments.people.folders import VisitFolders
 from experiments.people.phases.base import Phase
 from experiments.people.phases.comprehension import Comprehension
 from experiments.people.phases.played import Played
+from experiments.people.plan import COMPREHENSION, CONSENT, DEVICE
 from experiments.people.readiness.reading import words_of
 from experiments.people.readiness.server import serving
-from experiments.people.recruitment.base import Leaving, Recruiter
-from experiments.people.server.app import Serving, StudyServer
+from experiments.people.recruiter import Leaving, Recruiter
+from experiments.people.server.app import ServerOptions, VisitServer
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Person, Store
-from experiments.people.study_file import COMPREHENSION, CONSENT, DEVICE, Cell, Study
+from experiments.people.study_file import Cell, Study
+from experiments.people.study_plan import plan_of
+from experiments.people.tokens import token_hash
 from experiments.record.phases import TRAINING
 from experiments.web.server.pool import WorkerPool
-from experiments.web.server.visits import Visits, token_hash
 
 MINIMUM = 1.0  # s; the longest that the dry run waits in a phase
 TASK_TIME = 1.0  # s that the task lasts
@@ -52,7 +54,7 @@ class Walked:
 
 
 async def dry_run(
-    study: Study, recruiter: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
+    study: Study, platform: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
 ) -> Walked:
     """Let made-up people go through a study: one to the end, the others out of it on each way that there is.
 
@@ -61,13 +63,13 @@ async def dry_run(
     """
     study = _shortened(study)
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
-    visits, rng = Visits(folder / VISITS), np.random.default_rng(0)
-    procedure = Procedure(study, phases_of_study(study), store, visits, rng)
-    app = StudyServer(procedure, recruiter, pool, Serving(b"dry run", workers=1)).app("127.0.0.1")
+    folders, rng = VisitFolders(folder / VISITS), np.random.default_rng(0)
+    procedure = Procedure(plan_of(study, platform=platform), store, folders, rng)
+    app = VisitServer(procedure, pool, ServerOptions(b"dry run", workers=1)).app("127.0.0.1")
     async with serving(app) as base:
         headers = {"Origin": base}
         async with httpx.AsyncClient(base_url=base, headers=headers, timeout=PATIENCE) as client:
-            return await _DryRun(procedure, recruiter, folder, client, photograph).walk()
+            return await _DryRun(study, procedure, folder, client, photograph).walk()
 
 
 def _shortened(study: Study) -> Study:
@@ -89,14 +91,14 @@ class _StuckError(Exception):
 class _DryRun:
     def __init__(
         self,
+        study: Study,
         procedure: Procedure,
-        recruiter: Recruiter,
         folder: Path,
         client: httpx.AsyncClient,
         photograph: Photograph,
     ) -> None:
-        self._procedure, self._recruiter, self._folder = procedure, recruiter, folder
-        self._study, self._store, self._client = procedure.study, procedure.store, client
+        self._study, self._procedure, self._folder = study, procedure, folder
+        self._recruiter, self._store, self._client = procedure.plan.recruiter, procedure.store, client
         self._photograph = photograph
         self._people = 0
         self._walked = Walked()

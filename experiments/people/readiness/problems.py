@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from experiments.errors import ConfigError
 from experiments.people.file_lines import line_of
+from experiments.people.plan import COMPREHENSION, CONSENT
 from experiments.people.recruitment import recruiter
-from experiments.people.study_file import COMPREHENSION, CONSENT, Study
+from experiments.people.study_file import Study
 from mjsim.support.files import read_text
 
 PAID = ("prolific", "connect", "external-question")  # platforms on which nobody works for nothing

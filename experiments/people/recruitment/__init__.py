@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from experiments.errors import ConfigError
-from experiments.people.recruitment.base import Recruiter
+from experiments.people.recruiter import OpenLink, Recruiter
 from experiments.people.recruitment.connect import Connect, ConnectPayer
 from experiments.people.recruitment.external_question import ExternalQuestion, ExternalQuestionPayer
-from experiments.people.recruitment.link import OpenLink
 from experiments.people.recruitment.payer import Payer
 from experiments.people.recruitment.prolific import Prolific, ProlificPayer
 from experiments.people.study_file import Recruitment, Settings

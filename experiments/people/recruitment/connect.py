@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.people.recruitment.base import Arrival, Leaving, Refusal, WayBack
+from experiments.people.recruiter import Arrival, Leaving, Refusal, WayBack
 from experiments.people.recruitment.payer import LISTED_AFTER, Api, Order, secret
 from experiments.people.study_file import Recruitment
 

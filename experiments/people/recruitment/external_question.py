@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.errors import ConfigError
-from experiments.people.recruitment.base import Arrival, Leaving, Preview, Refusal, WayBack
+from experiments.people.recruiter import Arrival, Leaving, Preview, Refusal, WayBack
 from experiments.people.recruitment.payer import LISTED_AFTER, Api, Order, UnsureError, secret
 from experiments.people.study_file import Recruitment
 

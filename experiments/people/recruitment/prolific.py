@@ -6,7 +6,7 @@ from datetime import timedelta
 from typing import Any
 from urllib.parse import urlencode
 
-from experiments.people.recruitment.base import Arrival, Leaving, Refusal, WayBack
+from experiments.people.recruiter import Arrival, Leaving, Refusal, WayBack
 from experiments.people.recruitment.payer import Api, DeclinedError, Order, UnsureError, secret
 from experiments.people.study_file import Recruitment
 

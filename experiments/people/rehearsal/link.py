@@ -127,6 +127,8 @@ class Link:
                 self._saved = True
             case "occupied":
                 self._occupied = True
+            case "queue":
+                raise LostError("the page has to wait for a slot")
             case "beat":
                 await self.say(type="beat")
             case "error":

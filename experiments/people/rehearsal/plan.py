@@ -7,7 +7,8 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from experiments.people.study_file import COMPREHENSION, CONSENT, PLAYED, Cell, Study
+from experiments.people.plan import COMPREHENSION, CONSENT, PLAYED
+from experiments.people.study_file import Cell, Study
 from experiments.record.origin import REHEARSAL
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails"]

@@ -15,7 +15,7 @@ from experiments.people.rehearsal.person import Rehearsed
 from experiments.people.rehearsal.run import SERVED, Settings
 from experiments.people.store import Store
 from experiments.people.study_file import Study
-from experiments.web.server.visits import token_hash
+from experiments.people.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"

@@ -13,11 +13,12 @@ import msgspec
 
 from experiments.errors import ConfigError, RecordError
 from experiments.house import House
-from experiments.people.phases import phases_of_study
+from experiments.people.phases import phases_of
 from experiments.people.recruitment import recruiter
 from experiments.people.rehearsal.person import Person, Rehearsed, Surroundings
 from experiments.people.rehearsal.plan import Planned, plan_people
 from experiments.people.study_file import Study
+from experiments.people.study_plan import plan_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
@@ -55,7 +56,7 @@ async def rehearse(
     """
     _keep(settings, out)
     known = read_people(out / PEOPLE)
-    names = [phase.name for phase in phases_of_study(study)]
+    names = [phase.name for phase in phases_of(plan_of(study))]
     planned = plan_people(
         names, settings.people, settings.seed, per_minute=settings.per_minute, dropouts=settings.dropouts
     )
@@ -133,7 +134,7 @@ async def _send(
     platform = recruiter(study.settings.recruitment)
     own = {"STUDY_ID": study.settings.recruitment.study_id}
     parameters = {name: own.get(name, "") for name in platform.parameters}
-    phases = {phase.name: phase for phase in phases_of_study(study)}
+    phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
     # Each request on a connection of its own: a pool looks at all that it keeps before each one.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)

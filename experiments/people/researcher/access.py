@@ -9,8 +9,8 @@ from starlette.responses import Response
 from experiments.people.store import Researcher, Role
 from experiments.people.store.researchers import Researchers
 from experiments.people.store.values import utc_now
+from experiments.people.tokens import TOKEN, new_token, token_hash
 from experiments.web.server.guards import Rate
-from experiments.web.server.visits import TOKEN, new_token, token_hash
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)

@@ -23,7 +23,8 @@ from experiments.people.researcher.access import Access, may
 from experiments.people.researcher.metrics import Metrics
 from experiments.people.researcher.overview import overview
 from experiments.people.store import Person, Researcher, Role, Store, StudyState
-from experiments.people.study_file import PLAYED, Study
+from experiments.people.study_file import Study
+from experiments.people.texts import words_of
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Guards, Network, allowed_hosts
@@ -212,7 +213,9 @@ class ResearcherServer:
         person = await self._found(request.path_params["number"])
         if person is None:
             return self._message(request, 404, *UNKNOWN)
-        return self._page(request, who, "watch", person=person, texts=trial_texts(self._study.words))
+        return self._page(
+            request, who, "watch", person=person, texts=trial_texts(words_of(self._study.texts))
+        )
 
     async def _watch(self, socket: WebSocket) -> None:
         who = await self._access.who(socket)
@@ -278,7 +281,7 @@ class ResearcherServer:
     def _session(self, person: Person) -> PlayedSession | None:
         """The session under way of a person, if this server has it."""
         session = self._watched.sessions.under_way.get(person.token_hash)
-        return session if session and person.active and session.visit.phase in PLAYED else None
+        return session if session and person.active and session.trial is not None else None
 
     def _page(self, request: Request, who: Researcher, name: str, **values: Any) -> Response:
         common: dict[str, Any] = {"who": who, "title": self._study.settings.title, "name_of": person_name}

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
+from experiments.people.plan import DEVICE
 from experiments.people.store import Person, Status, Store, StudyState, utc_now
 from experiments.people.store.ledger import by_key, paid
-from experiments.people.study_file import DEVICE, Study
+from experiments.people.study_file import Study
 from experiments.web.server.sessions import Sessions
 
 LEFT: tuple[Status, ...] = ("no_consent", "screened_out", "withdrawn", "timed_out")

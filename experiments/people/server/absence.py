@@ -4,26 +4,19 @@ import asyncio
 import datetime
 import logging
 import time
-from collections.abc import Callable
-from contextlib import AbstractAsyncContextManager
 
 from experiments.errors import StoreError
 from experiments.people.server.procedure import Procedure
-from experiments.people.store import Person, utc_now
-from experiments.people.study_file import PLAYED
+from experiments.people.store import utc_now
 
 LOG = logging.getLogger("mjsim.study")
 SWEEP_PERIOD = 60.0  # s between two looks for people who never return
 CLOCK_SET = 30.0  # s by which the clock is off once it was set, or the machine slept
-LockOf = Callable[[Person], AbstractAsyncContextManager[None]]
 
 
-async def end_absent(procedure: Procedure, lock_of: LockOf) -> None:
-    """End the participation of people who never return. Time in which this server did not run does not count.
-
-    `lock_of` gives what is held while a person's phase changes.
-    """
-    away = procedure.study.settings.limits.timed_out_after
+async def end_absent(procedure: Procedure) -> None:
+    """Time out participants who do not return. Time in which this server did not run does not count."""
+    away = procedure.plan.limits.timed_out_after
     since = time.monotonic()
     ahead = time.time() - since
     while True:
@@ -34,19 +27,8 @@ async def end_absent(procedure: Procedure, lock_of: LockOf) -> None:
         if now - since < away:
             continue
         try:
-            await _end_before(utc_now() - datetime.timedelta(seconds=away), procedure, lock_of)
+            gone = await procedure.store.time_out(utc_now() - datetime.timedelta(seconds=away))
+            if gone:
+                LOG.info("%d participants did not return", gone)
         except StoreError as error:  # the next sweep may find them
             LOG.warning("%s", error)
-
-
-async def _end_before(before: datetime.datetime, procedure: Procedure, lock_of: LockOf) -> None:
-    """End the participation of people of whom there is no sign of life since then.
-
-    A trial that was over when its page was closed is noted; its person may still answer the survey.
-    """
-    for person in await procedure.store.people():
-        if person.active and person.seen < before and person.phase in PLAYED:
-            async with lock_of(person):
-                await procedure.after_trials(person)
-    if gone := await procedure.store.time_out(before):
-        LOG.info("%d people did not return", gone)

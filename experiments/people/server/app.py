@@ -1,11 +1,11 @@
-"""The server of a study: a welcome, the phases one after the other, the end. Trials are played as in `mjsim play`."""
+"""The server of visits: a welcome, the phases one after the other, the end."""
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -15,26 +15,24 @@ from starlette.responses import FileResponse, PlainTextResponse, RedirectRespons
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from experiments.errors import StoreError
+from experiments.errors import RecordError, StoreError
 from experiments.people.phases.base import Again
 from experiments.people.phases.played import Played
-from experiments.people.recruitment.base import Recruiter
-from experiments.people.retention import forget_daily
+from experiments.people.plan import RESULT
 from experiments.people.server.absence import end_absent
 from experiments.people.server.arrivals import Arrivals
 from experiments.people.server.host import HostOfVisits
-from experiments.people.server.keys import Keys
-from experiments.people.server.pages import StudyPages
+from experiments.people.server.pages import VisitPages
 from experiments.people.server.procedure import Now, Procedure
 from experiments.people.server.trials import Trials
 from experiments.people.store import Assignment, Person
+from experiments.people.tokens import TOKEN, Keys, token_hash
 from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Guards, Network, allowed_hosts
 from experiments.web.server.meter import Meter
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
 from experiments.web.server.static_files import static_routes
-from experiments.web.server.visits import TOKEN, token_hash
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
@@ -43,50 +41,46 @@ MAX_FORM = 64 * 1024  # bytes
 
 
 @dataclass(frozen=True)
-class Serving:
-    """What a server needs besides the study.
+class ServerOptions:
+    """Options of a server that are not part of the plan.
 
     Attributes:
-        secret: Key from which tokens of people with a platform's id are made.
-        film: Of the house, if the study shows one.
-        proxies: Whose word about the address of a person is believed.
-        meter: Is told what sessions measure.
-        host: Name of this host, where several share a database; None for the only one.
-        workers: How many trials may run at a time; None for as many as the machine holds.
+        secret: Key from which tokens of participants with a platform's id are made.
+        proxies: Proxies whose X-Forwarded-For header is trusted.
+        meter: Receives session metrics.
+        host: Name of this host if several share a database; None for the only one.
+        workers: Trials at a time; None for as many as the machine holds.
+        background: Tasks that run as long as the server.
     """
 
-    secret: bytes
-    film: Path | None = None
+    secret: bytes = b""
     proxies: tuple[Network, ...] = ()
     meter: Meter | None = None
     host: str | None = None
     workers: int | None = None
+    background: Sequence[Callable[[], Coroutine[Any, Any, None]]] = ()
 
 
 class _ElsewhereError(Exception):
     """Another host has a person."""
 
 
-class StudyServer:
-    """Pages and sockets of a study.
+class VisitServer:
+    """Pages and sockets of all visits.
 
     Attributes:
-        sessions: Those under way.
+        sessions: Sessions under way.
     """
 
-    def __init__(
-        self, procedure: Procedure, recruiter: Recruiter, pool: WorkerPool, serving: Serving
-    ) -> None:
-        self._procedure, self._recruiter, self._serving = procedure, recruiter, serving
-        self._study, self._store = procedure.study, procedure.store
-        self._pool = pool
-        self._trials = Trials(procedure, pool, serving.workers, serving.meter)
+    def __init__(self, procedure: Procedure, pool: WorkerPool, options: ServerOptions) -> None:
+        self._procedure, self._options, self._pool = procedure, options, pool
+        self._plan, self._store = procedure.plan, procedure.store
+        self._trials = Trials(procedure, pool, options.workers, options.meter)
         self.sessions = self._trials.sessions
-        self._pages = StudyPages(self._study, recruiter, len(procedure.phases))
-        keys = Keys(serving.secret, self._study.settings.name)
-        self._arrivals = Arrivals(procedure, recruiter, self._pages, keys)
+        self._pages = VisitPages(self._plan)
+        self._arrivals = Arrivals(procedure, self._pages, Keys(options.secret, self._plan.name))
         self._host = (
-            None if serving.host is None else HostOfVisits(serving.host, self._store, procedure.visits)
+            None if options.host is None else HostOfVisits(options.host, self._store, procedure.folders)
         )
         self._locks: dict[str, asyncio.Lock] = {}
 
@@ -102,6 +96,7 @@ class StudyServer:
                 Route("/play/{token}/withdrawal", self._ask_to_leave),
                 Route("/play/{token}/withdrawal", self._leave, methods=["POST"]),
                 Route("/play/{token}/film", self._film),
+                Route("/play/{token}/floor-plan.png", self._floor_plan),
                 Route("/play/{token}/ping", self._ping),
                 WebSocketRoute("/play/{token}", self._play),
                 scene_route(scenes_folder()),
@@ -114,28 +109,29 @@ class StudyServer:
                 Middleware(
                     Guards,
                     public=public,
-                    proxies=self._serving.proxies,
+                    proxies=self._options.proxies,
                     max_body=MAX_FORM,
-                    embedded_by=self._recruiter.embedded_by,
+                    embedded_by=self._plan.recruiter.embedded_by,
                 ),
             ],
             exception_handlers={
                 404: self._unknown,
                 _ElsewhereError: self._elsewhere,
                 StoreError: self._out_of_order,
+                RecordError: self._out_of_order,
+                OSError: self._out_of_order,
+                Exception: self._failed,
             },
             lifespan=self._lifespan,
         )
 
     @asynccontextmanager
     async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        absent = end_absent(self._procedure, self._lock)
-        tasks = [asyncio.create_task(task) for task in (self.sessions.watch(), absent)]
-        if days := self._study.settings.limits.keep_days:
-            visits = self._procedure.visits.folder
-            tasks.append(asyncio.create_task(forget_daily(self._store, visits, days)))
+        await self._procedure.recover()
+        works: list[Coroutine[Any, Any, None]] = [self.sessions.watch(), end_absent(self._procedure)]
         if self._host is not None:
-            tasks.append(asyncio.create_task(self._host.keep(self.sessions)))
+            works.append(self._host.keep(self.sessions))
+        tasks = [asyncio.create_task(work) for work in (*works, *(one() for one in self._options.background))]
         try:
             yield
         finally:
@@ -183,7 +179,7 @@ class StudyServer:
         if person is None or not person.active:
             return self._pages.message(request, "unknown", 404)
         path = f"/play/{request.path_params['token']}"
-        return self._pages.show(request, "withdrawal", section=self._study.texts["withdrawal"], path=path)
+        return self._pages.show(request, "withdrawal", section=self._plan.texts["withdrawal"], path=path)
 
     async def _leave(self, request: Request) -> Response:
         person = await self._person(request)
@@ -191,15 +187,22 @@ class StudyServer:
             return self._pages.message(request, "unknown", 404)
         form = await sent_form(request)
         async with self._lock(person):
-            await self.sessions.release(lambda session: session.visit.name == person.token_hash)
+            await self.sessions.release(lambda session: session.player.key == person.token_hash)
             self.sessions.limit.release(person.token_hash)  # also where its page had just been let in
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
     async def _film(self, request: Request) -> Response:
-        if await self._person(request) is None or self._serving.film is None:
+        if await self._person(request) is None or self._plan.film is None:
             return PlainTextResponse("not found\n", 404)
-        return FileResponse(self._serving.film, headers=FILM_HEADERS, media_type="video/mp4")
+        return FileResponse(self._plan.film, headers=FILM_HEADERS, media_type="video/mp4")
+
+    async def _floor_plan(self, request: Request) -> Response:
+        person = await self._person(request)
+        folder = None if person is None else self._procedure.folders.find(person.token_hash)
+        if person is None or folder is None or person.phase != RESULT or not folder.floor_plan.is_file():
+            return PlainTextResponse("not found\n", 404)
+        return FileResponse(folder.floor_plan, media_type="image/png")
 
     async def _ping(self, request: Request) -> Response:  # noqa: ARG002 - only the time counts
         return Response(status_code=204)
@@ -207,14 +210,13 @@ class StudyServer:
     async def _play(self, socket: WebSocket) -> None:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
-        visit = None if person is None else self._procedure.visits.find(token)
         if person is not None and self._host is not None and not await self._host.has(person):
             await socket.send_denial_response(Response(status_code=404))  # the proxy asks the next host
             return
-        if person is None or visit is None:
+        if person is None:
             await socket.close(1008)
             return
-        await self._trials.play(socket, person, visit)
+        await self._trials.play(socket, person)
 
     async def _show_phase(self, request: Request, person: Person, refused: Again | None = None) -> Response:
         async with self._lock(person):
@@ -226,8 +228,8 @@ class StudyServer:
         return self._pages.phase(request, now, identity, refused)
 
     async def _played(self, request: Request, now: Now) -> Response:
-        token, person = request.path_params["token"], now.person
-        begun = self._procedure.visits.find(token)  # a small file, read once: a thread would take longer
+        person = now.person
+        begun = self._procedure.folders.find(person.token_hash)  # a small file: a thread would take longer
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))
@@ -238,12 +240,15 @@ class StudyServer:
                 )  # who waits is there; to be assigned a place says so as well
             return self._pages.queue(request, now, queued)
         if isinstance(here, Assignment):
-            here = await self._procedure.begin_playing(person, here, token)
-        return self._trials.page(request, here)
+            here = await self._procedure.begin_playing(person, here)
+        return self._trials.page(request, now, here)
 
     async def _out_of_order(self, request: Request, error: Exception) -> Response:
         LOG.error("%s", error)
         return self._pages.message(request, "paused", 503)
+
+    async def _failed(self, request: Request, _: Exception) -> Response:
+        return self._pages.message(request, "paused", 500)
 
     async def _unknown(self, request: Request, _: Exception) -> Response:
         return self._pages.message(request, "unknown", 404)

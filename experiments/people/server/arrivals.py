@@ -8,14 +8,13 @@ import time
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
-from experiments.people.recruitment.base import Arrival, Preview, Recruiter, Refusal
-from experiments.people.server.keys import Keys
-from experiments.people.server.pages import StudyPages
+from experiments.people.recruiter import Arrival, Preview, Refusal
+from experiments.people.server.pages import VisitPages
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Person
+from experiments.people.tokens import Keys, new_token, token_hash
 from experiments.web.server.form import sent_form
 from experiments.web.server.guards import Rate
-from experiments.web.server.visits import new_token, token_hash
 
 LOG = logging.getLogger("mjsim.study")
 NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
@@ -31,14 +30,14 @@ class Arrivals:
 
     Args:
         procedure: Of the study.
-        recruiter: From where people come.
         pages: What they see.
         keys: Of the study.
     """
 
-    def __init__(self, procedure: Procedure, recruiter: Recruiter, pages: StudyPages, keys: Keys) -> None:
-        self._procedure, self._recruiter, self._pages, self._keys = procedure, recruiter, pages, keys
-        self._study, self._store = procedure.study, procedure.store
+    def __init__(self, procedure: Procedure, pages: VisitPages, keys: Keys) -> None:
+        self._procedure, self._pages, self._keys = procedure, pages, keys
+        self._plan, self._store = procedure.plan, procedure.store
+        self._recruiter = self._plan.recruiter
         self._new = Rate(*NEW_PEOPLE)
         self._counting = asyncio.Lock()
         self._room, self._counted = 0, 0.0  # free places, and until when that count is good
@@ -56,7 +55,7 @@ class Arrivals:
         return self._pages.show(
             request,
             "welcome",
-            section=self._study.texts["welcome"],
+            section=self._plan.texts["welcome"],
             parameters={name: request.query_params.get(name, "") for name in self._recruiter.parameters},
             remembers=self._recruiter.platform == "link",
             forgets=self._recruiter.platform == "lab",
@@ -93,7 +92,7 @@ class Arrivals:
         ):
             return await self._arrive(came)
         LOG.warning("person %d comes with other ids than before, from another browser", person.id)
-        section = self._study.texts["returning"]
+        section = self._plan.texts["returning"]
         ids = {name: came.identity.get(name, "") for name in self._recruiter.parameters}
         return self._pages.show(request, "returning", 403, section=section, parameters=ids)
 
@@ -101,7 +100,7 @@ class Arrivals:
         token, key = new_token(), None
         if came.key is not None:
             token, key = self._keys.token(came.key), self._keys.person(came.key)
-        first = self._procedure.phases[0].name
+        first = self._procedure.names[0]
         person = await self._store.arrive(
             self._recruiter.platform, key, came.identity, token_hash(token), first
         )

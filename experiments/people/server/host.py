@@ -5,11 +5,11 @@ import logging
 import time
 
 from experiments.errors import StoreError
+from experiments.people.folders import VisitFolders
+from experiments.people.plan import PLAYED
 from experiments.people.store import Person, Store
 from experiments.people.store.hosts import LEASE
-from experiments.people.study_file import PLAYED
 from experiments.web.server.sessions import Sessions
-from experiments.web.server.visits import Visits
 
 LOG = logging.getLogger("mjsim.study")
 PERIOD = 10.0  # s between two words to the database
@@ -21,11 +21,11 @@ class HostOfVisits:
     Args:
         name: Of the host, another one than those of the others.
         store: Knows all hosts.
-        visits: Have the journals of this host.
+        folders: Hold the journals of this host.
     """
 
-    def __init__(self, name: str, store: Store, visits: Visits) -> None:
-        self._name, self._store, self._visits = name, store, visits
+    def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
+        self._name, self._store, self._folders = name, store, folders
         self._until = 0.0  # of the monotonic clock
         self._new = False
 
@@ -50,7 +50,7 @@ class HostOfVisits:
             return False
         if person.host == self._name:
             return True
-        journal = await asyncio.to_thread(self._visits.find_again, person.token_hash) is not None
+        journal = await asyncio.to_thread(self._folders.find, person.token_hash) is not None
         return await self._store.claim(person.id, self._name, new=self._new, journal=journal)
 
     async def leave(self) -> None:

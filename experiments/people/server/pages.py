@@ -8,49 +8,43 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from experiments.people.phases.base import Again
-from experiments.people.recruitment.base import Leaving, Recruiter
+from experiments.people.plan import CONSENT, PLAYED, VisitPlan
+from experiments.people.recruiter import Leaving
 from experiments.people.server.procedure import Now
 from experiments.people.server.trials import Queued
 from experiments.people.store import Person
-from experiments.people.study_file import CONSENT, PLAYED, Study
 from experiments.web.server.pages import page
 
 
-class StudyPages:
-    """Pages of a study in its words.
+class VisitPages:
+    """Pages of a plan, in its texts."""
 
-    Args:
-        study: The study.
-        recruiter: To which people return.
-        steps: How many phases there are.
-    """
-
-    def __init__(self, study: Study, recruiter: Recruiter, steps: int) -> None:
-        self._study, self._recruiter, self._steps = study, recruiter, steps
+    def __init__(self, plan: VisitPlan) -> None:
+        self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
 
     def show(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
         """A page from a template, with the texts that all pages have."""
         section: Any = values.get("section")
         if "paragraphs" not in values:
             values["paragraphs"] = section.paragraphs()
-        common, lang = self._study.texts["common"], self._study.settings.language
+        common, lang = self._plan.texts["common"], self._plan.language
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
         """A message, by the name of its text."""
-        words = self._study.texts["welcome"]
+        words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
         """The page of somebody who may not begin, by the name of its text."""
-        words, platform = self._study.texts["welcome"], self._recruiter.platform
+        words, platform = self._plan.texts["welcome"], self._recruiter.platform
         return self.show(
             request,
             "closed",
             section={"title": words[f"{name}_title"]},
             paragraphs=[words[name]],
-            completion=self._study.texts["completion"],
+            completion=self._plan.texts["completion"],
             back=self._recruiter.way_back("withdrawn", {}),
             remembers=platform == "link",
         )
@@ -71,14 +65,14 @@ class StudyPages:
         shown = now.phase.page(now.visitor, refused)
         if now.number < self._steps:
             return self.show(request, shown.template, **{**self._around(now), **shown.values})
-        section = self._study.texts["completion"]
-        values = {**shown.values, "paragraphs": section.paragraphs(), "completion": section}
+        paragraphs = self._plan.texts[now.phase.name].paragraphs()
+        values = {**shown.values, "paragraphs": paragraphs, "completion": self._plan.texts["completion"]}
         back = self._recruiter.way_back("finished", identity)
         return self.show(request, shown.template, **values, back=back, finished=True)
 
     def queue(self, request: Request, now: Now, queued: Queued) -> Response:
         """The page of somebody who waits for a place; it asks again by itself."""
-        section = self._study.texts["queue"]
+        section = self._plan.texts["queue"]
         values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
         texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
         filled = [re.sub(r"\{(place|wait)\}", lambda found: values[found[1]], text) for text in texts]
@@ -87,18 +81,18 @@ class StudyPages:
 
     def _around(self, now: Now) -> dict[str, Any]:
         """What the pages of all phases have."""
-        common, name = self._study.texts["common"], now.phase.name if now.phase else ""
+        common, name = self._plan.texts["common"], now.phase.name if now.phase else ""
         step = common["step"].replace("{step}", str(now.number))
-        section = self._study.texts.get(name)
+        section = self._plan.texts.get(name)
         return {
             "step": step.replace("{steps}", str(self._steps)),
             "path": now.visitor.path,
             "phase": name,
             "wait": now.wait,
-            "optional": name in self._study.settings.optional,
+            "optional": name in self._plan.optional,
             "leave": name != CONSENT,
             "paragraphs": section.paragraphs() if section else [],
-            "story_title": self._study.texts["story"]["title"],
+            "story_title": self._plan.texts["story"]["title"],
         }
 
     def left(self, request: Request, person: Person) -> Response:
@@ -115,12 +109,12 @@ class StudyPages:
 
     def _last(self, request: Request, section: str, text: str, how: Leaving) -> Response:
         """A last page, by the section and the name of its text."""
-        words = self._study.texts[section]
+        words = self._plan.texts[section]
         return self.show(
             request,
             "completion",
             section={"title": words[f"{text}_title"]},
             paragraphs=[words[text]],
-            completion=self._study.texts["completion"],
+            completion=self._plan.texts["completion"],
             back=self._recruiter.way_back(how, {}),
         )

@@ -1,36 +1,38 @@
-"""How a person gets through a study: the phase under way, what is sent in it, and what follows."""
+"""The way of participants through the phases of a visit."""
 
 import asyncio
+import dataclasses
 import datetime
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
 import numpy as np
 
+from experiments.people.folders import Ended, VisitFolder, VisitFolders
+from experiments.people.phases import phases_of
 from experiments.people.phases.base import Again, Answers, Done, FormData, Phase, Visitor
 from experiments.people.phases.played import Played
-from experiments.people.store import Assignment, CellQuota, Person, Status, Store
+from experiments.people.plan import PLAYED, RESULT, VisitPlan
+from experiments.people.recruiter import AFTER
+from experiments.people.store import Assignment, Person, Status, Store
 from experiments.people.store.values import utc_now
-from experiments.people.study_file import PLAYED, Study
-from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
-from experiments.trials.training import training_config
-from experiments.web.server.visits import Ended, Visit, Visits
+from experiments.record.phases import FLYTHROUGH, STORY, TASK
+from experiments.web.server.player import LiveTrial
 
-TRAINING_LIMIT = 24 * 3600.0  # s; as good as none
-FULL = "full"  # why a phase ended for somebody who got no place
+FULL = "full"  # reason of a phase that ended because no place was left
 ATTEMPTS = "attempts"  # answer in which the attempts at a phase are counted
 
 
 @dataclass(frozen=True)
 class Now:
-    """Where a person is.
+    """Where a participant is.
 
     Attributes:
-        phase: Under way; None for somebody who has ended.
-        number: Of the phase, from 1.
-        wait: Seconds before it may be ended.
+        phase: Phase under way; None if the participation has ended.
+        number: Number of the phase, from 1.
+        wait: Seconds before the phase may be ended.
     """
 
     person: Person
@@ -41,48 +43,52 @@ class Now:
 
 
 class Procedure:
-    """The phases of a study, its store, and the visits of its people.
+    """The phases of a plan, with the store and the folders that record how participants go through them.
 
     Args:
-        study: The study.
-        phases: Its phases.
-        store: Keeps what is known of people.
-        visits: Keep what is played.
-        rng: Draws cells.
+        plan: Plan of the visits.
+        store: Records participants, their phases and answers.
+        folders: Hold what is played.
+        rng: Source of assignments.
     """
 
     def __init__(
-        self, study: Study, phases: Sequence[Phase], store: Store, visits: Visits, rng: np.random.Generator
+        self, plan: VisitPlan, store: Store, folders: VisitFolders, rng: np.random.Generator
     ) -> None:
-        self.study, self.phases, self.store, self.visits = study, phases, store, visits
+        self.plan, self.store, self.folders = plan, store, folders
+        self.phases = phases_of(plan)
+        self.names = [phase.name for phase in self.phases]
         self._rng = rng
-        self._names = [phase.name for phase in phases]
 
     async def now(self, person: Person, path: str) -> Now:
-        """Where a person is; trials that are over are noted first."""
-        person = await self.after_trials(person)
+        """Return where a participant is, and record when the phase was first shown."""
         if not person.active and person.status != "finished":
             return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
-        number = self._names.index(person.phase)
-        shown = await self.store.show_phase(person.id, person.phase)
-        passed = (utc_now() - shown.shown).total_seconds()
-        minimum = self.study.settings.minimum.get(person.phase, 0.0)
-        wait = max(0.0, minimum - passed) if passed >= 0.0 else 0.0  # the clock was set back
+        number = self.names.index(person.phase)
+        passed, wait = await self.times(person)
         rows = await self.store.answers(person.id)
         answers = {row.item: row.value for row in rows if row.phase == person.phase}
-        visitor = Visitor(answers, passed, answers.get(ATTEMPTS, 0), path)
+        visitor = Visitor(answers, passed, answers.get(ATTEMPTS, 0), path, self._metrics(person))
         return Now(person, self.phases[number], number + 1, visitor, wait)
 
+    async def times(self, person: Person) -> tuple[float, float]:
+        """Return the seconds since the participant's phase was first shown, and those until it may be ended."""
+        shown = await self.store.show_phase(person.id, person.phase)
+        passed = (utc_now() - shown.shown).total_seconds()
+        minimum = self.plan.minimum.get(person.phase, 0.0)
+        # A negative time has passed if the clock was set back.
+        return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
+
     async def submit(self, now: Now, phase: str, sent: FormData) -> Again | None:
-        """Take what was sent in a phase; what is wrong with it, or None. What comes from an earlier page is ignored."""
-        current, settings = now.phase, self.study.settings
+        """Handle a submitted form. Return an error message, or None if it was accepted or came from an earlier page."""
+        current = now.phase
         if current is None or phase != current.name or isinstance(current, Played):
             return None
-        if phase == self._names[-1]:
+        if phase == self.names[-1]:
             return None
-        skipped = bool(sent.get("skip")) and phase in settings.optional
+        skipped = bool(sent.get("skip")) and phase in self.plan.optional
         if now.wait > 0.0 and not skipped:
-            return Again(self.study.texts["common"]["too_early"])
+            return Again(self.plan.texts["common"]["too_early"])
         read = Done({"skipped": True}) if skipped else current.read(now.visitor, sent)
         attempts = {ATTEMPTS: now.visitor.attempts + 1}
         if isinstance(read, Again):
@@ -96,7 +102,7 @@ class Procedure:
         return None
 
     async def save(self, now: Now, phase: str, sent: FormData) -> None:
-        """Keep answers of a form that is not sent yet."""
+        """Store the answers of a form that has not been submitted yet."""
         current = now.phase
         if current is None or phase != current.name or not hasattr(current, "drafts"):
             return
@@ -104,70 +110,120 @@ class Procedure:
             await self.store.save_answers(now.person.id, phase, drafts)
 
     async def assign(self, person: Person) -> Assignment | None:
-        """The place of a person who has not begun to play; a sign of life as well. None if all cells are full."""
-        trials = (cell.trials for cell in self.study.cells)
-        quotas = [CellQuota(len(each), [trial.house_seed for trial in each]) for each in trials]
-        rule = self.study.settings.assignment
-        return await self.store.assign(person.id, quotas, rule, self._rng, abandoned_after=self._away)
+        """Return the place of a participant who has not begun to play. None if all cells are full."""
+        plan = self.plan
+        return await self.store.assign(
+            person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
+        )
 
-    async def begin_playing(self, person: Person, place: Assignment, token: str) -> Visit:
-        """Start the visit in which a person plays, with the first phase that is played."""
+    async def begin_playing(self, person: Person, place: Assignment) -> VisitFolder:
+        """Make the folder of a visit, with the settings of its trials."""
+        played = [name for name in self.names if name in PLAYED]
         ended = await self._before_playing(person)
-        played = [name for name in self._names if name in PLAYED]
-        return await asyncio.to_thread(self.visits.create, token, played, self._trials(place), ended)
+        trials = self.plan.trials(await self._after_earlier_visit(person, place))
+        return await asyncio.to_thread(self.folders.create, person.token_hash, played, trials, ended)
 
     async def withdraw(self, person: Person, *, delete: bool) -> None:
         await self.store.withdraw(person.id, delete=delete)
         if delete:
-            await asyncio.to_thread(self.visits.remove, person.token_hash)
+            await asyncio.to_thread(self.folders.remove, person.token_hash)
 
     async def room(self) -> int:
-        """How many places are free to whom nobody is on the way."""
-        wanted = [len(cell.trials) for cell in self.study.cells]
-        return await self.store.room(wanted, self._names[0], self._away)
+        """Return the number of free places that are not yet claimed by participants in earlier phases."""
+        wanted = [cell.wanted for cell in self.plan.cells]
+        return await self.store.room(wanted, self.names[0], self._away)
 
     async def turn_away(self, person: Person) -> Person:
-        """End the participation of somebody for whom there is no place."""
+        """End the participation of a participant for whom there is no place."""
         here = person.phase
         await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
         return await self.store.person(person.id)
 
-    @property
-    def _away(self) -> datetime.timedelta:
-        return datetime.timedelta(seconds=self.study.settings.limits.abandoned_after)
-
-    def _trials(self, place: Assignment) -> Mapping[str, dict[str, Any]]:
-        task = msgspec.structs.replace(
-            self.study.cells[place.cell].trial(place.place),
-            house_seed=place.house_seed,
-            person_seed=place.person_seed,
-            order_seed=place.order_seed,
-        )
-        training = msgspec.structs.replace(training_config(task), time_limit=TRAINING_LIMIT)
-        return {TRAINING: training.settings(), TASK: task.settings()}
-
-    async def _before_playing(self, person: Person) -> list[Ended]:
-        """The phases that the record of the task tells of."""
-        wanted = [name for name in (STORY, FLYTHROUGH) if name in self._names]
-        found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
-        told = [found[name] for name in wanted if name in found]
-        return [Ended(phase.name, phase.duration_s or 0.0) for phase in told]
-
-    async def after_trials(self, person: Person) -> Person:
-        """The person, after all trials that are over were noted; their runs are on the disk."""
+    async def record_trials(self, person: Person) -> Person:
+        """Record the participant's trials whose runs have been written, and return the participant afterwards."""
         while person.active and person.phase in PLAYED:
-            visit = self.visits.named(person.token_hash)
-            if visit is None or visit.phase == person.phase:
+            folder = self.folders.find(person.token_hash)
+            if folder is None or not folder.is_over(person.phase):
                 break
-            metrics = await asyncio.to_thread(visit.metrics, person.phase)
-            folder = visit.run(person.phase).relative_to(self.visits.folder.parent)
-            await self.store.finish_trial(person.id, person.phase, folder.as_posix(), metrics["ended"])
-            await self._move_on(person, person.phase, {}, metrics["ended"])
+            ended = (await asyncio.to_thread(folder.metrics, person.phase))["ended"]
+            run = folder.run(person.phase).relative_to(self.folders.path.parent)
+            await self.store.finish_trial(person.id, person.phase, run.as_posix(), ended)
+            await self._move_on(person, person.phase, {}, ended)
             person = await self.store.person(person.id)
         return person
 
+    async def recover(self) -> None:
+        """Record the trials that ended while no server ran."""
+        for person in await self.store.people():
+            await self.record_trials(person)
+
+    async def adopt(self) -> None:
+        """Add participants for folders of visits that were made before `mjsim play` had a database."""
+        for folder in await asyncio.to_thread(self.folders.all):
+            if await self.store.find(folder.path.name) is None:
+                here = folder.stored.phase
+                if here != FLYTHROUGH or here not in self.names:
+                    here = next(name for name in self.names if name in folder.stored.trials)
+                await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
+
+    @property
+    def _away(self) -> datetime.timedelta:
+        return datetime.timedelta(seconds=self.plan.limits.abandoned_after)
+
+    def _metrics(self, person: Person) -> Mapping[str, Any] | None:
+        """Metrics of the task, for the page of the result."""
+        folder = self.folders.find(person.token_hash) if person.phase == RESULT else None
+        return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
+
+    async def _after_earlier_visit(self, person: Person, place: Assignment) -> Assignment:
+        """Give the next house seed to a participant who has seen the best way through the episode of this one."""
+        earlier = (await self.store.identity(person.id)).get(AFTER)
+        folder = self.folders.find(earlier) if earlier else None
+        if folder is None or not folder.is_over(TASK):
+            return place
+        return dataclasses.replace(place, house_seed=folder.settings(TASK)["house_seed"] + 1)
+
+    async def _before_playing(self, person: Person) -> list[Ended]:
+        """The phases that the record of the task mentions."""
+        wanted = [name for name in (STORY, FLYTHROUGH) if name in self.names]
+        found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
+        shown = [found[name] for name in wanted if name in found]
+        return [Ended(phase.name, phase.duration_s or 0.0) for phase in shown]
+
     async def _move_on(self, person: Person, phase: str, answers: Answers, reason: str | None = None) -> None:
-        """End a phase; who reaches the last one has finished the study."""
-        following = self._names[self._names.index(phase) + 1]
-        status: Status | None = "finished" if following == self._names[-1] else None
+        """End a phase. A participant who reaches the last one has finished."""
+        names = self.names
+        following = names[names.index(phase) + 1]
+        status: Status | None = "finished" if following == names[-1] else None
         await self.store.finish_phase(person.id, phase, following, answers, reason, status=status)
+
+
+class BrowserPlayer:
+    """A participant of a procedure who plays in a browser."""
+
+    def __init__(self, procedure: Procedure, person: Person) -> None:
+        self.key = person.token_hash
+        self._procedure, self._id = procedure, person.id
+
+    async def trial(self) -> LiveTrial | None:
+        procedure = self._procedure
+        person = await procedure.record_trials(await procedure.store.person(self._id))
+        folder = procedure.folders.find(person.token_hash)
+        if folder is None or not person.active or person.phase not in PLAYED:
+            return None
+        _, wait = await procedure.times(person)
+        phase = person.phase
+        return LiveTrial(
+            phase,
+            folder.journal(phase),
+            folder.run(phase),
+            folder.settings(phase),
+            await asyncio.to_thread(folder.before, phase),
+            time.monotonic() + wait,
+            floor_plan=procedure.plan.floor_plan and phase == TASK,
+            language=procedure.plan.language,
+            texts=procedure.plan.texts["hud"].words,
+        )
+
+    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002 - the folder tells which are over
+        await self._procedure.record_trials(await self._procedure.store.person(self._id))

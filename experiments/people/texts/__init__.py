@@ -37,6 +37,11 @@ class _Items(msgspec.Struct):
 Texts = Mapping[str, Section]
 
 
+def words_of(texts: Texts) -> Mapping[str, Mapping[str, str]]:
+    """Return texts by section and name, without items of forms."""
+    return {name: section.words for name, section in texts.items()}
+
+
 def languages() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 

@@ -54,10 +54,10 @@ class BrowserSocket:
         """Close the connection once all is sent."""
         self._waiting.put_nowait((code, reason))
 
-    async def serve(self, session: PlayedSession, trial: str) -> None:
-        """Serve until the browser is gone; `trial` is the phase of the visit that is under way."""
+    async def serve(self, session: PlayedSession) -> None:
+        """Serve until the browser is gone."""
         sending = asyncio.create_task(self._send_all())
-        receiving = asyncio.create_task(self._receive_all(session, trial))
+        receiving = asyncio.create_task(self._receive_all(session))
         beating = asyncio.create_task(self._beat(session))
         try:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
@@ -103,12 +103,13 @@ class BrowserSocket:
             if session.browser is self and self._waiting.empty():
                 self.send(Beat())
 
-    async def _receive_all(self, session: PlayedSession, trial: str) -> None:
+    async def _receive_all(self, session: PlayedSession) -> None:
         try:
             hello = await asyncio.wait_for(self._hello(), HELLO_TIMEOUT)
         except TimeoutError:
             self._end(Error("idle", "no hello was received"))
-        if hello.trial != trial:
+        under_way = session.trial or await session.player.trial()
+        if under_way is None or under_way.phase != hello.trial:
             self.send(State(OVER))
             self.send(Saved())
             return

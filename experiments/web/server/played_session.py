@@ -1,16 +1,17 @@
-"""A session under way: joins a visit, its worker, and the browser that is connected."""
+"""A session under way: joins a participant, the worker, and the browser that is connected."""
 
 import asyncio
 import logging
+import math
 import time
 from collections import deque
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import MutableMapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
 import msgspec
 
-from experiments.record.phases import TASK
+from experiments.errors import StoreError
 from experiments.web import protocol
 from experiments.web.controls import Input
 from experiments.web.protocol import (
@@ -34,14 +35,13 @@ from experiments.web.protocol import (
 )
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.meter import Meter
+from experiments.web.server.player import LiveTrial, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
 from experiments.web.server.spectators import Spectators
-from experiments.web.server.visits import PLAYED, Visit
 from experiments.web.state import FAILED, LOADING, READY, RUNNING, Trigger
 
 LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
-QUEUE_TIMEOUT = 10.0  # s that a place in the queue is kept without a connection
 MAX_AHEAD = 1000  # inputs that may wait to be taken
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
@@ -59,10 +59,11 @@ class Browser(Protocol):
 
 
 class PlayedSession:
-    """The training or the task of a visit.
+    """All trials that a participant plays, one after the other.
 
     Attributes:
-        visit: The visit.
+        player: The participant.
+        trial: The trial under way, or None.
         browser: The one that is connected, or None.
         heard: When the person last did something, as `time.monotonic` has it.
         state: Copy of the worker's state.
@@ -72,21 +73,17 @@ class PlayedSession:
 
     def __init__(
         self,
-        visit: Visit,
+        player: Player,
         pool: WorkerPool,
         limit: SessionLimit,
-        minimum: Mapping[str, float],
         scenes: MutableMapping[str, str],
         meter: Meter | None = None,
         *,
         as_inputs_come: bool = False,
-        floor_plan: bool = True,
-        language: str = "en",
-        texts: Mapping[str, str] | None = None,
     ) -> None:
-        self.visit, self._minimum, self._scenes = visit, minimum, scenes
-        self._as_inputs_come, self._floor_plan = as_inputs_come, floor_plan
-        self._language, self._texts = language, dict(texts or {})
+        self.player, self._scenes = player, scenes
+        self.trial: LiveTrial | None = None
+        self._as_inputs_come = as_inputs_come
         self._meter = meter or Meter()
         self.browser: Browser | None = None
         self.heard = time.monotonic()
@@ -120,8 +117,6 @@ class PlayedSession:
         self.take(view)
         if self._task is None:
             self._task = asyncio.create_task(self._run())
-        elif (position := self._limit.position(self.visit.name)) is not None:
-            browser.send(protocol.Queue(position))
         else:
             browser.send(self.state)
 
@@ -132,8 +127,6 @@ class PlayedSession:
         self.browser = None
         self.heard = time.monotonic()
         self._pause("disconnected")
-        if self._limit.position(self.visit.name) is not None:
-            asyncio.get_running_loop().call_later(QUEUE_TIMEOUT, self._leave_queue)
 
     def take(self, message: Any) -> Error | None:
         """Take a message from the browser; why it was refused, or None."""
@@ -158,7 +151,7 @@ class PlayedSession:
                 self.display = message
             case Run() | Leave() if self.state.phase is LOADING:
                 return Error("too early", "the session is not ready")
-            case Leave() if wait := self.visit.wait(self._minimum):
+            case Leave() if (wait := self._leave_at - time.monotonic()) > 0.0:
                 return Error("too early", f"this phase can be ended in {wait:.0f} s")
             case Run():
                 self._lost, self.state = False, self.state.after(Trigger.RUN)
@@ -201,15 +194,6 @@ class PlayedSession:
         self.state = self.state.after(Trigger.PAUSE, reason)
         self._send(Pause(reason))
 
-    def _leave_queue(self) -> None:
-        waits = self._limit.position(self.visit.name) is not None
-        if self.browser is None and waits and self._task is not None:
-            self._task.cancel()
-            self._task = None
-
-    def _tell_position(self, position: int) -> None:
-        self._tell(protocol.Queue(position))
-
     def _send(self, message: protocol.WireMessage) -> None:
         if self._worker is not None:
             self._worker.send(message)
@@ -223,41 +207,50 @@ class PlayedSession:
         self.state = state
         self._tell(state)
 
+    @property
+    def _leave_at(self) -> float:
+        return math.inf if self.trial is None else self.trial.leave_at
+
     async def _run(self) -> None:
-        """Play what is left of the visit."""
-        name, duration = self.visit.name, None
-        await self._limit.acquire(name, self._tell_position)
-        self.heard = began = time.monotonic()  # who waits in the queue need do nothing
+        """Play the trials that are left."""
+        key, duration = self.player.key, None
+        if not self._limit.hold(key):
+            self._tell(protocol.Queue())
+            self._task = None
+            return
+        self.heard = began = time.monotonic()
         try:
-            while self.visit.phase in PLAYED:
-                await self._play(self.visit.phase)
+            while (trial := await self.player.trial()) is not None:
+                self.trial = trial
+                await self._play(trial)
             duration = time.monotonic() - began
-        except OSError as error:
-            LOG.error("session %s: %s", self.visit.name[:12], error)
+        except (OSError, StoreError) as error:
+            LOG.error("session %s: %s", key[:12], error)
             self._set(State(FAILED, FAILURE))
         except Exception:
-            LOG.exception("session %s", self.visit.name[:12])
+            LOG.exception("session %s", key[:12])
             self._set(State(FAILED, FAILURE))
         finally:
-            self._limit.release(name, duration)
+            self.trial = None
+            self._limit.release(key, duration)
             self._discard_worker()
             if self._task is asyncio.current_task():
                 self._task = None
 
-    async def _play(self, trial: str) -> None:
+    async def _play(self, trial: LiveTrial) -> None:
         """Play a trial to its end, with another worker whenever one dies."""
-        visit, crashes, safe = self.visit, 0, 0
+        crashes, safe = 0, 0
         self._taken = self._step = 0
         self._came.clear()
         opening = Open(
-            str(visit.journal(trial)),
-            str(visit.run(trial)),
-            visit.settings(trial),
-            visit.before(trial),
+            str(trial.journal),
+            str(trial.run),
+            dict(trial.config),
+            [dict(fields) for fields in trial.before],
             as_inputs_come=self._as_inputs_come,
-            floor_plan=self._floor_plan and trial == TASK,
-            language=self._language,
-            texts=self._texts,
+            floor_plan=trial.floor_plan,
+            language=trial.language,
+            texts=dict(trial.texts),
         )
         while crashes < MAX_CRASHES:
             self._set(State())
@@ -283,11 +276,13 @@ class PlayedSession:
                     case Snapshot(step):
                         self._step = max(self._step, step)
                     case Saved():
-                        await asyncio.to_thread(self._finish, trial)
+                        await self.player.over(trial)
+                        self.trial = None
+                        LOG.info("session %s: %s is over", self.player.key[:12], trial.phase)
                         self._tell(message)
                         return
                 self._tell(message)
-            LOG.warning("session %s: its worker died", visit.name[:12])
+            LOG.warning("session %s: its worker died", self.player.key[:12])
             self._meter.worker_lost()
             self._came.clear()
             self._lost = True
@@ -300,12 +295,6 @@ class PlayedSession:
         """Note how long it took until inputs were safe."""
         while self._came and self._came[0][0] <= safe:
             self._meter.acknowledged(time.monotonic() - self._came.popleft()[1])
-
-    def _finish(self, trial: str) -> None:
-        visit = self.visit
-        metrics = visit.metrics(trial)
-        visit.finish(trial, metrics.get("completion_time_s", 0.0), metrics["ended"])
-        LOG.info("session %s: %s is over (%s)", visit.name[:12], trial, metrics["ended"])
 
     def _discard_worker(self) -> None:
         if self._worker is not None:

@@ -10,8 +10,8 @@ from experiments.web.server.capacity import Capacity
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.meter import Meter
 from experiments.web.server.played_session import PlayedSession
+from experiments.web.server.player import Player
 from experiments.web.server.pool import WorkerPool
-from experiments.web.server.visits import Visit
 
 WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone
 MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
@@ -20,8 +20,7 @@ MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
 class Sessions:
     """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back.
 
-    With a `capacity`, the limit follows what the machine holds. `floor_plans` adds one to the run of each task.
-    `language` is that of the HUD, whose words `texts` replaces.
+    With a `capacity`, the limit follows what the machine holds.
     """
 
     def __init__(
@@ -29,40 +28,33 @@ class Sessions:
         pool: WorkerPool,
         limit: SessionLimit,
         idle: float,
-        minimum: Mapping[str, float],
         meter: Meter | None = None,
         capacity: Capacity | None = None,
-        *,
-        floor_plans: bool = True,
-        language: str = "en",
-        texts: Mapping[str, str] | None = None,
     ) -> None:
-        self._pool, self._limit, self._idle, self._minimum = pool, limit, idle, minimum
-        self._meter, self._capacity, self._floor_plans = meter, capacity, floor_plans
-        self._language, self._texts = language, texts
+        self._pool, self._limit, self._idle = pool, limit, idle
+        self._meter, self._capacity = meter, capacity
         self._sessions: dict[str, PlayedSession] = {}
         self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
 
-    def of(self, visit: Visit, *, as_inputs_come: bool = False) -> PlayedSession:
-        """The session of a visit; `as_inputs_come` lets its clock run as fast as inputs come, not in real time."""
-        if visit.name not in self._sessions:
-            self._sessions[visit.name] = PlayedSession(
-                visit,
+    def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:
+        """Return the session of a participant.
+
+        With `as_inputs_come`, its clock runs as fast as inputs come, not in real time.
+        """
+        if player.key not in self._sessions:
+            self._sessions[player.key] = PlayedSession(
+                player,
                 self._pool,
                 self._limit,
-                self._minimum,
                 self._scenes,
                 self._meter,
                 as_inputs_come=as_inputs_come,
-                floor_plan=self._floor_plans,
-                language=self._language,
-                texts=self._texts,
             )
-        return self._sessions[visit.name]
+        return self._sessions[player.key]
 
     @property
     def under_way(self) -> Mapping[str, PlayedSession]:
-        """Sessions by the names of their visits."""
+        """Sessions by the keys of their participants."""
         return self._sessions
 
     @property
@@ -89,7 +81,7 @@ class Sessions:
                 session.browser.send(protocol.Error("idle", "nothing was received for a long time"))
                 session.browser.close(protocol.IDLE, "idle")
             await session.release()
-            self._sessions.pop(session.visit.name, None)
+            self._sessions.pop(session.player.key, None)
 
     def _is_idle(self, session: PlayedSession) -> bool:
         """Whether the person has been gone for long; for less long where others wait and the page is closed."""

@@ -17,7 +17,7 @@ from experiments.record.export import save_record
 from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries, sync_folder
 from experiments.record.reader import read_journal, read_run, same_record
 from experiments.record.records import TOPDOWN, EventLog
-from experiments.record.run_directory import is_run, run_directory
+from experiments.record.run_directory import JOURNALS, is_run, run_directory
 from experiments.record.verify import checksum_mismatches
 from experiments.replay.log_source import LogSource
 from experiments.session.endings import INTERRUPTED
@@ -33,7 +33,6 @@ from experiments.trials.setup import (
 from experiments.trials.trial import draw_floor_plan
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.controls import Controls, Input, control_step
-from experiments.web.server.visits import JOURNALS
 from hud.texts import HudTexts
 from mjsim.house.scene.scene import compose
 from mjsim.values.actions import Action

@@ -8,9 +8,10 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from experiments.people.plan import PHASES
 from experiments.people.rehearsal.plan import plan_people
 from experiments.people.store import CellQuota, Store
-from experiments.people.study_file import PHASES, TASK, TRAINING
+from experiments.people.study_file import TASK, TRAINING
 
 PEOPLE, CELLS = 447, [CellQuota(38, range(38))] * 12
 SEEDS = int(os.environ.get("MJSIM_BALANCE_SEEDS", "2"))

@@ -19,10 +19,10 @@ from experiments.people.readiness.dry_run import dry_run
 from experiments.people.recruitment import recruiter
 from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
+from experiments.people.tokens import token_hash
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.server.pool import WorkerPool
-from experiments.web.server.visits import token_hash
 
 VALIDATOR = "MJSIM_PSYCHDS_VALIDATOR"  # command of the validator, such as `deno run -A .../src/index.ts`
 SECRETS = (

@@ -18,8 +18,8 @@ from experiments.errors import StoreError
 from experiments.people.collect import collect, write_collected
 from experiments.people.server.arrivals import NEW_PEOPLE
 from experiments.people.store import Store
+from experiments.people.tokens import token_hash
 from experiments.web.server.static_files import static_url
-from experiments.web.server.visits import token_hash
 
 PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
 EVERYBODY = {"nobody", "participant", "other participant", *ROLES}
@@ -36,6 +36,7 @@ PEOPLE = {
     ("GET", "/play/{token}/withdrawal"): PARTICIPANT,
     ("POST", "/play/{token}/withdrawal"): PARTICIPANT,
     ("GET", "/play/{token}/film"): PARTICIPANT,
+    ("GET", "/play/{token}/floor-plan.png"): PARTICIPANT,
     ("GET", "/play/{token}/ping"): EVERYBODY,  # it does nothing; the time that it takes is measured
     ("WS", "/play/{token}"): PARTICIPANT,
     SCENE: EVERYBODY,

@@ -7,9 +7,10 @@ import pytest
 from starlette.datastructures import ImmutableMultiDict
 
 from experiments.errors import ConfigError
-from experiments.people.phases import phases_of_study
+from experiments.people.phases import phases_of
 from experiments.people.phases.base import Again, Done, Visitor
 from experiments.people.study_file import read_people_study
+from experiments.people.study_plan import plan_of
 from experiments.study.designs import FOLDER
 
 NOBODY = Visitor({}, 0.0, 0, "/play/x")
@@ -19,7 +20,7 @@ GOOD |= {"keyboard": "yes", "webgl": "yes", "renderer": "a card"}
 
 @pytest.fixture(scope="module")
 def phases():
-    return {phase.name: phase for phase in phases_of_study(read_people_study(FOLDER / "paper.toml"))}
+    return {phase.name: phase for phase in phases_of(plan_of(read_people_study(FOLDER / "paper.toml")))}
 
 
 def sent(**values):
@@ -101,7 +102,7 @@ def test_own_phases_are_named_by_module_and_attribute():
     for name, says in [("nowhere:Phase", "No module"), ("builtins:str", "not all of name")]:
         other = dataclasses.replace(study, settings=_with_phases(study.settings, name))
         with pytest.raises(ConfigError, match=says):
-            phases_of_study(other)
+            phases_of(plan_of(other))
 
 
 def _with_phases(settings, name):
@@ -132,7 +133,7 @@ def checked_survey(folder, right=2, **limits):
     entries = "".join(f"{name} = {value}\n" for name, value in limits.items())
     (folder / "study.toml").write_text(f"{text}\n[study.limits]\n{entries}")
     study = read_people_study(folder / "study.toml")
-    return next(phase for phase in phases_of_study(study) if phase.name == "survey")
+    return next(phase for phase in phases_of(plan_of(study)) if phase.name == "survey")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from scripted_workers import ScriptedPool
 
 from experiments.cli.main import main
-from experiments.people.phases import phases_of_study
+from experiments.people.phases import phases_of
 from experiments.people.phases.base import Done, FormPhase
 from experiments.people.readiness import dry_run as runs
 from experiments.people.readiness.costs import Played, cost, detectable, durations
@@ -16,6 +16,7 @@ from experiments.people.readiness.pictures import browser
 from experiments.people.readiness.problems import located, problems_of_file, problems_of_length
 from experiments.people.recruitment import recruiter
 from experiments.people.study_file import read_people_study
+from experiments.people.study_plan import plan_of
 
 STUDY = """\
 [all_cells]
@@ -100,7 +101,7 @@ def test_cost_length_and_power(study):
         settings=msgspec.structs.replace(study.settings, phases=("consent", "story", "task", "completion")),
     )
     played = Played(60.0, {"none": 100.0, "optimal": 80.0})
-    seconds = durations(shorter, phases_of_study(shorter), {"consent": 238, "story": 10}, played)
+    seconds = durations(shorter, phases_of(plan_of(shorter)), {"consent": 238, "story": 10}, played)
     assert seconds == {"consent": 60.0, "story": 20.0, "task": 90.0, "completion": 0.0}
     assert detectable(study).keys() == {"assistance"}
     assert 0.5 < detectable(study)["assistance"] < 1.0
@@ -120,7 +121,7 @@ def _walked(study, folder, monkeypatch, phases=None):
         pictures.append(name)
 
     if phases:
-        monkeypatch.setattr(runs, "phases_of_study", lambda _: phases)
+        monkeypatch.setattr("experiments.people.server.procedure.phases_of", lambda _: phases)
     walked = asyncio.run(
         runs.dry_run(study, recruiter(study.settings.recruitment), folder, ScriptedPool(), photograph)
     )
@@ -141,11 +142,11 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
 
 async def _play_nothing(self, link, trial):
     """The trial is over; what is tested here is what is around it."""
-    visit = self._procedure.visits.find(link.rpartition("/")[2])
-    visit.run(trial).mkdir()
-    (visit.run(trial) / "metrics.json").write_text('{"ended": "time limit"}')
-    visit.finish(trial)
-    await self._client.get(link)
+    person = await self._person(link)
+    run = self._procedure.folders.find(person.token_hash).run(trial)
+    run.mkdir()
+    (run / "metrics.json").write_text('{"ended": "time limit"}')
+    await self._procedure.record_trials(person)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +172,9 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
 
 def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
     monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
-    phases = [_Sloppy(study, "survey") if p.name == "survey" else p for p in phases_of_study(study)]
+    phases = [
+        _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
+    ]
     walked, _ = _walked(study, tmp_path, monkeypatch, phases)
     assert "survey takes a form that it should refuse" in walked.faults
 

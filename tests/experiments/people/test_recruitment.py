@@ -9,8 +9,8 @@ import msgspec
 import pytest
 
 from experiments.errors import ConfigError
+from experiments.people.recruiter import Preview, Refusal
 from experiments.people.recruitment import recruiter
-from experiments.people.recruitment.base import Preview, Refusal
 from experiments.people.study_file import Recruitment, read_people_study
 from experiments.study.designs import FOLDER
 from tests.experiments.people.test_server import begin, go_to, phase, play_trial, post, serving

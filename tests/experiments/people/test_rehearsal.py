@@ -14,8 +14,8 @@ import pytest
 from check_rehearsal import check
 
 from experiments.cli.main import main
+from experiments.people.plan import PHASES
 from experiments.people.rehearsal.plan import plan_people
-from experiments.people.study_file import PHASES
 from experiments.record.origin import REHEARSED
 
 STUDY = """

@@ -18,8 +18,8 @@ from websockets.sync.client import connect
 from experiments.cli.main import main
 from experiments.errors import StoreError
 from experiments.people.researcher.access import ATTEMPTS, COOKIE, Access
+from experiments.people.tokens import token_hash
 from experiments.web.protocol import Snapshot
-from experiments.web.server.visits import token_hash
 
 PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scripted_workers import ORIGIN, ScriptedPool, connected, play_trial, started, until
 from starlette.testclient import TestClient
+from study_site import MadeInItsLoop
 
 from experiments.errors import StoreError
-from experiments.people.phases import phases_of_study
-from experiments.people.recruitment import recruiter
-from experiments.people.server.app import Serving, StudyServer
+from experiments.people.folders import VisitFolders
+from experiments.people.server.app import ServerOptions, VisitServer
 from experiments.people.server.procedure import Procedure
 from experiments.people.store import Store
 from experiments.people.study_file import read_people_study
+from experiments.people.study_plan import plan_of
 from experiments.study.designs import FOLDER
-from experiments.web.server.visits import Visits
 
 DEVICE = {"frames_per_s": "60", "latency_ms": "40", "width": "1280", "height": "720", "pixel_ratio": "1"}
 DEVICE |= {"keyboard": "yes", "webgl": "yes", "renderer": "a card"}
@@ -30,17 +30,6 @@ def study():
     return dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, minimum={}))
 
 
-class MadeInItsLoop:
-    """An application that is made in the event loop in which it runs, as its database has to be."""
-
-    def __init__(self, make):
-        self._make, self._app = make, None
-
-    async def __call__(self, scope, receive, send):
-        self._app = self._app or await self._make()
-        await self._app(scope, receive, send)
-
-
 @contextmanager
 def serving(folder, study):
     film = folder / "film.mp4"
@@ -48,11 +37,9 @@ def serving(folder, study):
 
     async def make():
         store = await Store.open(f"sqlite:///{folder / 'study.db'}", "study", "0" * 64)
-        visits, rng = Visits(folder / "visits"), np.random.default_rng(0)
-        procedure = Procedure(study, phases_of_study(study), store, visits, rng)
-        came_from = recruiter(study.settings.recruitment)
-        needs = Serving(b"secret", film, workers=20)
-        return StudyServer(procedure, came_from, ScriptedPool(), needs).app("127.0.0.1")
+        folders, rng = VisitFolders(folder / "visits"), np.random.default_rng(0)
+        procedure = Procedure(plan_of(study, film), store, folders, rng)
+        return VisitServer(procedure, ScriptedPool(), ServerOptions(b"secret", workers=20)).app("127.0.0.1")
 
     with TestClient(MadeInItsLoop(make), base_url=ORIGIN, follow_redirects=False) as client:
         yield client

@@ -7,9 +7,10 @@ from starlette.datastructures import ImmutableMultiDict
 
 from experiments.cli.main import main
 from experiments.errors import ConfigError
-from experiments.people.phases import phases_of_study
+from experiments.people.phases import phases_of
 from experiments.people.phases.base import Visitor
 from experiments.people.study_file import PHASES, read_people_study
+from experiments.people.study_plan import plan_of
 from experiments.people.texts import FOLDER as TEXTS
 from experiments.people.texts import languages, read_texts
 from experiments.study.designs import FOLDER
@@ -141,7 +142,7 @@ def test_a_study_in_another_language_has_its_story_and_its_messages(tmp_path):
     path.write_text(path.read_text().replace('language = "en"', 'language = "de"'))
     study = read_people_study(path)
     assert "Ferienwohnung" in study.story and study.cells[0].trial(0).story.endswith("story.de.md")
-    survey = next(phase for phase in phases_of_study(study) if phase.name == "survey")
+    survey = next(phase for phase in phases_of(plan_of(study)) if phase.name == "survey")
     sent = ImmutableMultiDict({**survey.example(), "age": "7"})
     refused = survey.read(Visitor({}, 0.0, 0, "/"), sent)
     assert "zwischen 18 und 120" in refused.values["form"]["age"].errors[0]

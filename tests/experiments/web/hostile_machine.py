@@ -103,7 +103,7 @@ def _open_visit(url: str) -> float:
     headers = {"Origin": url.rstrip("/")}
     with httpx.Client(base_url=url, transport=transport, timeout=PATIENCE, headers=headers) as client:
         client.get("/").raise_for_status()
-        client.post("/visits", follow_redirects=True).raise_for_status()
+        client.post("/begin", follow_redirects=True).raise_for_status()
     return time.perf_counter() - began
 
 
@@ -160,14 +160,14 @@ async def _spoof(url: str) -> int:
         for i in range(SPOOFED):
             headers = {"Origin": url.rstrip("/"), "X-Forwarded-For": f"198.51.100.{i}"}
             with suppress(httpx.TransportError):  # it made room for others
-                begun += (await client.post("/visits", headers=headers)).status_code == 303
+                begun += (await client.post("/begin", headers=headers)).status_code == 303
     return begun
 
 
 async def _half_send(url: str, number: int) -> list[asyncio.StreamWriter]:
     """Begin requests without ending their head or body; their connections."""
     parts, writers = urlsplit(url), list[asyncio.StreamWriter]()
-    head = f"POST /visits HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: http://{parts.netloc}\r\n"
+    head = f"POST /begin HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: http://{parts.netloc}\r\n"
     for i in range(number):
         with suppress(OSError):
             _, writer = await asyncio.open_connection(parts.hostname, parts.port, local_addr=(HOSTILE, 0))

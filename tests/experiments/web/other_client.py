@@ -19,7 +19,7 @@ PRESS_EVERY = 25  # control steps
 def begin_visit(url):
     """Begin a visit; its link."""
     with httpx.Client(base_url=url, headers={"Origin": url.rstrip("/")}, timeout=60.0) as client:
-        return str(client.post("/visits", follow_redirects=True).raise_for_status().url)
+        return str(client.post("/begin", follow_redirects=True).raise_for_status().url)
 
 
 class OtherClient:

@@ -27,7 +27,7 @@ HELLO = {
 }
 VALUES = [None, -1, 1e308, float("nan"), "x", [], {}, True, 2**70, "\x00", "ä" * 50]
 SMALL = ['{"type":"run"}', '{"type":"takeover"}', '{"type":"leave","x":1}', "{}", "", "null"]
-PATHS = ("/", "/visits", "/%ff%fe", "//evil.example/", "*", "http://evil.example/", "/play/" + "A" * 43)
+PATHS = ("/", "/begin", "/%ff%fe", "//evil.example/", "*", "http://evil.example/", "/play/" + "A" * 43)
 PATHS += ("/static/../app.py", "/static/..%2f..%2fapp.py", "/static/style.css%00", "/static/" + "x" * 4000)
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "TRACE", "PATCH", "CONNECT", "get", "X" * 50)
 HEADERS = ["Content-Length: -1", "Content-Length: 1e3", "Host: evil.example", "Origin: null", "Upgrade: h2c"]

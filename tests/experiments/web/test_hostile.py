@@ -9,7 +9,8 @@ import pytest
 from nginx_site import NGINX
 
 from benchmarks.play import FAST
-from experiments.web.server.app import NEW_VISITS, SOCKETS_OF_A_VISIT
+from experiments.people.server.arrivals import NEW_PEOPLE
+from experiments.people.server.trials import SOCKETS_OF_A_PERSON
 from tests.experiments.web.hostile_machine import measure_hostile
 
 pytestmark = pytest.mark.slow
@@ -23,6 +24,6 @@ def test_a_hostile_machine_disturbs_nobody(tmp_path, nginx):
     found = measure_hostile(tmp_path, SOCKETS, 3.0, *FAST, nginx=nginx)
     print(found)
     assert found["flood_cut_off"] and found["journal_kb"] < 500.0, "presses do not fill the disk"
-    assert found["sockets_served"] <= SOCKETS_OF_A_VISIT
-    assert found["visits_begun"] <= NEW_VISITS[0], "nobody speaks for others"
+    assert found["sockets_served"] <= SOCKETS_OF_A_PERSON
+    assert found["visits_begun"] <= NEW_PEOPLE[0], "nobody speaks for others"
     assert found["errors"] == 0

@@ -74,12 +74,6 @@ export const over = (reason, saved) => ({
   buttons: saved ? [[textOf("next"), "reload"]] : [],
 });
 
-/** @param {number} position @returns {Dialog} */
-export const queue = (position) => ({
-  title: textOf("queue_title"),
-  texts: [position === 1 ? textOf("queue_next") : textOf("queue_place", { place: position }), textOf("queue_wait")],
-});
-
 /** @param {string} reason @returns {Dialog} */
 export const cannotDraw = (reason) => ({
   title: textOf("cannot_draw"),

@@ -113,7 +113,8 @@ function take(message) {
       setTimeout(() => location.reload(), DONE);
       break;
     case "queue":
-      panel.show(dialogs.queue(message.position));
+      connection.close();
+      location.reload(); // the page shows the queue
       break;
     case "occupied":
       panel.show(dialogs.occupied());

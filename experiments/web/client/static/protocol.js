@@ -37,7 +37,7 @@
 /** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment What changes as the person moves: the clock in whole seconds, the room, what is in reach, pointer and map. */
 /** @typedef {{ type: "busy"; busy: boolean }} Busy Whether a pick or place is under way, for clients that show frames; keys pressed then are handled afterwards. */
 /** @typedef {{ type: "saved" }} Saved The run directory of a session that is over has been written. */
-/** @typedef {{ type: "queue"; position: number }} Queue All places are taken; the session opens by itself when it is its turn. Position 1 is next. */
+/** @typedef {{ type: "queue" }} Queue All slots are taken. The page has to be loaded again, and then shows the queue. */
 /** @typedef {{ type: "occupied" }} Occupied The session is open in another page; `takeover` continues here. */
 /** @typedef {{ type: "replaced" }} Replaced Another page took the session over; this connection is closed. */
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */

@@ -286,7 +286,6 @@ describe("a lost link", () => {
 });
 
 test.each([
-  [{ type: "queue", position: 3 }, "All places are taken", null],
   [{ type: "occupied" }, "This session is open in another page", "Continue here"],
   [{ type: "replaced" }, "This session continues in another page", "Continue here"],
   [{ type: "error", code: "idle", message: "" }, "You were away for a long time", "Continue"],

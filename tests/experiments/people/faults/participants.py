@@ -10,9 +10,9 @@ from websockets.exceptions import WebSocketException
 
 from benchmarks.support.play_browser import SimulatedBrowser
 from benchmarks.support.play_server import PATIENCE
+from experiments.people.tokens import token_hash
 from experiments.record.journal import Entry, read_entries
 from experiments.record.phases import TASK
-from experiments.web.server.visits import token_hash
 from tests.experiments.people.faults.site import NAMES, QUESTIONS, RIGHT
 
 PAUSE = 0.1  # s between two tries of a form that is not taken

@@ -20,7 +20,7 @@ from experiments.people.store.tables import payment
 from experiments.people.store.values import utc_now
 from experiments.record.journal import JOURNAL
 from experiments.record.phases import TASK
-from experiments.web.server.visits import JOURNALS
+from experiments.record.run_directory import JOURNALS
 
 NAMES = ("one", "two")
 DISK = 800  # MB

@@ -1,14 +1,16 @@
-"""The server of `mjsim play` in front of a worker that is scripted: links, checks, messages, the visit."""
+"""`mjsim play` in front of a worker that is scripted: links, checks, messages, the visit."""
 
 import asyncio
 import json
 import re
+import sqlite3
 import time
-from contextlib import contextmanager
-from ipaddress import ip_network
+from contextlib import closing
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
+from play_site import arguments_of, begin, play_app, playing, send
 from scripted_workers import (
     METRICS,
     ORIGIN,
@@ -25,22 +27,20 @@ from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from experiments.procedure.comprehension import Question
-from experiments.record.phases import PHASES
-from experiments.trials.trial_config import TrialConfig
+from experiments.cli.play import task_of
+from experiments.house import House
+from experiments.people.folders import VisitFolders
+from experiments.people.tokens import new_token, token_hash
+from experiments.record.run_directory import VISIT
 from experiments.web import protocol
 from experiments.web.protocol import Frame, Inputs, Open, Pause, Snapshot, State, Taken
-from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
-from experiments.web.server.visits import VISIT, Visits, new_token, token_hash
 from experiments.web.state import PAUSED
 
-TASK = TrialConfig(objects=6, assistance="optimal", seed=0, user="human", live=True).settings()
 GAIT, SPEEDS = protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0)
 SCENE = protocol.Scene("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
-TRIALS = {"training": {**TASK, "objects": 1}, "task": TASK}
 
 
 @pytest.fixture
@@ -48,24 +48,17 @@ def pool():
     return ScriptedPool()
 
 
-@contextmanager
-def serving(folder, pool, **options):
-    server = PlayServer(PlayConfig(PHASES, TRIALS, folder, story="A story.", **options), pool)
-    with TestClient(server.app("127.0.0.1"), base_url=ORIGIN, follow_redirects=False) as client:
-        yield client
-
-
 @pytest.fixture
 def client(tmp_path, pool):
-    with serving(tmp_path, pool) as client:
+    with playing(tmp_path, pool) as client:
         yield client
 
 
 def new_visit(client, **form):
-    """Begin a visit; its link."""
-    answer = client.post("/visits", headers={"Origin": ORIGIN}, data=form)
-    assert answer.status_code == 303
-    return answer.headers["location"]
+    """Begin a visit and read the story; its link."""
+    link = begin(client, **form)
+    assert 'data-trial="' in client.get(link).text
+    return link
 
 
 def go_through(client, link):
@@ -86,8 +79,10 @@ def before_the_task(pool):
 
 
 def test_a_visit_from_the_story_to_the_result(client, pool):
-    assert "<p>A story.</p>" in client.get("/").text
-    link = new_visit(client)
+    assert "Tidy the apartment" in client.get("/").text
+    link = begin(client, read=False)
+    assert "You are a guest" in client.get(link).text
+    send(client, link, "story")
     for phase in ("training", "task"):
         assert f'data-trial="{phase}"' in client.get(link).text
         with connected(client, link) as socket:
@@ -103,6 +98,7 @@ def test_a_visit_from_the_story_to_the_result(client, pool):
     assert len(pool.workers) == 1  # the same worker for training and task
     asked = [told for told in pool.workers[0].told if isinstance(told, Open)]
     assert [opened.config["objects"] for opened in asked] == [1, 6]
+    assert [opened.floor_plan for opened in asked] == [False, True]
 
 
 def test_who_did_nothing_has_a_result_without_an_inverse_path_length(client, monkeypatch):
@@ -115,52 +111,45 @@ def test_who_did_nothing_has_a_result_without_an_inverse_path_length(client, mon
     assert "Your result" in answer.text and "Inverse path length" not in answer.text
 
 
-def test_the_first_page_says_the_same_under_all_conditions_but_what_they_show(tmp_path, pool, monkeypatch):
+def test_the_story_says_the_same_under_all_conditions_but_what_they_show(tmp_path, pool):
     """What is said under none is said under all; what is shown in addition follows, and plans come last."""
 
     def said(name):
-        monkeypatch.setitem(TASK, "assistance", name)
-        with serving(tmp_path, pool) as client:
-            (text,) = re.findall(r"<p>(A list names .*?)</p>", client.get("/").text, re.DOTALL)
-        return re.split(r"(?<=\.)\s+", text.strip())
+        with playing(tmp_path / name, pool, "--assistance", name) as client:
+            text = client.get(begin(client, read=False)).text
+        return re.findall(r"<p>(.*?)</p>", text[text.index("<p>A list") : text.index("<form")], re.DOTALL)
 
     none, highlight, optimal = (said(name) for name in ("none", "highlight", "optimal"))
     assert len(none) == 2 and said("guided-minimap") == optimal
     assert (highlight[:1] + highlight[2:], optimal[:2] + optimal[3:]) == (none, highlight)
 
 
-def test_a_film_comes_first_where_there_is_one(tmp_path, pool, monkeypatch):
+def test_a_film_comes_first_where_there_is_one(tmp_path, pool):
     film = tmp_path / "film.mp4"
     film.write_bytes(b"0123456789")
-    with serving(tmp_path / "visits", pool, film=film) as client:
-        story, now = client.get("/"), time.monotonic()
-        with monkeypatch.context() as later:
-            later.setattr("experiments.web.server.readings.time.monotonic", lambda: now + 90.0)
-            link = send_story(client, story).headers["location"]
+    with playing(tmp_path / "visits", pool, "--film", str(film)) as client:
+        link = begin(client)
         assert "<video" in client.get(link).text
         assert client.get(f"{link}/film", headers={"Range": "bytes=2-4"}).content == b"234"
-        assert client.post(f"{link}/film", headers={"Origin": ORIGIN}).status_code == 303
+        assert send(client, link, "flythrough").status_code == 303
         assert 'data-trial="training"' in client.get(link).text
         go_through(client, link)
     story, watched, trained = before_the_task(pool)
-    assert story["phase"] == "story" and 90.0 <= story["duration_s"] < 100.0
-    assert watched["phase"] == "flythrough" and 0.0 < watched["duration_s"] < 10.0
+    assert (story["phase"], watched["phase"]) == ("story", "flythrough")
+    assert 0.0 < story["duration_s"] < 10.0 and 0.0 < watched["duration_s"] < 10.0
     assert trained == {"phase": "training", "duration_s": 125.0, "reason": "all delivered"}
 
 
-@pytest.mark.parametrize("opened", ["", "x", "-1", ".", "9" * 15, "9" * 400, "1.a.b", "é.é"])
-def test_a_form_that_was_tampered_with_only_spoils_its_own_reading_time(client, pool, opened):
-    link = new_visit(client, opened=opened)
-    go_through(client, link)
-    assert before_the_task(pool)[0] == {"phase": "story", "duration_s": 0.0}
-
-
 def test_only_the_hash_of_a_token_is_kept(client, tmp_path, caplog):
-    caplog.set_level("INFO", "mjsim.play")
-    token = new_visit(client).removeprefix("/play/")
-    assert token not in caplog.text and token_hash(token)[:12] in caplog.text
+    caplog.set_level("INFO")
+    link = new_visit(client)
+    play_trial(client, link, "training")
+    token = link.removeprefix("/play/")
+    text = "".join(one.getMessage() for one in caplog.records if one.name.startswith("mjsim"))
+    assert token not in text and token_hash(token)[:12] in text
     assert (tmp_path / token_hash(token) / VISIT).is_file()
-    assert not [p for p in tmp_path.rglob("*") if token in p.name or (p.is_file() and token in p.read_text())]
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(files) > 2 and not [path for path in files if token.encode() in path.read_bytes()]
 
 
 @pytest.mark.parametrize("token", ["x", "x" * 43, "%2e%2e", "..%2f..%2fetc", "a" * 5000, "%00", "é" * 43])
@@ -190,8 +179,8 @@ def test_every_answer_has_strict_headers_and_no_script_or_style_of_its_own(clien
 def test_files_are_cached_and_pages_are_not(tmp_path, pool):
     film = tmp_path / "film.mp4"
     film.write_bytes(b"0123456789")
-    with serving(tmp_path / "visits", pool, film=film) as client:
-        link = new_visit(client)
+    with playing(tmp_path / "visits", pool, "--film", str(film)) as client:
+        link = begin(client)
         for path, cached in (("/", False), (link, False), ("/static/play.js", True), (f"{link}/film", True)):
             headers = client.get(path).headers
             assert ("no-store" not in headers["cache-control"]) is cached
@@ -199,10 +188,10 @@ def test_files_are_cached_and_pages_are_not(tmp_path, pool):
         tag = client.get("/static/play.js").headers["etag"]
         assert client.get("/static/play.js", headers={"If-None-Match": tag}).status_code == 304
         text = client.get(link).text
-        (address,) = re.findall(r'<script type="module" src="(/static/[0-9a-f]{16}/wait.js)">', text)
+        (address,) = re.findall(r'<script type="module" src="(/static/[0-9a-f]{16}/study/form.js)">', text)
         answer = client.get(address)
         assert answer.status_code == 200 and "immutable" in answer.headers["cache-control"]
-        assert f'href="{address.replace("wait.js", "style.css")}"' in text
+        assert f'href="{address.replace("study/form.js", "style.css")}"' in text
 
 
 PROXY, SPOOF = "203.0.113.9", "198.51.100."
@@ -211,21 +200,20 @@ PROXY, SPOOF = "203.0.113.9", "198.51.100."
 @pytest.mark.parametrize(
     ("peer", "forwarded", "begun"),
     [
-        ("192.0.2.7", SPOOF + "{}", 30),  # no proxy: its word is nothing
-        (PROXY, "192.0.2.7", 30),
-        (PROXY, SPOOF + "{}, 192.0.2.7", 30),  # what the proxy did not write is nothing
-        (PROXY, SPOOF + "{}", 40),  # people behind the proxy have limits of their own
-        (PROXY, "2001:db8::{}", 30),  # one machine has all addresses of its network
-        (PROXY, "unknown, {}, x", 30),
+        ("192.0.2.7", SPOOF + "{}", 60),  # no proxy: its word is nothing
+        (PROXY, "192.0.2.7", 60),
+        (PROXY, SPOOF + "{}, 192.0.2.7", 60),  # what the proxy did not write is nothing
+        (PROXY, SPOOF + "{}", 70),  # people behind the proxy have limits of their own
+        (PROXY, "2001:db8::{}", 60),  # one machine has all addresses of its network
+        (PROXY, "unknown, {}, x", 60),
     ],
 )
 def test_limits_hold_for_the_address_that_a_trusted_proxy_saw(tmp_path, pool, peer, forwarded, begun):
-    config = PlayConfig(PHASES, TRIALS, tmp_path, proxies=[ip_network(PROXY)])
-    app = PlayServer(config, pool).app("127.0.0.1")
+    app = play_app(tmp_path, pool, "--trusted-proxy", PROXY)
     with TestClient(app, base_url=ORIGIN, follow_redirects=False, client=(peer, 1)) as client:
-        headers = [{"Origin": ORIGIN, "X-Forwarded-For": forwarded.format(i)} for i in range(40)]
-        answers = [client.post("/visits", headers=sent).status_code for sent in headers]
-    assert answers.count(303) == begun and answers.count(429) == 40 - begun
+        headers = [{"Origin": ORIGIN, "X-Forwarded-For": forwarded.format(i)} for i in range(70)]
+        answers = [client.post("/begin", headers=sent).status_code for sent in headers]
+    assert answers.count(303) == begun and answers.count(429) == 70 - begun
 
 
 OWN_HOSTS = "127.0.0.1:8000", "localhost:8000", "[::1]:8000"
@@ -248,7 +236,7 @@ def test_an_odd_host_reaches_no_content_security_policy(host):
 )
 def test_another_origin_is_refused(client, origin):
     link = new_visit(client)
-    assert client.post("/visits", headers={"Origin": origin}).status_code == 403
+    assert client.post("/begin", headers={"Origin": origin}).status_code == 403
     with pytest.raises(WebSocketDisconnect), connected(client, link, origin):
         pass
 
@@ -261,10 +249,10 @@ def test_a_server_for_the_network_is_reached_at_the_addresses_of_the_machine():
 
 def test_a_proxy_may_make_it_public(tmp_path, pool):
     public = "https://play.example.org"
-    app = PlayServer(PlayConfig(PHASES, TRIALS, tmp_path), pool).app("127.0.0.1", public)
+    app = play_app(tmp_path, pool, "--public-url", public)
     with TestClient(app, base_url=public, follow_redirects=False) as client:
-        assert client.post("/visits", headers={"Origin": public}).status_code == 303
-        assert client.post("/visits", headers={"Origin": ORIGIN}).status_code == 403
+        assert client.post("/begin", headers={"Origin": public}).status_code == 303
+        assert client.post("/begin", headers={"Origin": ORIGIN}).status_code == 403
         assert (
             "connect-src 'self' blob: wss://play.example.org;"
             in client.get("/").headers["content-security-policy"]
@@ -273,9 +261,9 @@ def test_a_proxy_may_make_it_public(tmp_path, pool):
 
 
 def test_large_bodies_and_many_visits_are_refused(client):
-    assert client.post("/visits", headers={"Origin": ORIGIN}, content=b"x" * 5000).status_code == 413
-    answers = [client.post("/visits", headers={"Origin": ORIGIN}).status_code for _ in range(40)]
-    assert answers.count(303) == 30 and answers.count(429) == 10
+    assert client.post("/begin", headers={"Origin": ORIGIN}, content=b"x" * 70000).status_code == 413
+    answers = [client.post("/begin", headers={"Origin": ORIGIN}).status_code for _ in range(70)]
+    assert answers.count(303) == 60 and answers.count(429) == 10
 
 
 @pytest.mark.parametrize(
@@ -323,7 +311,7 @@ def test_messages_may_come_too_early(client):
 
 def test_a_flood_is_cut_off_and_others_are_not_disturbed(tmp_path, pool):
     with (
-        serving(tmp_path, pool, sessions=2) as client,
+        playing(tmp_path, pool) as client,
         connected(client, new_visit(client)) as quiet,
         connected(client, new_visit(client)) as loud,
     ):
@@ -357,12 +345,17 @@ def test_presses_without_end_are_cut_off(client):
     assert closed.value.code == protocol.TOO_MUCH
 
 
-def test_a_visit_and_an_address_have_few_sockets(client, monkeypatch):
+def test_a_visit_and_an_address_have_few_sockets(tmp_path, pool, monkeypatch):
+    with playing(tmp_path, pool, sessions=2) as client:
+        few_sockets(client, monkeypatch)
+
+
+def few_sockets(client, monkeypatch):
     link = new_visit(client)
     with connected(client, link), connected(client, link):
         with pytest.raises(WebSocketDisconnect), connected(client, link):
             pass
-        monkeypatch.setattr("experiments.web.server.app.SOCKETS_OF_AN_ADDRESS", 2)
+        monkeypatch.setattr("experiments.people.server.trials.SOCKETS_OF_AN_ADDRESS", 2)
         with pytest.raises(WebSocketDisconnect), connected(client, new_visit(client)):
             pass
     with connected(client, link) as socket:
@@ -389,14 +382,14 @@ def test_who_answers_occupied_with_nothing_is_sent_away(client, monkeypatch):
 
 
 def test_visits_have_orders_of_their_own_and_folders_that_nobody_else_reads(client, tmp_path):
-    tokens = [new_visit(client)[6:] for _ in range(3)]
-    assert [Visits(tmp_path).find(token).settings("task")["order_seed"] for token in tokens] == [0, 1, 2]
-    assert all((tmp_path / token_hash(token)).stat().st_mode & 0o077 == 0 for token in tokens)
+    folders = [VisitFolders(tmp_path).find(token_hash(new_visit(client)[6:])) for _ in range(3)]
+    assert [folder.settings("task")["order_seed"] for folder in folders] == [0, 1, 2]
+    assert all(folder.path.stat().st_mode & 0o077 == 0 for folder in folders)
 
 
 def test_who_has_seen_the_best_way_plays_another_episode(client, tmp_path):
     def house_seed(link):
-        return Visits(tmp_path).find(link[6:]).settings("task")["house_seed"]
+        return VisitFolders(tmp_path).find(token_hash(link[6:])).settings("task")["house_seed"]
 
     link = new_visit(client)
     assert house_seed(new_visit(client, after=link[6:])) == 0, "that visit is not over"
@@ -411,100 +404,136 @@ def test_who_has_seen_the_best_way_plays_another_episode(client, tmp_path):
 
 @pytest.mark.parametrize("after", ["", "x", "A" * 43, '"><script>'])
 def test_another_episode_needs_the_link_of_a_visit(tmp_path, pool, after):
-    with serving(tmp_path, pool) as client:
+    with playing(tmp_path, pool) as client:
         assert '"><script>' not in client.get("/", params={"after": after}).text
         token = new_visit(client, after=after)[6:]
-        assert Visits(tmp_path).find(token).settings("task")["house_seed"] == 0
+        assert VisitFolders(tmp_path).find(token_hash(token)).settings("task")["house_seed"] == 0
 
 
-def test_a_fixed_episode_is_not_offered_again(tmp_path, pool, monkeypatch):
-    monkeypatch.setitem(TRIALS, "task", {**TASK, "episode": "e.json"})
-    with serving(tmp_path, pool) as client:
+def test_a_fixed_episode_is_not_offered_again(tmp_path, pool):
+    episode = tmp_path / "episode.json"
+    episode.write_text(House.load("apartment").sample_episode(objects=3, seed=0).to_json())
+    with playing(tmp_path / "visits", pool, "--episode", str(episode)) as client:
         link = new_visit(client)
         go_through(client, link)
         assert "Play again" not in client.get(link).text
 
 
-QUESTIONS = [Question("How many things at a time?", ["one", "two"], "two"), Question("Why?", ["a", "b"], "a")]
+QUESTIONS = """
+[[question]]
+text = "How many things at a time?"
+choices = ["one", "two"]
+answer = "two"
+
+[[question]]
+text = "Why?"
+choices = ["a", "b"]
+answer = "a"
+"""
 
 
-def send_story(client, page, **answers):
-    """The story page sent with answers; the next page."""
-    form = dict(re.findall(r'type="hidden" name="(\w+)" value="([^"]*)"', page.text))
-    return client.post("/visits", headers={"Origin": ORIGIN}, data={**form, **answers})
+def ago(store_folder, seconds):
+    """Let all phases have been shown earlier."""
+    with closing(sqlite3.connect(store_folder / "study.db")) as database:
+        for row, shown in database.execute("SELECT id, shown FROM phase").fetchall():
+            earlier = datetime.fromisoformat(shown) - timedelta(seconds=seconds)
+            database.execute("UPDATE phase SET shown = ? WHERE id = ?", (str(earlier), row))
+        database.commit()
 
 
-def test_a_story_is_read_for_its_time(tmp_path, pool, monkeypatch):
-    with serving(tmp_path, pool, minimum={"story": 30.0}) as client:
-        page = client.get("/")
+def test_a_story_is_read_for_its_time(tmp_path, pool):
+    with playing(tmp_path, pool, "--minimum", "story=30") as client:
+        link = begin(client, read=False)
+        page = client.get(link)
         assert float(re.search(r'data-wait="([\d.]+)"', page.text)[1]) > 29.0
-        early = send_story(client, page)
+        early = send(client, link, "story")
         assert early.status_code == 200 and "take the time" in early.text
-        now = time.monotonic()
-        monkeypatch.setattr("experiments.web.server.readings.time.monotonic", lambda: now + 31.0)
-        assert send_story(client, early).status_code == 303, "the time so far counts"
+        ago(tmp_path, 31.0)
+        assert send(client, link, "story").status_code == 303, "the time so far counts"
 
 
-def test_questions_about_the_story_are_answered_before_the_visit_begins(tmp_path, pool):
-    with serving(tmp_path, pool, questions=QUESTIONS) as client:
-        page = client.get("/")
-        for wrong in ({}, {"answer0": "two"}, {"answer0": "one", "answer1": "a"}):
-            page = send_story(client, page, **wrong)
-            assert page.status_code == 200 and "Not all answers are right" in page.text
-        link = send_story(client, page, answer0="two", answer1="a").headers["location"]
-        go_through(client, link)
-    assert before_the_task(pool)[0]["attempts"] == 4
+def test_questions_about_the_story_are_answered_as_often_as_needed(tmp_path, pool):
+    (tmp_path / "questions.toml").write_text(QUESTIONS)
+    with playing(tmp_path, pool, "--questions", str(tmp_path / "questions.toml")) as client:
+        link = begin(client)
+        for wrong in ({}, {"question_1": "two"}, {"question_1": "one", "question_2": "a"}):
+            page = send(client, link, "comprehension", **wrong)
+            assert page.status_code == 200 and 'role="alert"' in page.text
+        assert "Not all answers are right" in page.text
+        assert send(client, link, "comprehension", question_1="two", question_2="a").status_code == 303
+        assert 'data-trial="training"' in client.get(link).text
 
 
-@pytest.mark.parametrize("changed", ["", "1", "1.{}", "{}x", "1{}", "0.0000000000000000.{}"])
-@pytest.mark.parametrize("options", [{"minimum": {"story": 30.0}}, {"questions": QUESTIONS}])
-def test_a_form_made_by_hand_passes_neither_the_time_nor_the_questions(changed, options, tmp_path, pool):
-    with serving(tmp_path, pool, **options) as client:
-        opened = re.search(r'name="opened" value="([^"]+)"', client.get("/").text)[1]
-        form = {"opened": changed.format(opened), "attempts": "0", "answer0": "two", "answer1": "a"}
-        page = client.post("/visits", headers={"Origin": ORIGIN}, data=form)
-        assert page.status_code == 200 and "take the time" in page.text
-    assert not any(tmp_path.glob("*/visit.json"))
-
-
-def test_pages_sent_again_count_all_attempts(tmp_path, pool):
-    with serving(tmp_path, pool, questions=QUESTIONS) as client:
-        first = client.get("/")
-        for _ in range(2):
-            send_story(client, first, answer0="one")
-        link = send_story(client, first, answer0="two", answer1="a").headers["location"]
-        go_through(client, link)
-    assert before_the_task(pool)[0]["attempts"] == 3
-
-
-def test_film_and_training_last_their_time(tmp_path, pool, monkeypatch):
-    film = tmp_path / "film.mp4"
-    film.write_bytes(b"film")
-    minimum = {"flythrough": 10.0, "training": 20.0}
-    with serving(tmp_path / "visits", pool, film=film, minimum=minimum) as client:
-        link, clock = new_visit(client), [time.monotonic()]
-        monkeypatch.setattr("experiments.web.server.visits.time.monotonic", lambda: clock[0])
+def test_film_and_training_last_their_time(tmp_path, pool):
+    (tmp_path / "film.mp4").write_bytes(b"film")
+    words = ("--film", str(tmp_path / "film.mp4"), "--minimum", "flythrough=10,training=20")
+    with playing(tmp_path, pool, *words) as client:
+        link = begin(client)
         for _ in range(2):
             assert "This film" in client.get(link).text, "it is not over yet"
-            client.post(f"{link}/film", headers={"Origin": ORIGIN})
-            clock[0] += 6.0
-        client.post(f"{link}/film", headers={"Origin": ORIGIN})
+            send(client, link, "flythrough")
+        ago(tmp_path, 11.0)
+        send(client, link, "flythrough")
         assert 'data-trial="training"' in client.get(link).text
         with connected(client, link) as socket:
             started(socket)
             socket.send_json({"type": "leave"})
             assert until(socket, "error")[-1]["code"] == "too early"
-            clock[0] += 21.0
+        ago(tmp_path, 21.0)
+        client.portal.call(client.release)
+        with connected(client, link) as socket:
+            started(socket)
             left(socket)
         assert 'data-trial="task"' in client.get(link).text
 
 
-def test_a_step_of_the_wall_clock_changes_no_duration(tmp_path, pool, monkeypatch):
-    with serving(tmp_path, pool) as client:
-        story = client.get("/")
-        monkeypatch.setattr("time.time", lambda: 5e9)
-        go_through(client, send_story(client, story).headers["location"])
-    assert before_the_task(pool)[0]["duration_s"] < 10.0
+def test_a_participant_may_leave_and_have_everything_deleted(client, tmp_path):
+    link = new_visit(client)
+    play_trial(client, link, "training")
+    assert "Leave, and delete what I did so far" in client.get(f"{link}/withdrawal").text
+    client.post(f"{link}/withdrawal", headers={"Origin": ORIGIN}, data={"data": "delete"})
+    assert "You have left" in client.get(link).text and not list(tmp_path.glob("*/visit.json"))
+
+
+def test_pages_are_in_the_language_that_was_asked_for(tmp_path, pool):
+    with playing(tmp_path, pool, "--language", "de") as client:
+        assert "Räumen Sie die Wohnung auf" in client.get("/").text
+        link = new_visit(client)
+        go_through(client, link)
+        assert "Ihr Ergebnis" in client.get(link).text and "6 von 6" in client.get(link).text
+
+
+@pytest.mark.parametrize(
+    ("here", "shown"),
+    [("flythrough", "This film"), ("training", 'data-trial="training"'), ("task", 'data-trial="task"')],
+)
+def test_folders_of_visits_from_before_the_database_continue(tmp_path, pool, here, shown):
+    (tmp_path / "film.mp4").write_bytes(b"film")
+    token, phases = new_token(), ["flythrough", "training", "task"]
+    folder = tmp_path / "visits" / token_hash(token)
+    folder.mkdir(parents=True)
+    ended = [{"phase": "story", "duration_s": 12.5}]
+    ended += [{"phase": "flythrough", "duration_s": 3.0}] * (here != "flythrough")
+    if here == "task":
+        (folder / "training").mkdir()
+        (folder / "training" / "metrics.json").write_text(json.dumps(METRICS))
+        ended.append({"phase": "training", "duration_s": 125.0, "reason": "all delivered"})
+    settings = {**task_of(arguments_of()).settings(), "order_seed": 17}
+    stored = {"phase": here, "phases": phases, "trials": {"training": settings, "task": settings}}
+    (folder / VISIT).write_text(json.dumps({**stored, "ended": ended, "shown": 5.0, "version": 1}))
+    with playing(tmp_path / "visits", pool, "--film", str(tmp_path / "film.mp4")) as client:
+        link = f"/play/{token}"
+        assert shown in client.get(link).text
+        if here == "flythrough":
+            send(client, link, "flythrough")
+            client.get(link)
+        for trial in phases[phases.index(here if here != "flythrough" else "training") :]:
+            play_trial(client, link, trial)
+        assert "Your result" in client.get(link).text
+    opened = [told for told in pool.workers[-1].told if isinstance(told, Open)]
+    assert [told.config["order_seed"] for told in opened] == [17] * len(opened)
+    assert [(one["phase"], one["duration_s"]) for one in opened[-1].before][-1] == ("training", 125.0)
+    assert opened[-1].before[0] == {"phase": "story", "duration_s": 12.5}
 
 
 def test_a_worker_that_died_is_named_to_the_next(client, pool):
@@ -613,22 +642,24 @@ def test_a_fork_server_that_was_just_killed_costs_no_session(monkeypatch):
         asyncio.run(WorkerPool("apartment").start())
 
 
-def test_beyond_the_limit_people_wait_in_a_queue(client):
-    with connected(client, new_visit(client)) as first, connected(client, new_visit(client)) as second:
-        started(first)
-        second.send_json(hello())
-        assert until(second, "queue")[-1]["position"] == 1
-        with connected(client, new_visit(client)) as third:
-            third.send_json(hello())
-            assert until(third, "queue")[-1]["position"] == 2
-        left(first)
-        until_phase(first, "ready")
-        left(first)
-        until_phase(second, "ready")
+def test_beyond_the_limit_participants_wait_in_a_queue(tmp_path, pool):
+    with playing(tmp_path, pool, sessions=1) as client:
+        links = [begin(client) for _ in range(3)]
+        assert "data-trial" in client.get(links[0]).text
+        with connected(client, links[0]) as first:
+            started(first)
+            assert "You are number 1 in the queue" in client.get(links[1]).text
+            assert "You are number 2 in the queue" in client.get(links[2]).text
+            left(first)
+            until_phase(first, "ready")
+            assert "You are number 1 in the queue" in client.get(links[1]).text, "the task follows"
+            left(first)
+        assert "data-trial" in client.get(links[1]).text
+        play_trial(client, links[1], "training")
 
 
 def test_a_page_names_the_scene_that_its_house_had_before(tmp_path, pool):
-    with serving(tmp_path, pool, sessions=2) as client:
+    with playing(tmp_path, pool) as client:
         link = new_visit(client)
         assert "/scene/" not in client.get(link).text
         with connected(client, link) as socket:
@@ -641,7 +672,7 @@ def test_a_page_names_the_scene_that_its_house_had_before(tmp_path, pool):
 
 def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
     monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
-    with serving(tmp_path, pool, idle=0.1) as client, connected(client, new_visit(client)) as socket:
+    with playing(tmp_path, pool, "--idle", "1") as client, connected(client, new_visit(client)) as socket:
         started(socket)
         assert until(socket, "error")[-1]["code"] == "idle"
         with pytest.raises(WebSocketDisconnect) as closed:
@@ -653,24 +684,25 @@ def test_an_idle_session_gives_its_place_back(tmp_path, pool, monkeypatch):
 def test_a_closed_page_keeps_no_place_from_those_who_wait(tmp_path, monkeypatch, pool):
     monkeypatch.setattr("experiments.web.server.sessions.MAX_AWAY", 0.1)
     monkeypatch.setattr("experiments.web.server.sessions.WATCH_PERIOD", 0.05)
-    with serving(tmp_path, pool) as client:
-        link = new_visit(client)
+    with playing(tmp_path, pool, sessions=1) as client:
+        link, other = new_visit(client), begin(client)
         with connected(client, link) as first:
             started(first)
-        with connected(client, new_visit(client)) as second:
-            second.send_json(hello())
-            until_phase(second, "ready")
+        while "You are number 1 in the queue" in client.get(other).text:
+            time.sleep(0.05)
+        with connected(client, other) as second:
+            started(second)
             with connected(client, link) as back:
                 back.send_json(hello())
-                assert until(back, "queue")[-1]["position"] == 1
+                until(back, "queue")
+            assert "You are number 1 in the queue" in client.get(link).text
 
 
 def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
-    token = new_token()
-    visit = Visits(tmp_path).create(token, ["training", "task"], TRIALS)
-    (tmp_path / visit.name / VISIT).write_text("{")
-    answer = client.get(f"/play/{token}")
-    assert answer.status_code == 500 and str(tmp_path) not in answer.text
+    link = new_visit(client)
+    (tmp_path / token_hash(link[6:]) / VISIT).write_text("{")
+    answer = client.get(link)
+    assert answer.status_code == 503 and str(tmp_path) not in answer.text
     assert "is damaged" in caplog.text
 
 

@@ -1,14 +1,14 @@
 """Scene files over HTTP: kept for good by browsers, compressed, and nothing else is served."""
 
-import asyncio
 import gzip
 import json
 
 import pytest
+from play_site import playing
+from scripted_workers import ScriptedPool
 from starlette.applications import Starlette
 from starlette.testclient import TestClient
 
-from experiments.web.server.app import PlayConfig, PlayServer
 from experiments.web.server.scene_files import scene_route
 from mjsim.formats.gltf.store import GZIP, scenes_folder
 
@@ -99,11 +99,7 @@ def test_the_server_of_play_serves_scenes_without_a_token(folder, tmp_path, monk
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert scenes_folder() == folder
 
-    class Pool:
-        close = staticmethod(lambda: asyncio.sleep(0))
-
-    app = PlayServer(PlayConfig(("task",), {}, tmp_path / "out"), Pool()).app("127.0.0.1")
-    with TestClient(app, base_url="http://127.0.0.1:8000") as client:
+    with playing(tmp_path / "out", ScriptedPool()) as client:
         answer = client.get(f"/scene/{HASH}/scene.json")
         assert json.loads(answer.content[:21]) == {"house": "house.glb"}
         assert answer.headers["cache-control"] == "public, max-age=31536000, immutable"

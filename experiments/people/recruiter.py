@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from experiments.people.tokens import TOKEN, token_hash
+
+AFTER = "after"  # parameter that holds the token of an earlier visit
 Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_out"]
 
 
@@ -72,3 +75,30 @@ class Recruiter(Protocol):
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
         """The way back of somebody who leaves."""
         ...
+
+
+class OpenLink:
+    """An open link: every visitor may take part, and gets a personal link to come back to.
+
+    Args:
+        platform: `link`, or `lab`, where the last page leads to the first one for the next participant.
+        code: Completion code; empty for none.
+        repeats: True if the link of a further visit names the earlier one.
+    """
+
+    has_time_limit = False
+    embedded_by: tuple[str, ...] = ()
+
+    def __init__(self, platform: str = "link", code: str = "", *, repeats: bool = False) -> None:
+        self.platform, self._code = platform, code
+        self.parameters: tuple[str, ...] = (AFTER,) if repeats else ()
+
+    def arrive(self, query: Mapping[str, str]) -> Arrival:
+        """Return an arrival without an id of a platform."""
+        earlier = query.get(AFTER, "") if AFTER in self.parameters else ""
+        return Arrival(identity={AFTER: token_hash(earlier)} if TOKEN.fullmatch(earlier) else {})
+
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - nobody is known
+        """A code where there is one; in a lab, the first page."""
+        code = self._code if how == "finished" else ""
+        return WayBack(code, "/", label="next_person") if self.platform == "lab" else WayBack(code)

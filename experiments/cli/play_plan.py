@@ -1,0 +1,94 @@
+"""The plan of the visits of `mjsim play`: the smallest study, with an open link and without pay."""
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec.structs import replace
+
+from experiments.cli.play import questions_of, shown_phases
+from experiments.people.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
+from experiments.people.recruiter import OpenLink
+from experiments.people.store import Assignment, CellQuota
+from experiments.people.study_plan import trials_of
+from experiments.people.texts import Section, read_texts, story_file
+from experiments.procedure.story import story_text
+from experiments.record.phases import STORY, TRAINING
+from experiments.trials.trial_config import MAX_SEED, TrialConfig
+
+NAME = "play"  # name of the study in the database
+MINUTES = 15.0
+DAY = 86400.0  # seconds
+MAX_VISITS = 1_000_000
+PLACES = ("title", "institution", "contact", "minutes")  # places in the texts of studies
+_NOTHING = Section({})
+
+
+def _texts(arguments: argparse.Namespace) -> dict[str, Section]:
+    """Return the texts of a study with those of `mjsim play` in place of some of them."""
+    empty = dict.fromkeys(PLACES, "")
+    words = read_texts(arguments.language, None, empty)["play"].words
+    texts = dict(read_texts(arguments.language, None, {**empty, "contact": words["contact"]}))
+    for name, text in texts["play"].words.items():
+        section, _, word = name.partition("_")
+        if word in texts.get(section, _NOTHING).words:
+            texts[section] = replace(texts[section], words={**texts[section].words, word: text})
+    if arguments.questions:
+        texts[COMPREHENSION] = replace(texts[COMPREHENSION], items=questions_of(arguments))
+    return texts
+
+
+def _story(arguments: argparse.Namespace, words: Section, assistance: str, phases: Sequence[str]) -> str:
+    """Return the story and what the HUD will show."""
+    if STORY not in phases:
+        return ""
+    path = arguments.story or story_file(arguments.language)
+    shown = {
+        "story_list": True,
+        "story_poles": assistance in ("highlight", "optimal", "guided"),
+        "story_plan": assistance in ("optimal", "guided"),
+        "story_training": TRAINING in phases,
+    }
+    more = [words[name] for name, is_shown in shown.items() if is_shown]
+    return "\n\n".join([story_text(None if path is None else Path(path)), *more])
+
+
+def plan_of_play(arguments: argparse.Namespace, task: TrialConfig) -> VisitPlan:
+    """Return the plan of a visit, which is the smallest study."""
+    shown = [*shown_phases(arguments), RESULT]
+    if arguments.questions:
+        shown.insert(shown.index(STORY) + 1, COMPREHENSION)
+    texts = _texts(arguments)
+    again = task.episode is None  # else there is only one, whose best way the result shows
+
+    def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
+        """Each visit has an order seed of its own, so that not all start with the same arrangement of hands."""
+        order, house = task.order_seed + place.person_id - 1, place.house_seed
+        seeds = {"order_seed": order % (MAX_SEED + 1), "house_seed": house % (MAX_SEED + 1)}
+        return trials_of(msgspec.structs.replace(task, **seeds))
+
+    return VisitPlan(
+        "play",
+        texts["welcome"]["title"],
+        arguments.language,
+        tuple(shown),
+        texts,
+        _story(arguments, texts["play"], str(task.assistance).split("-")[0], shown),
+        arguments.minimum,
+        frozenset(),
+        Limits(
+            idle=max(arguments.idle, 1.0), abandoned_after=DAY, timed_out_after=math.inf, attempts=MAX_VISITS
+        ),
+        Device(),
+        MINUTES,
+        [CellQuota(MAX_VISITS, [task.house_seed])],
+        "uniform",
+        trials,
+        OpenLink(repeats=again),
+        arguments.film,
+        headset=arguments.xr,
+        floor_plan=True,
+    )

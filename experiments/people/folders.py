@@ -1,0 +1,143 @@
+"""Folders of visits: the settings of their trials, their journals and their runs.
+
+The folder of a visit is named after the SHA-256 of the token in the participant's link. How far the participant is
+stands in the database only.
+"""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.errors import RecordError
+from experiments.record import records
+from experiments.record.journal import sync_folder
+from experiments.record.phases import TASK, TRAINING
+from experiments.record.run_directory import JOURNALS, VISIT
+from mjsim.support.files import write_text_atomically
+
+
+class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A phase that is over, as the event `phase_ended` has it; `reason` is why a training ended."""
+
+    phase: str
+    duration_s: float
+    reason: str | None = None
+    attempts: int | None = None
+
+
+class Stored(msgspec.Struct, frozen=True):
+    """Content of `visit.json`, which is written once."""
+
+    phase: str  # phase at which the folder was made
+    phases: list[str]  # played phases, in order
+    trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
+    ended: list[Ended] = []  # phases before the first trial
+    version: int = 1  # of this format
+
+
+@dataclass(frozen=True)
+class VisitFolder:
+    """Folder of one visit."""
+
+    path: Path
+    stored: Stored
+
+    def settings(self, phase: str) -> dict[str, Any]:
+        """Settings of the trial of a phase."""
+        return self.stored.trials[phase]
+
+    def run(self, phase: str) -> Path:
+        return self.path / phase
+
+    def journal(self, phase: str) -> Path:
+        return self.path / JOURNALS / phase
+
+    def is_over(self, phase: str) -> bool:
+        """True if the run directory of a phase has been written."""
+        return (self.run(phase) / records.METRICS).is_file()
+
+    def metrics(self, phase: str) -> dict[str, Any]:
+        """Content of `metrics.json` of a phase's run directory."""
+        found: dict[str, Any] = msgspec.json.decode((self.run(phase) / records.METRICS).read_bytes())
+        return found
+
+    def before(self, phase: str) -> list[dict[str, Any]]:
+        """Return the phases before the task as fields of `phase_ended` events; none for other phases."""
+        if phase != TASK:
+            return []
+        ended = [one for one in self.stored.ended if one.phase != TRAINING]
+        if self.is_over(TRAINING):
+            metrics = self.metrics(TRAINING)
+            duration = round(metrics.get("completion_time_s", 0.0), 3)
+            ended.append(Ended(TRAINING, duration, metrics["ended"]))
+        return [msgspec.to_builtins(one) for one in ended]
+
+    @property
+    def floor_plan(self) -> Path:
+        """Picture of the paths in the task."""
+        return self.run(TASK) / records.TOPDOWN
+
+
+class VisitFolders:
+    """Folders of all visits.
+
+    Attributes:
+        path: The folder that holds them.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path.mkdir(parents=True, exist_ok=True)
+        self.path = path
+
+    def create(
+        self,
+        name: str,
+        phases: Sequence[str],
+        trials: Mapping[str, dict[str, Any]],
+        ended: Sequence[Ended] = (),
+    ) -> VisitFolder:
+        """Make the folder of a visit, or return the one that exists.
+
+        Args:
+            name: Hash of the token of the participant's link.
+            phases: Played phases, in order.
+            trials: Settings of the trials, by phase.
+            ended: Phases before the first trial.
+        """
+        if (known := self.find(name)) is not None:
+            return known
+        folder = self.path / name
+        folder.mkdir(0o700, exist_ok=True)
+        stored = Stored(phases[0], list(phases), dict(trials), list(ended))
+        write_text_atomically(folder / VISIT, msgspec.json.encode(stored).decode())
+        sync_folder(folder)
+        sync_folder(self.path)
+        return VisitFolder(folder, stored)
+
+    def remove(self, name: str) -> None:
+        """Delete a visit with everything that was played in it."""
+        shutil.rmtree(self.path / name, ignore_errors=True)
+        sync_folder(self.path)
+
+    def find(self, name: str) -> VisitFolder | None:
+        """Return the folder of a visit, or None if there is none.
+
+        Raises:
+            RecordError: Its `visit.json` is damaged.
+        """
+        path = self.path / name / VISIT
+        try:
+            return VisitFolder(path.parent, msgspec.json.decode(path.read_bytes(), type=Stored))
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except msgspec.DecodeError as error:
+            raise RecordError(f"{path} is damaged: {error}") from error
+
+    def all(self) -> list[VisitFolder]:
+        """Return the folders of all visits, by name."""
+        found = (self.find(path.parent.name) for path in sorted(self.path.glob(f"*/{VISIT}")))
+        return [one for one in found if one is not None]

@@ -1,0 +1,41 @@
+"""Tokens of links, and the keys by which participants of a platform are recognized."""
+
+import base64
+import hashlib
+import hmac
+import re
+import secrets
+
+TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")
+
+
+def new_token() -> str:
+    return secrets.token_urlsafe(32)
+
+
+def token_hash(token: str) -> str:
+    """SHA-256 of a token, hexadecimal. Only this hash is stored."""
+    return hashlib.sha256(token.encode()).hexdigest()
+
+
+class Keys:
+    """Keys and tokens that follow from a study's secret.
+
+    Args:
+        secret: The study's secret.
+        study: Name of the study.
+    """
+
+    def __init__(self, secret: bytes, study: str) -> None:
+        self._secret, self._study = secret, study
+
+    def person(self, platform_id: str) -> str:
+        """Return the key of a platform's participant, hexadecimal."""
+        return self._digest(f"key:{platform_id}").hex()
+
+    def token(self, platform_id: str) -> str:
+        """Return the token of a platform's participant, the same at each arrival."""
+        return base64.urlsafe_b64encode(self._digest(f"token:{platform_id}")).decode().rstrip("=")
+
+    def _digest(self, text: str) -> bytes:
+        return hmac.new(self._secret, f"{self._study}:{text}".encode(), hashlib.sha256).digest()
