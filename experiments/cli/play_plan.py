@@ -36,8 +36,7 @@ def _texts(arguments: argparse.Namespace) -> dict[str, Section]:
         section, _, word = name.partition("_")
         if word in texts.get(section, _NOTHING).words:
             texts[section] = replace(texts[section], words={**texts[section].words, word: text})
-    if arguments.questions:
-        texts[COMPREHENSION] = replace(texts[COMPREHENSION], items=questions_of(arguments))
+    texts[COMPREHENSION] = replace(texts[COMPREHENSION], items=questions_of(arguments))
     return texts
 
 
