@@ -13,10 +13,10 @@ from experiments.cli.play import questions_of, shown_phases
 from experiments.people.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
 from experiments.people.recruiter import OpenLink
 from experiments.people.store import Assignment, CellQuota
-from experiments.people.study_plan import trials_of
 from experiments.people.texts import Section, read_texts, story_file
 from experiments.procedure.story import story_text
 from experiments.record.phases import STORY, TRAINING
+from experiments.trials.training import trials_of
 from experiments.trials.trial_config import MAX_SEED, TrialConfig
 
 NAME = "play"  # name of the study in the database

@@ -9,7 +9,7 @@ from experiments.errors import ConfigError
 
 EXTRAS = {
     "study": ("matplotlib", "statsmodels"),
-    "people": ("wtforms", "sqlalchemy", "alembic", "prometheus_client"),
+    "people": ("argon2", "httpx", "prometheus_client"),
 }  # name of an extra -> modules that it brings
 
 

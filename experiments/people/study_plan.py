@@ -13,11 +13,7 @@ from experiments.people.recruitment import recruiter
 from experiments.people.store import Assignment, CellQuota
 from experiments.people.study_file import Study
 from experiments.record.origin import REHEARSAL
-from experiments.record.phases import TASK, TRAINING
-from experiments.trials.training import training_config
-from experiments.trials.trial_config import TrialConfig
-
-TRAINING_LIMIT = 24 * 3600.0  # seconds; no participant reaches it
+from experiments.trials.training import trials_of
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
@@ -60,9 +56,3 @@ def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None =
         film,
         rehearsal=study.rehearsal,
     )
-
-
-def trials_of(task: TrialConfig) -> Mapping[str, dict[str, Any]]:
-    """Return the settings of a task and of the training before it, by phase."""
-    training = msgspec.structs.replace(training_config(task), time_limit=TRAINING_LIMIT)
-    return {TRAINING: training.settings(), TASK: task.settings()}

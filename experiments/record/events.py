@@ -97,7 +97,7 @@ class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
         duration_s: Time spent reading, watching, or training, s.
         bins: Of a simulated participant's fly-through: receptacle -> time at which it came into view, s.
         reason: Why the training ended, as in `end`; the run directory `training` holds its record.
-        attempts: How often the questions about the story were answered, until all answers were right.
+        attempts: How often the questions about the story were answered. Only in logs from before version 0.3.
     """
 
     phase: Literal["story", "flythrough", "training"]

@@ -1,12 +1,16 @@
 """The training trial: one object, as long as it takes (PAPER section 7)."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from msgspec.structs import replace
 
-from experiments.record.phases import TASK
+from experiments.record.phases import TASK, TRAINING
 from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
-TRAINING_LIMIT = 3600.0  # s; generous
+TRAINING_LIMIT = 3600.0  # seconds, for a simulated participant
+HUMAN_TRAINING_LIMIT = 24 * 3600.0  # seconds, for a person; no one reaches it
 _TRAINING_SEED = 7  # sets the house of the training apart from that of the task
 
 
@@ -29,3 +33,9 @@ def training_config(config: TrialConfig) -> TrialConfig:
         story=None,
         time_limit=TRAINING_LIMIT,
     )
+
+
+def trials_of(task: TrialConfig) -> Mapping[str, dict[str, Any]]:
+    """Return the settings of a person's task and of the training before it, by phase."""
+    training = replace(training_config(task), time_limit=HUMAN_TRAINING_LIMIT)
+    return {TRAINING: training.settings(), TASK: task.settings()}

@@ -3,10 +3,9 @@
 import asyncio
 import re
 from datetime import datetime
-from typing import Any, get_args
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, get_args
 
-from argon2 import PasswordHasher
-from argon2.exceptions import VerifyMismatchError
 from sqlalchemy import insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
@@ -14,6 +13,9 @@ from experiments.errors import StoreError
 from experiments.people.store.engine import Database
 from experiments.people.store.tables import login, researcher
 from experiments.people.store.values import Researcher, Role, utc_now
+
+if TYPE_CHECKING:
+    from argon2 import PasswordHasher
 
 PASSWORD_MEMORY_KIB = 65_536  # what hashing a password takes, by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
@@ -31,7 +33,13 @@ class Researchers:
 
     def __init__(self, database: Database, memory_kib: int) -> None:
         self._database = database
-        self._hasher = PasswordHasher(memory_cost=memory_kib)
+        self._memory_kib = memory_kib
+
+    @cached_property
+    def _hasher(self) -> "PasswordHasher":
+        from argon2 import PasswordHasher  # `mjsim play` works without the extra `people`
+
+        return PasswordHasher(memory_cost=self._memory_kib)
 
     async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
         """Let somebody in. Raises StoreError if the name is taken or unusable, or the role unknown."""
@@ -63,6 +71,8 @@ class Researchers:
         if row is None:
             await self._hash(password)
             return None
+        from argon2.exceptions import VerifyMismatchError
+
         try:
             await asyncio.to_thread(self._hasher.verify, row.password, password)
         except VerifyMismatchError:

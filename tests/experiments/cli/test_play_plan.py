@@ -1,5 +1,8 @@
 """The plan of `mjsim play`: its questions and its phases."""
 
+import subprocess
+import sys
+
 import pytest
 from play_site import arguments_of
 
@@ -57,3 +60,10 @@ def test_every_visit_has_seeds_that_tables_can_hold():
     place = type("Place", (), {"person_id": 7, "house_seed": 2**63})
     settings = made.trials(place)["task"]
     assert settings["order_seed"] == 5 and settings["house_seed"] == 0
+
+
+def test_play_needs_no_extra():
+    missing = "argon2", "httpx", "prometheus_client", "aiomysql", "psycopg", "matplotlib", "statsmodels"
+    code = f"import sys; sys.modules |= dict.fromkeys({missing}); import experiments.cli.play_plan, "
+    code += "experiments.people.server.app, experiments.people.store"
+    subprocess.run([sys.executable, "-c", code], check=True)

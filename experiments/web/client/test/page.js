@@ -30,7 +30,7 @@ export function giveTexts() {
 export function showPage(name, data = {}) {
   const [, tasks, side] = template("hud").match(/tasks\(\) %}(.*?){% endmacro.*side\(texts\) %}(.*?){% endmacro/s);
   const text = template(name).replace("{{ hud.tasks() }}", tasks).replace("{{ hud.side(texts) }}", side);
-  const [, body] = text.match(/(<main.*<\/main>)/s);
+  const body = text.match(/<main.*<\/main>/s)?.[0] ?? text;
   const filled = body.replace(/{{ texts\.(\w+) }}/g, (_, key) => TEXTS[key]);
   document.body.innerHTML = filled.replace(/{[{%].*?[%}]}/g, "");
   giveTexts();

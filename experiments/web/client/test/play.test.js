@@ -112,13 +112,13 @@ describe("a trial", () => {
 
   test("is offered again on the first page of this browser", async () => {
     await opened();
-    showPage("story");
+    showPage("welcome");
     vi.resetModules();
     await import("../static/start.js");
     expect(part("continue").hidden).toBe(false);
     expect(part("continue").querySelector("a")?.pathname).toBe(location.pathname);
     await import("../static/end.js");
-    showPage("story");
+    showPage("welcome");
     vi.resetModules();
     await import("../static/start.js");
     expect(part("continue").hidden).toBe(true);
