@@ -17,7 +17,7 @@ from rich.progress import track
 from benchmarks.support.home_figures import WAY, figures, remade
 from benchmarks.support.requirements import outcome
 from mjsim.house.catalogue.generated_names import ROOMS
-from mjsim.support.sources import ROOT, digest_of
+from mjsim.support.files import ROOT, digest_of
 
 T = TypeVar("T")
 Rows = Sequence[dict[str, Any]]

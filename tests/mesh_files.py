@@ -9,7 +9,7 @@ import trimesh
 from PIL import Image
 from trimesh.visual.material import PBRMaterial, SimpleMaterial
 
-from mjsim.formats.scene.options import ImportOptions
+from mjsim.formats.scene.source_scene import ImportOptions
 
 _NOTHING = ImportOptions()
 Y_UP = trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0])

@@ -7,7 +7,7 @@ from typing import Any
 
 from experiments.cli import import_episodes
 from experiments.cli.options import HelpFormatter
-from mjsim.formats.scene.options import AXES, UNITS, ImportDecision, ImportOptions
+from mjsim.formats.scene.source_scene import AXES, UNITS, ImportDecision, ImportOptions
 from mjsim.importing import require_extra
 
 DESCRIPTION = """\

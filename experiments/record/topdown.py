@@ -17,9 +17,8 @@ from experiments.record.records import Event
 from hud.text import Typeface
 from hud.texts import HudTexts, filled
 from hud.theme import Face
-from mjsim.support.files import replacing
+from mjsim.support.files import replacing, source_digest
 from mjsim.support.kernels import cache_base
-from mjsim.support.sources import source_digest
 from mjsim.values.episode import Episode
 from mjsim.values.observation import Observation
 

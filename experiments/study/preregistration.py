@@ -26,8 +26,7 @@ from experiments.trials.batch_checks import check_names
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
-from mjsim.support.files import read_bytes, replacing
-from mjsim.support.sources import ROOT, source_digest
+from mjsim.support.files import ROOT, read_bytes, replacing, source_digest
 
 STUDY, DESIGN, MEASURES, EXCLUSIONS = "study.toml", "design.json", "measures.toml", "exclusions.json"
 VERSIONS, MANIFEST, CODE = "versions.json", "manifest.json", "code/"

@@ -18,8 +18,7 @@ from experiments.procedure.story import story_text
 from experiments.record.phases import STORY
 from experiments.trials.trial_config import PATHS, TrialConfig
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.support.files import read_bytes
-from mjsim.support.sources import PACKAGES, digest_of, source_digest
+from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
 # Code on which the record of a trial depends; what only looks at records is not here.

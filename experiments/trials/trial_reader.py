@@ -22,8 +22,7 @@ from experiments.record.run_directory import PACKED, TRIALS
 from experiments.trials.batch_folder import Stamp, StoredTrial, read_trial, stamp_of
 from experiments.trials.fingerprint import CODE
 from experiments.trials.workers import worker_pool
-from mjsim.support.files import replacing
-from mjsim.support.sources import source_digest
+from mjsim.support.files import replacing, source_digest
 
 ROWS = ".rows.jsonl.gz"
 UNSTAMPED: Stamp = ()

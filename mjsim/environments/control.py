@@ -12,9 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from dm_env import specs
 
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.values.actions import IDLE, Action, Move, Pick, Place
-from mjsim.values.errors import ActionError
+from mjsim.values.errors import ActionError, EnvironmentConfigError
 from mjsim.values.observation import Observation
 from mjsim.world.world import StepResult, World
 

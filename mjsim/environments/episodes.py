@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from mjsim.environments.errors import ViewerError
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.navigable import NavigablePoints
 from mjsim.house.scene.sampling import sample_episode
@@ -15,6 +14,7 @@ from mjsim.house.scene.scene import compose
 from mjsim.render import Labels, Renderer
 from mjsim.render.diagnostics import INSTALL_DM_CONTROL
 from mjsim.values.episode import Episode
+from mjsim.values.errors import ViewerError
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mjsim.environments.control import Continuous
 from mjsim.environments.core import ObservationDict
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.options import build, parse_options
 from mjsim.environments.viewer import InteractiveViewer, has_window
+from mjsim.values.errors import EnvironmentConfigError
 
 RENDER_SIZE = (640, 480)  # px
 

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.house.compiled.footprint import Footprint
+from mjsim.values.errors import EnvironmentConfigError
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import Any, Literal, TypeVar
 from mjsim.environments.control import CONTROLS, Control
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.episodes import EpisodeCache, sample
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
@@ -18,6 +17,7 @@ from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.compiled.house import compiled_house, navigable_floor
 from mjsim.house.compiled.navigable import NavigableBuilder
 from mjsim.values.episode import POINTS, Episode
+from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 

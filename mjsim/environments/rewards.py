@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.house.scene.scene import Scene
 from mjsim.values.episode import CAPACITY
+from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.observation import ObjectStatus, Observation
 
 HANDLING_TIME = 2.0  # s, about what a pick or a place takes

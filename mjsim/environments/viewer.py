@@ -6,8 +6,8 @@ import warnings
 from typing import Any
 
 from mjsim.environments.episodes import dm_control_physics
-from mjsim.environments.errors import ViewerError
 from mjsim.render.diagnostics import INSTALL_DM_CONTROL
+from mjsim.values.errors import ViewerError
 from mjsim.world.world import World
 
 _BACKEND = "MUJOCO_GL"

@@ -22,7 +22,7 @@ from trimesh.visual.material import PBRMaterial
 
 from mjsim.formats.gltf.reader import RECEPTACLE, SEMANTICS
 from mjsim.formats.mjcf_reader import read_mjcf
-from mjsim.formats.scene.meshes import Y_TO_Z
+from mjsim.formats.scene.mesh_files import Y_TO_Z
 from mjsim.formats.scene.source_scene import HouseOptions, Piece
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue

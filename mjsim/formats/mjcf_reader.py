@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
-from mjsim.formats.scene.meshes import primitive
+from mjsim.formats.scene.mesh_files import primitive
 from mjsim.formats.scene.source_scene import (
     TEXTURE_SIDE,
     HouseOptions,

@@ -10,9 +10,8 @@ import trimesh
 import yaml
 from trimesh.transformations import rotation_matrix, translation_matrix
 
-from mjsim.formats.scene.meshes import primitive
-from mjsim.formats.scene.options import ImportDecision
-from mjsim.formats.scene.source_scene import HouseOptions, Piece, SourceScene, left_out
+from mjsim.formats.scene.mesh_files import primitive
+from mjsim.formats.scene.source_scene import HouseOptions, ImportDecision, Piece, SourceScene, left_out
 from mjsim.formats.scene.surface import Floats
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief

@@ -11,10 +11,16 @@ import numpy as np
 import trimesh
 from trimesh.transformations import compose_matrix
 
-from mjsim.formats.scene.mesh_files import PLAIN
-from mjsim.formats.scene.meshes import primitive, read_parts
-from mjsim.formats.scene.options import ImportDecision
-from mjsim.formats.scene.source_scene import HouseOptions, Missing, Piece, SourceScene, left_out, numbers
+from mjsim.formats.scene.mesh_files import PLAIN, primitive, read_parts
+from mjsim.formats.scene.source_scene import (
+    HouseOptions,
+    ImportDecision,
+    Missing,
+    Piece,
+    SourceScene,
+    left_out,
+    numbers,
+)
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError

@@ -14,9 +14,8 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.files import MAX_EXTENDS, base_of
 from mjsim.house.catalogue.generated_names import parse_name
 from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, parse_house
-from mjsim.support.files import work_folder
+from mjsim.support.files import digest_of, work_folder
 from mjsim.support.kernels import cache_base
-from mjsim.support.sources import digest_of
 from mjsim.values.errors import HouseError
 
 # Modules outside the generator that a home follows from.

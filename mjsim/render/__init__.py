@@ -30,24 +30,34 @@ __all__ = [
 if TYPE_CHECKING:
     from mjsim.render.cameras import CameraPose
     from mjsim.render.context import GlInfo, gl_info
-    from mjsim.render.floorplan import FloorPlan, largest_scale, render_floorplan, render_house_map
     from mjsim.render.labels import Labels
-    from mjsim.render.layered import LayeredRenderer
     from mjsim.render.markers import MarkerLike
-    from mjsim.render.pictures import render_picture, render_pictures
+    from mjsim.render.pictures import (
+        FloorPlan,
+        largest_scale,
+        render_floorplan,
+        render_house_map,
+        render_picture,
+        render_pictures,
+    )
     from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
-    from mjsim.render.renderer import Frame, Renderer
+    from mjsim.render.renderer import Frame, LayeredRenderer, Renderer
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
         "cameras": ("CameraPose",),
         "context": ("GlInfo", "gl_info"),
-        "floorplan": ("FloorPlan", "largest_scale", "render_floorplan", "render_house_map"),
         "labels": ("Labels",),
-        "layered": ("LayeredRenderer",),
         "markers": ("MarkerLike",),
-        "pictures": ("render_picture", "render_pictures"),
+        "pictures": (
+            "FloorPlan",
+            "largest_scale",
+            "render_floorplan",
+            "render_house_map",
+            "render_picture",
+            "render_pictures",
+        ),
         "profiles": ("DRAFT", "FAST", "PROFILES", "QUALITY", "RenderProfile"),
-        "renderer": ("Frame", "Renderer"),
+        "renderer": ("Frame", "LayeredRenderer", "Renderer"),
     }
 
     def __getattr__(name):

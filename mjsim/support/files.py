@@ -1,4 +1,4 @@
-"""Reading files to an end and values strictly; writing files and folders whole or not at all.
+"""Reading files to an end and values strictly; writing files and folders atomically; digests of source code.
 
 Work in progress has a name that begins with `WORK`, in the folder of its final place. The work of killed processes is
 removed, once it is a day old, by the next process that writes into the same folder.
@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import errno
 import functools
+import hashlib
 import json
 import os
 import select
@@ -26,6 +27,8 @@ WORK = ".mjsim-work-"
 MAX_AGE = 24 * 3600  # s since the last change of a leftover, after which it is removed
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux's renameat2
+ROOT = Path(__file__).parents[2]  # folder of the packages
+PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 
 def check_input(path: Path) -> None:
@@ -172,3 +175,18 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
+
+
+@functools.cache
+def source_digest(*places: str) -> str:
+    """16 hex digits over Python sources, given by modules and folders in that of the packages; all if none is given."""
+    return digest_of(*(ROOT / place for place in places or PACKAGES))
+
+
+def digest_of(*places: Path) -> str:
+    """16 hex digits over Python files and the names under which they lie in `places`, which are files or folders."""
+    digest = hashlib.sha256()
+    for place in places:
+        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
+            digest.update(path.relative_to(place.parent).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

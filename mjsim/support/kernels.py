@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 
 from platformdirs import user_cache_path
 
-from mjsim.support.sources import ROOT, digest_of
+from mjsim.support.files import ROOT, digest_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 

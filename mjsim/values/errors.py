@@ -9,7 +9,9 @@
     ├── PersonError       a value of a person is out of range
     ├── PhysicsError      MuJoCo warned, or a state is not finite
     ├── StateError        a saved state does not fit the world, or the world is in the middle of a motion
-    └── RenderError       no GL context, or a frame cannot be drawn
+    ├── RenderError       no GL context, or a frame cannot be drawn
+    ├── EnvironmentConfigError, EnvironmentStateError   an option, or a call at this moment, is unusable
+    └── ViewerError       no window could be opened, or dm-control is not installed
 
 Every message names the offending value and what to do about it.
 """
@@ -61,6 +63,18 @@ class StateError(MjsimError):
 
 class RenderError(MjsimError):
     """No GL context could be made, or a frame cannot be drawn."""
+
+
+class EnvironmentConfigError(MjsimError):
+    """An option of the environment is unknown or unusable."""
+
+
+class EnvironmentStateError(MjsimError):
+    """A call is not possible now, such as a step before the first reset."""
+
+
+class ViewerError(MjsimError):
+    """No window could be opened, or dm-control is not installed."""
 
 
 def brief(text: str, limit: int = 600) -> str:

@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.support.sources import digest_of
+from mjsim.support.files import digest_of
 from mjsim.values.errors import StateError
 from mjsim.values.observation import ObjectStatus
 from mjsim.world.body.carrying import CarryingState

@@ -1,6 +1,7 @@
 """The public surface of mjsim, as a list: a name that appears or goes is a decision, and shows up here."""
 
 import ast
+import importlib
 import inspect
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import mjsim
+import mjsim.render
 
 PUBLIC = [
     "IDLE", "ActionResult", "Catalogue", "Episode", "FollowPath", "MjsimError", "Move", "Observation",
@@ -26,6 +28,17 @@ def test_the_public_names_are_these():
 def test_every_name_resolves_to_something_documented(name):
     value = getattr(mjsim, name)
     assert name == "IDLE" or (value.__name__ == name and value.__doc__)
+
+
+@pytest.mark.parametrize("name", mjsim.render.__all__)
+def test_every_name_of_rendering_is_found_where_type_checkers_see_it(name):
+    tree = ast.parse(Path(inspect.getfile(mjsim.render)).read_text(encoding="utf-8"))
+    module = next(
+        n.module
+        for n in ast.walk(tree)
+        if isinstance(n, ast.ImportFrom) and name in [a.name for a in n.names]
+    )
+    assert getattr(mjsim.render, name) is getattr(importlib.import_module(str(module)), name)
 
 
 def test_type_checkers_see_the_same_names():

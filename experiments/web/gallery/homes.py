@@ -20,8 +20,7 @@ from mjsim.house.catalogue.generated_names import parse_name
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import Renderer
-from mjsim.support.files import exchange, work_folder
-from mjsim.support.sources import source_digest
+from mjsim.support.files import exchange, source_digest, work_folder
 
 PLAN, VIEW = (480, 400), (300, 200)  # px
 PAGE, ABOUT = "index.html", "home.json"

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.sensors import house, person, task, vision
 from mjsim.environments.sensors.base import IMAGES, Sensor, SensorInput, unit_spec
+from mjsim.values.errors import EnvironmentConfigError
 
 __all__ = ["BUNDLES", "IMAGES", "SENSORS", "Sensor", "SensorInput", "resolve_sensors", "unit_spec"]
 

@@ -6,10 +6,10 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
 from mjsim.house.sight.sight import visible_objects
+from mjsim.values.errors import EnvironmentConfigError
 
 # Numbers of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot.
 MIN_LABEL = -1

@@ -16,9 +16,8 @@ import mujoco
 from mjsim.formats.gltf.export import export_scene, floor_json
 from mjsim.formats.gltf.store import GZIP
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.support.files import WORK, replacing, work_folder
+from mjsim.support.files import WORK, replacing, source_digest, work_folder
 from mjsim.support.kernels import UNUSED
-from mjsim.support.sources import source_digest
 
 _LEVEL = 9
 _COMPRESSED = (".webp",)  # endings of files that are so already

@@ -19,9 +19,9 @@ from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.store import SCENE
 from mjsim.formats.gltf.surfaces import Surface, drawn_scene, surfaces
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.compiled.rooms import RoomMap
-from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows

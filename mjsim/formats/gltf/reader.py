@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 from trimesh.transformations import quaternion_matrix, scale_matrix
 
-from mjsim.formats.scene.meshes import GLTF, SUFFIXES, Y_TO_Z, read_parts
-from mjsim.formats.scene.options import UNITS, ImportDecision
+from mjsim.formats.scene.mesh_files import GLTF, SCENE_SUFFIXES, Y_TO_Z, read_parts
 from mjsim.formats.scene.source_scene import (
     MAX_SIDE,
+    UNITS,
     Bin,
     HouseOptions,
+    ImportDecision,
     Missing,
     NamedRoom,
     Piece,
@@ -98,7 +99,7 @@ class _Habitat:
         self.bins: list[Bin] = []
         root = path.resolve().parent.parent
         self._files = {
-            p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *SUFFIXES))
+            p.name: p for p in sorted(root.rglob("*")) if p.name.endswith(("_config.json", *SCENE_SUFFIXES))
         }
 
     def rooms(self, name: str) -> tuple[NamedRoom, ...]:
@@ -169,7 +170,7 @@ class _Habitat:
         """The file of an asset, beside its template or elsewhere in the data set; None where it is not there."""
         mesh = (config or self._path).parent / asset
         found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
-        return found if found and found.name.endswith(SUFFIXES) else None
+        return found if found and found.name.endswith(SCENE_SUFFIXES) else None
 
 
 def _read(path: Path) -> dict[str, Any]:

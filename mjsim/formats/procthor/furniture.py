@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from mjsim.formats.procthor.plan import Thing
-from mjsim.formats.scene.meshes import primitive
+from mjsim.formats.scene.mesh_files import primitive
 from mjsim.formats.scene.source_scene import Piece
 from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import STYLE, used_materials

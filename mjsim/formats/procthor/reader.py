@@ -13,8 +13,7 @@ from trimesh.transformations import rotation_matrix
 from mjsim.formats.mjcf_reader import read_mjcf
 from mjsim.formats.procthor.furniture import Assets, Library, in_our_style
 from mjsim.formats.procthor.plan import PlanOpening, PlanWall, ProcthorPlan, Thing, read_plan
-from mjsim.formats.scene.options import ImportDecision
-from mjsim.formats.scene.source_scene import HouseOptions, NamedRoom, SourceScene, left_out
+from mjsim.formats.scene.source_scene import HouseOptions, ImportDecision, NamedRoom, SourceScene, left_out
 from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import used_materials
 from mjsim.generator.palette import surfaces

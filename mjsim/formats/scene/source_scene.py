@@ -1,4 +1,4 @@
-"""The scene that every reader returns, what the user may say about it, and helpers that readers share."""
+"""The scene that every reader returns, options and decisions of an import, and helpers that readers share."""
 
 import re
 from collections.abc import Iterator
@@ -10,13 +10,34 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from mjsim.formats.scene.options import UNITS, ImportDecision
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.values.errors import AssetError
 
+UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # metres; in the order of guessing
+AXES = ("y", "z")
 TEXTURE_SIDE = 512  # px, longest side of a picture
 MIN_SIDE, MAX_SIDE = 3.0, 60.0  # m, longest sides that houses have
 _STEP = 0.1  # m, of the rectangles that cover slanted outlines
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What the user gives; None for what is to be found out."""
+
+    units: str | None = None  # key of `UNITS`
+    up: str | None = None  # one of `AXES`
+    scale: float = 1.0  # factor on top of the unit
+    mass: float | None = None  # kg
+    density: float | None = None  # kg/m^3; not with `mass`
+
+
+@dataclass(frozen=True)
+class ImportDecision:
+    """One line of the report."""
+
+    what: str  # what was decided
+    choice: str  # how
+    reason: str = ""  # why, or what to do if it is not what was meant
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +88,7 @@ class SourceScene:
 class HouseOptions:
     """What the user gives; None for what is to be found out."""
 
-    units: str | None = None  # key of `mjsim.formats.scene.options.UNITS`
+    units: str | None = None  # key of `mjsim.formats.scene.source_scene.UNITS`
     up: str | None = None  # `y` or `z`
     scale: float = 1.0  # factor on top of the unit
     floor: float | None = None  # height of the floor in the source, m

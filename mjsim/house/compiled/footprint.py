@@ -1,9 +1,14 @@
-"""The floor plan of what a person cannot walk through: outlines of the compiled model's static geoms."""
+"""The floor plan of what a person cannot walk through: outlines of the compiled model's static geoms.
+
+A `Floor` holds those that stop the trunk, in a grid for kernels.
+"""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
@@ -13,6 +18,13 @@ from mjsim.values.errors import AssetError
 CIRCLE_SIDES = 32  # a circumscribed polygon covers 0.5 % of the radius too much, never too little
 
 _GEOM = mujoco.mjtGeom
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
+# A polygon around the unit circle, touching it at the middles of its sides, (k, 2).
+_CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
+CELL = 0.25  # m
+MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +113,58 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
     return repr(model.geom(geom).name or f"#{geom} of body {body}")
 
 
-_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-_ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
-# A polygon around the unit circle, touching it at the middles of its sides, (k, 2).
-_CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+class Floor(NamedTuple):
+    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels."""
+
+    # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
+    edges: NDArray[np.float64]
+    first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
+    boxes: NDArray[np.float64]  # each polygon's smallest and largest x, and smallest and largest y, m, (p, 4)
+    near: NDArray[np.int64]  # polygons that may touch the trunk, cell by cell
+    near_first: NDArray[np.int64]  # cell i, j has `near` from `near_first[i * columns + j]`, (cells + 1,)
+    origin_x: float  # corner of cell 0, 0, m
+    origin_y: float
+    rows: int  # cells along x
+    columns: int  # cells along y
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
+        """Outlines of the static geoms at the heights of a trunk of this radius, m."""
+        low, high = _TRUNK_BAND
+        return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
+
+    @classmethod
+    def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
+        """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
+        reach = radius + MARGIN
+        boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
+        low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
+        high = boxes[:, 2:].max(axis=0, initial=-np.inf) + reach if len(polygons) else np.ones(2)
+        rows, columns = (int(n) for n in np.ceil((high - low) / CELL))
+        i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
+        x, y = low[0] + CELL * i, low[1] + CELL * j
+        cells = shapely.box(x, y, x + CELL, y + CELL)
+        tree = shapely.STRtree([shapely.Polygon(polygon) for polygon in polygons])
+        cell, near = tree.query(cells, predicate="dwithin", distance=reach)
+        order = np.lexsort((near, cell))
+        edges = [_edges(polygon) for polygon in polygons]
+        counts = np.bincount(cell, minlength=rows * columns)
+        return cls(
+            edges=np.concatenate([np.zeros((0, 5)), *edges]),
+            first=np.cumsum([0, *(len(sides) for sides in edges)], dtype=np.int64),
+            boxes=np.ascontiguousarray(boxes[:, [0, 2, 1, 3]]),
+            near=np.ascontiguousarray(near[order].astype(np.int64)),
+            near_first=np.concatenate(([0], np.cumsum(counts))).astype(np.int64),
+            origin_x=float(low[0]),
+            origin_y=float(low[1]),
+            rows=rows,
+            columns=columns,
+        )
+
+
+def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Start, direction and length of the sides of a polygon (k, 2), shape (k, 5); none of length 0."""
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    lengths = np.hypot(sides[:, 0], sides[:, 1])
+    keep = lengths > 0.0
+    return np.column_stack((polygon[keep], sides[keep] / lengths[keep, None], lengths[keep]))

@@ -17,8 +17,8 @@ from mjsim.house.validation.floor_rules import check_floor, nowhere_to_stand
 from mjsim.house.validation.house_rules import check_house_file
 from mjsim.house.validation.object_rules import check_compiled_object
 from mjsim.house.validation.receptacle_rules import check_receptacle
+from mjsim.support.files import source_digest
 from mjsim.support.kernels import cache_base
-from mjsim.support.sources import source_digest
 from mjsim.values.errors import AssetError, MjsimError
 
 SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for

@@ -17,9 +17,16 @@ from mjsim.formats.procthor.reader import read_procthor
 from mjsim.formats.robocasa import SUFFIXES as ROBOCASA
 from mjsim.formats.robocasa import read_robocasa
 from mjsim.formats.scene.mesh_files import MAX_TRIANGLES
-from mjsim.formats.scene.meshes import SUFFIXES as MESHES
-from mjsim.formats.scene.options import ImportDecision
-from mjsim.formats.scene.source_scene import HouseOptions, Piece, SourceScene, left_out, moved, words_of
+from mjsim.formats.scene.mesh_files import SCENE_SUFFIXES as MESHES
+from mjsim.formats.scene.source_scene import (
+    HouseOptions,
+    ImportDecision,
+    Piece,
+    SourceScene,
+    left_out,
+    moved,
+    words_of,
+)
 from mjsim.formats.scene.surface import Floats
 from mjsim.formats.sdf import SUFFIXES as SDF
 from mjsim.formats.sdf import read_sdf
@@ -241,7 +248,7 @@ def _floor(pieces: Sequence[Piece]) -> Floats:
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
     """Draw the house from above; without OpenGL there is no picture, and the note says so."""
     from mjsim.house.compiled.house import compiled_house
-    from mjsim.render.floorplan import render_house_map
+    from mjsim.render.pictures import render_house_map
 
     loaded = Catalogue.load(str(catalogue))
     try:

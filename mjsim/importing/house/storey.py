@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mjsim.formats.scene.options import ImportDecision
-from mjsim.formats.scene.source_scene import Piece, left_out
+from mjsim.formats.scene.source_scene import ImportDecision, Piece, left_out
 from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.house.solids import LOW
 from mjsim.values.errors import AssetError

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mjsim.formats.scene.options import ImportDecision
+from mjsim.formats.scene.source_scene import ImportDecision
 from mjsim.formats.scene.surface import Floats
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue

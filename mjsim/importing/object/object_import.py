@@ -8,7 +8,7 @@ import trimesh
 from trimesh.transformations import translation_matrix
 
 from mjsim.formats.scene.mesh_files import missing_colours, read_surface
-from mjsim.formats.scene.options import ImportDecision, ImportOptions
+from mjsim.formats.scene.source_scene import ImportDecision, ImportOptions
 from mjsim.formats.scene.surface import Floats, Surface, cleaned
 from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.object.grip import Grip, find_grip

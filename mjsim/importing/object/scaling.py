@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mjsim.formats.scene.options import UNITS
+from mjsim.formats.scene.source_scene import UNITS
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import SIZE
 from mjsim.values.errors import AssetError

@@ -1,8 +1,10 @@
 """Carrying: the hands keep their postures and hold their loads clear of the house (`mjsim.world.body.postures`).
 
-A load that gets caught all the same slips out of the hand.
+A load that gets caught all the same slips out of the hand: its weld is stretched, or the hand is dragged far behind its
+servo.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,16 +18,50 @@ from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.inventory import LEFT, RIGHT
 from mjsim.values.motion_parameters import CarryingParameters
+from mjsim.world.body.grips import site_gap
 from mjsim.world.body.load_room import BodyMotion, drawn_in
 from mjsim.world.body.person import Person
 from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
 from mjsim.world.body.slots import object_corners
-from mjsim.world.body.strain import count_strain
 
+Floats = NDArray[np.float64]
+
+MAX_SERVO_LAG = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
 LOW, HIGH = 0.93, 1.60  # m, heights of carried objects
-
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object
+
+
+@kernel
+def count_strain(
+    pose: Floats,
+    targets: Floats,
+    site_xpos: Floats,
+    sites: NDArray[np.intp],
+    held: tuple[bool, bool],
+    max_error: float,
+    patience: float,
+    strained: NDArray[np.int64],
+) -> int:
+    """Count the control steps for which each hand's weld has been stretched by more than `max_error`, m.
+
+    Returns the hands whose count in `strained` (2,) has reached `patience`: 1 for the left one, 2 for the right one, 3.
+    """
+    slipping = 0
+    for hand in range(2):
+        if not held[hand]:
+            strained[hand] = 0
+            continue
+        lag = 0.0
+        for axis in range(3):
+            lag += (pose[4 + 3 * hand + axis] - targets[hand, axis]) ** 2
+        first, second = sites[hand, 0], sites[hand, 1]
+        error = site_gap(site_xpos, first, second) if first >= 0 else 0.0
+        tense = error > max_error or math.sqrt(lag) > MAX_SERVO_LAG
+        strained[hand] = strained[hand] + 1 if tense else 0
+        if strained[hand] > patience:
+            slipping += 1 << hand
+    return slipping
 
 
 @dataclass(frozen=True, eq=False)

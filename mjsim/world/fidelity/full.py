@@ -1,6 +1,11 @@
-"""Everything in physics: walking, reaching, carrying, releasing."""
+"""Everything in physics: walking, reaching, carrying, releasing.
 
+MuJoCo's timers of every physics step are turned off. They would take a twentieth of a trial.
+"""
+
+import functools
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -8,6 +13,7 @@ from numpy.typing import NDArray
 
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
+from mjsim.support.kernels import c_function
 from mjsim.values.actions import IDLE, ActionResult, Move, Pick, Place, StepAction
 from mjsim.values.errors import ActionError, StateError
 from mjsim.values.inventory import LEFT, RIGHT
@@ -16,11 +22,9 @@ from mjsim.values.options import WorldOptions
 from mjsim.world.body.carrying import Carrying
 from mjsim.world.body.feasibility import resolve_pick, resolve_place
 from mjsim.world.body.grips import Grips
+from mjsim.world.body.hand_motions import pick, place
 from mjsim.world.body.person import Motion, Person
-from mjsim.world.body.picking import pick
-from mjsim.world.body.placing import place
 from mjsim.world.body.rig import Rig
-from mjsim.world.fidelity.engine_clock import stop_engine_clock
 from mjsim.world.fidelity.episode_state import EpisodeState
 from mjsim.world.fidelity.tier import Tier
 from mjsim.world.health.monitor import HealthMonitor
@@ -29,6 +33,24 @@ from mjsim.world.state import PersonState, StateHash, WorldState, set_physics, t
 
 # The next object may push a delivered one a little; farther out than this it has left its receptacle.
 _DISLODGED_MARGIN = 0.03  # m
+
+
+def stop_engine_clock() -> None:
+    """Have MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless a clock is set.
+
+    `mujoco.set_mjcb_time(None)` brings MuJoCo's own clock back.
+    """
+    if mujoco.get_mjcb_time() is None:
+        mujoco.set_mjcb_time(_no_time().ctypes)
+
+
+@functools.cache
+def _no_time() -> Any:
+    return c_function("float64()", _zero)
+
+
+def _zero() -> float:
+    return 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.clearance import ClearanceField
-from mjsim.house.compiled.trunk_floor import Floor
+from mjsim.house.compiled.footprint import Floor
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
 from mjsim.values.steps import States

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.trunk_floor import Floor
+from mjsim.house.compiled.footprint import Floor
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel

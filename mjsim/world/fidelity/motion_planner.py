@@ -1,6 +1,6 @@
 """Picks and places computed without physics, with the times and speeds of `mjsim.values.person_parameters`.
 
-Only the fall of a released object is physics. Success is decided by the same test as in `mjsim.world.body.placing`.
+Only the fall of a released object is physics. Success is decided by the same test as in `world.body.hand_motions`.
 """
 
 import math
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from mjsim.house.compiled.receptacles import ReceptacleGeometry
 from mjsim.values.actions import ActionResult, EventKind, Place
+from mjsim.world.body.hand_motions import hover_height, square_heading
 from mjsim.world.body.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.load_room import BodyMotion
-from mjsim.world.body.placing import hover_height, square_heading
 from mjsim.world.body.slots import LoadExtent, Slot, best_slot, object_corners
 from mjsim.world.fidelity import motion_primitives
 from mjsim.world.fidelity.body_state import FORWARD, HEADING, X, Y

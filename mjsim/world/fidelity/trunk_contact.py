@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
+from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
 from mjsim.world.fidelity.body_state import VX, VY, X, Y
 

@@ -19,7 +19,7 @@ from experiments.trials import batch, fingerprint, ray_workers
 from experiments.trials.batch import RAY, run_batch
 from experiments.trials.design import factorial
 from experiments.trials.trial_reader import read_trials
-from mjsim.support.sources import ROOT
+from mjsim.support.files import ROOT
 
 ONE = {"objects": [2], "assistance": ["optimal"], "fidelity": "event", "regret": False}
 DESIGN = factorial(**ONE, users=["follower"], seeds=range(4))

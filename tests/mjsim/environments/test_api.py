@@ -18,8 +18,13 @@ from small_worlds import episode_of
 import mjsim
 from mjsim.environments import gymnasium_environment, viewer
 from mjsim.environments.control import MOVES
-from mjsim.environments.errors import EnvironmentConfigError, EnvironmentStateError, ViewerError
-from mjsim.values.errors import ActionError, PhysicsError
+from mjsim.values.errors import (
+    ActionError,
+    EnvironmentConfigError,
+    EnvironmentStateError,
+    PhysicsError,
+    ViewerError,
+)
 from mjsim.world.world import World
 
 FORWARD, PICK, PLACE = MOVES.index("forward"), MOVES.index("pick"), MOVES.index("place")

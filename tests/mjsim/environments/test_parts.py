@@ -14,13 +14,12 @@ from small_worlds import episode_of
 import mjsim
 from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.episodes import EpisodeCache, sample
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
 from mjsim.house.compiled import navigable
 from mjsim.house.compiled.navigable import installed_builder
 from mjsim.values.actions import IDLE, Move, Pick, Place
-from mjsim.values.errors import ActionError, PhysicsError, SamplingError
+from mjsim.values.errors import ActionError, EnvironmentConfigError, PhysicsError, SamplingError
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World

@@ -12,11 +12,11 @@ from numpy.testing import assert_allclose
 from small_worlds import episode_of
 
 import mjsim
-from mjsim.environments.errors import EnvironmentConfigError
 from mjsim.environments.observation_layout import CameraOptions
 from mjsim.environments.sensors import SENSORS, Sensor, resolve_sensors, unit_spec
 from mjsim.environments.sensors.house import MAP_SIZE, RANGE, RAYS
 from mjsim.environments.sensors.vision import visible_pixels
+from mjsim.values.errors import EnvironmentConfigError
 
 # In the west room, looking at the crate in its corner. The cube is at the feet, too low to be in the picture; the
 # ball is ahead; the wedge is behind the partition.

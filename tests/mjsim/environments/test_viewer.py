@@ -10,7 +10,7 @@ import pytest
 from small_worlds import scene_of, world_of
 
 from mjsim.environments import viewer
-from mjsim.environments.errors import ViewerError
+from mjsim.values.errors import ViewerError
 
 
 class Parts:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjsim.render import CameraPose, LayeredRenderer, Renderer
-from mjsim.render.layered import REST
+from mjsim.render.renderer import REST
 
 # A floor, a wall, a ball that can move before and behind it, and a pane of glass that can move.
 SCENE = """<mujoco><worldbody>

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from experiments.trials.compile_notice import NOT_KEPT, NOTICE
-from mjsim.support import kernels, sources
+from mjsim.support import files, kernels
 
 CALLEE = "from mjsim.support.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
 CALLER = (
@@ -27,7 +27,7 @@ def _project(root):
         (root / package).mkdir()
         (root / package / "__init__.py").touch()
     (root / "mjsim" / "support").mkdir()
-    for module in (kernels, sources):
+    for module in (files, kernels):
         shutil.copy(module.__file__, root / "mjsim" / "support")
     (root / "planner/caller.py").write_text(CALLER, encoding="utf-8")
     _set(root, factor=1, offset=0)

@@ -15,7 +15,7 @@ import shapely
 
 from experiments.house import House
 from experiments.web.controls import Controls, Input, act, control_step
-from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
+from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.scene.scene import compose
 from mjsim.values.options import WorldOptions
 from mjsim.world.fidelity import kinematics

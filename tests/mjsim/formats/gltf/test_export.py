@@ -25,7 +25,7 @@ from mjsim.formats.gltf.export import export_episode, export_scene
 from mjsim.formats.gltf.store import GZIP, SCENE
 from mjsim.formats.gltf.surfaces import drawn_scene
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.trunk_floor import CELL, MARGIN, Floor
+from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.importing.object.house_extension import Entry, HouseExtension
 from mjsim.importing.object.mesh_import import add_mesh
 from mjsim.support.kernels import UNUSED

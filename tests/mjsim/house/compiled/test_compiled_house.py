@@ -13,8 +13,7 @@ from experiments.house import House
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.model_files import content_hash, read_model
 from mjsim.house.compiled import house
-from mjsim.house.compiled.house import compiled_house
-from mjsim.house.compiled.object_model import VISUAL_BODY, separate_visuals
+from mjsim.house.compiled.house import VISUAL_BODY, compiled_house, separate_visuals
 from mjsim.house.scene.scene import compose
 from mjsim.house.sight.drawn_state import drawn_state
 from mjsim.house.sight.sight import visible_objects

@@ -19,13 +19,13 @@ from small_worlds import dropped
 from benchmarks.support.placement_sessions import arrange, run_episode
 from experiments.cli import main as cli
 from experiments.house import House
-from mjsim.formats.scene.options import ImportOptions
+from mjsim.formats.scene.source_scene import ImportOptions
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.object_rules import check_object
 from mjsim.importing.object import house_extension
-from mjsim.importing.object.atlas import SIDE, Atlas
 from mjsim.importing.object.house_extension import Entry, HouseExtension, held_in
+from mjsim.importing.object.look import SIDE, Atlas
 from mjsim.importing.object.mesh_import import add_mesh
 from mjsim.importing.object.object_import import import_object
 from mjsim.importing.object.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from small_worlds import do, scene_of, walk_to, world_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.trunk_floor import Floor
+from mjsim.house.compiled.footprint import Floor
 from mjsim.house.scene import avatar
 from mjsim.house.sight.sight import visible_objects
 from mjsim.values.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
