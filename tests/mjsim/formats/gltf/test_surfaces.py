@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from glb_files import File, cast
 
-from mjsim.formats.gltf.glb import UPRIGHT, Glb, Images
+from mjsim.formats.gltf.glb import UPRIGHT, Glb
 from mjsim.formats.gltf.lights import lights_of
 from mjsim.formats.gltf.surfaces import drawn_scene, surfaces
+from mjsim.formats.gltf.textures import Images
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.rasteriser import Rasteriser
