@@ -103,13 +103,15 @@ def test_doctor_imports_what_it_lists(tmp_path):
     assert "shapely is broken" in done.stdout
 
 
-def _install_fake(folder, package):
-    (folder / package).mkdir()
-    (folder / package / "__init__.py").touch()
+def _install_fake(folder, *packages):
+    for package in packages:
+        (folder / package).mkdir()
+        (folder / package / "__init__.py").touch()
     info = folder / "gadgets-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: gadgets\nVersion: 1.0\n")
-    (info / "RECORD").write_text(f"{package}/__init__.py,,\ngadgets-1.0.dist-info/METADATA,,\n")
+    lines = [f"{package}/__init__.py,,\n" for package in packages]
+    (info / "RECORD").write_text("".join([*lines, "gadgets-1.0.dist-info/METADATA,,\n"]))
 
 
 def _command_line(words, path):
@@ -121,13 +123,15 @@ def _command_line(words, path):
     )
 
 
-@pytest.mark.parametrize("package", ["planner", "hud"])
-def test_doctor_names_a_distribution_that_hides_a_package(tmp_path, package):
-    _install_fake(tmp_path, package)
+def test_doctor_names_a_distribution_that_hides_packages(tmp_path):
+    _install_fake(tmp_path, "planner", "hud")
     done = _command_line("doctor", f"{tmp_path}:{CHECKOUT}")
     assert done.returncode == 1
-    assert f"imports {package} from {tmp_path.resolve() / package} instead of" in done.stdout
-    assert f"the distribution gadgets installs a package {package} too: pip uninstall gadgets" in done.stdout
+    for package in ("planner", "hud"):
+        assert f"imports {package} from {tmp_path.resolve() / package} instead of" in done.stdout
+        assert (
+            f"the distribution gadgets installs a package {package} too: pip uninstall gadgets" in done.stdout
+        )
 
 
 def test_doctor_names_a_distribution_that_hides_nothing_yet(tmp_path):
