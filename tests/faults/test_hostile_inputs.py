@@ -8,11 +8,11 @@ import time
 from pathlib import Path
 
 import pytest
+from hostile import warm_commands
+from hostile.cases import case_factory
+from hostile.warm_commands import REFUSED, UNSTABLE, USED, Case, CaseFactory, run_cases
 
 from experiments.errors import ConfigError
-from faults import warm_commands
-from faults.hostile_cases import case_factory
-from faults.warm_commands import REFUSED, UNSTABLE, USED, Case, CaseFactory, run_cases
 from mjsim.support.files import WORK
 
 

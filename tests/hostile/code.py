@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from user_code import condition, participant, planner
 
-from faults.hostile_files import Rng, pick
-from faults.warm_commands import REFUSED, Case
+from hostile.files import Rng, pick
+from hostile.warm_commands import REFUSED, Case
 
 LIMIT = "0.5"  # s that a call may take
 RUN = "run --objects 2 --fidelity event --no-regret --no-floor-plan --no-video --time-limit 20 --out out"

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from faults.warm_commands import REFUSED
+from hostile.warm_commands import REFUSED
 
 Rng = np.random.Generator
 Change = Callable[[str, Rng], str | bytes]

@@ -9,9 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from faults.good_files import FAST, MESHES, PROBLEM, made_up_rows, prepare
-from faults.hostile_code import code_case, environment_case
-from faults.hostile_files import (
+from hostile.code import code_case, environment_case
+from hostile.files import (
     Rng,
     damage_file,
     damage_table,
@@ -22,7 +21,8 @@ from faults.hostile_files import (
     pick,
     rows_of,
 )
-from faults.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, CaseFactory
+from hostile.good_files import FAST, MESHES, PROBLEM, made_up_rows, prepare
+from hostile.warm_commands import CLOSED, PIPE, REFUSED, USED, Case, CaseFactory
 
 ODD = """
 nan inf -1 0 1e308 -0.0 -- - ١٢ 0x10 1_000 1,2 a:b None [] ../.. / /dev/full /dev/zero /dev/null keep.txt keep
