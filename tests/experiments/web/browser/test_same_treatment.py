@@ -1,8 +1,10 @@
 """What the page of a person says is what a film says: the same words from the same state, under every condition."""
 
+import dataclasses
 import functools
 import http.server
 import itertools
+import json
 import re
 import threading
 
@@ -12,8 +14,9 @@ import numpy as np
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
+from experiments.house import read_words
 from experiments.web.modules import STATIC
-from experiments.web.server.pages import CLIENT
+from experiments.web.server.pages import CLIENT, trial_texts
 from experiments.web.worker.viewer import page_hud
 from hud import stencils
 from hud.compose import compose
@@ -22,9 +25,13 @@ from hud.messages import message
 
 CONDITIONS = ("none", "highlight", "optimal", "guided", "highlight-regret", "optimal-bins")
 # What only one of them writes around the content: words for counts, titles, and what only screen readers say.
-PAGE_ALONE = {"put", "away", "of", "left", "in", "your", "hand", "done", "·", "✓", "i", "→"}
+PAGE_ALONE = {
+    "en": {"put", "away", "left", "in", "your", "hand", "done", "·", "✓", "i", "→"},
+    "de": {"weggeräumt", "linke", "in", "ihrer", "hand", "erledigt", "·", "✓", "i", "→"},
+}
 FILM_ALONE = {"•", "→", "·", "/"}
-PAGE = """<!doctype html><title>HUD</title><main id="play"><p id="progress"></p><p id="clock"></p><p id="room"></p>
+PAGE = """<!doctype html><meta charset="utf-8"><title>HUD</title>
+<main id="play"><p id="progress"></p><p id="clock"></p><p id="room"></p>
 {tasks}<div id="view"><button id="reach"></button><div id="pointer"></div><p id="message"></p></div>{side}</main>"""
 SHOW = """async (state) => {
     const { Hud } = await import("/hud.js");
@@ -42,8 +49,13 @@ SHOW = """async (state) => {
 }"""
 
 
+@pytest.fixture(params=["en", "de"])
+def language(request):
+    return request.param
+
+
 @pytest.fixture
-def page(chromium):
+def page(chromium, language):
     class Quiet(http.server.SimpleHTTPRequestHandler):
         def log_message(self, *_):
             pass
@@ -56,7 +68,9 @@ def page(chromium):
         .get_template("hud.html")
         .module
     )
-    content = PAGE.format(tasks=parts.tasks(), side=parts.side())
+    texts = trial_texts(read_words(language))
+    content = PAGE.format(tasks=parts.tasks(), side=parts.side(texts))
+    content += f'<script type="application/json" id="texts">{json.dumps(texts)}</script>'
     address = f"http://127.0.0.1:{serving.server_port}/"
     page.route(address, lambda route: route.fulfill(body=content, content_type="text/html"))
     page.goto(address)
@@ -79,17 +93,17 @@ def words(texts):
     return set(re.findall(r"[^\s,:/()]+", " ".join(texts).lower()))
 
 
-def test_page_and_film_say_the_same(page, drawn):
+def test_page_and_film_say_the_same(page, drawn, language):
+    texts = sample.texts(language)
     for name, steps in itertools.product(CONDITIONS, (0, 3)):
         drawn.clear()
-        view = sample.task(
-            4, steps=steps, message=message("picked", sample.TEXTS, object="Blue mug", receptacle="Dish bin")
-        )
+        bar = message("picked", texts, object="Blue mug", receptacle="Dish bin")
+        view = dataclasses.replace(sample.task(4, steps=steps, message=bar), texts=texts)
         state = condition(name)(view)
-        compose(np.zeros((1080, 1920, 3), np.uint8), state, sample.pictures(), sample.TEXTS)
+        compose(np.zeros((1080, 1920, 3), np.uint8), state, sample.pictures(), texts)
         shown = page.evaluate(SHOW, msgspec.to_builtins(page_hud(state).state) | {"clock": state.clock})
         film, on_page = words(drawn), words(shown["parts"])
-        assert on_page - film <= PAGE_ALONE, name
+        assert on_page - film <= PAGE_ALONE[language], name
         assert film - on_page <= FILM_ALONE, name
         assert shown["tasks"] == [item.text for item in state.checklist]
         assert shown["done"] == [item.done for item in state.checklist]
