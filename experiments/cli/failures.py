@@ -96,7 +96,7 @@ def _is_user_code(error: Exception) -> bool:
 
 def _own_place(error: Exception) -> str:
     """File and line of a user's own code that raised the cause of an error, empty if there is none."""
-    from experiments.blame import place
+    from experiments.errors import place
 
     return place(error.__cause__)
 

@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.blame import CALL_LIMIT
-from experiments.errors import ConfigError
+from experiments.errors import CALL_LIMIT, ConfigError
 from experiments.participants import participant_names
 from experiments.participants.distribution import Distributions
 from experiments.session.film_config import FilmConfig

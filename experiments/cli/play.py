@@ -3,11 +3,8 @@
 import argparse
 import asyncio
 import socket
-import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import msgspec
+from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import (
     PAGE_SETTINGS,
@@ -19,6 +16,7 @@ from experiments.cli.options import (
     seconds,
     trial_options,
 )
+from experiments.cli.play_phases import questions_of, shown_phases
 from experiments.cli.server import (
     add_server_options,
     check_public_url,
@@ -30,12 +28,10 @@ from experiments.cli.server import (
 )
 from experiments.cli.study.database import DATABASE, sqlite_url
 from experiments.errors import ConfigError
-from experiments.people.items import Item
 from experiments.record.origin import HUMAN
-from experiments.record.phases import FLYTHROUGH, PHASES, STORY, TASK, phases_of
+from experiments.record.phases import PHASES, TASK
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
-from mjsim.support.files import read_text
 from planner.solver import SOLVERS, solver
 
 if TYPE_CHECKING:
@@ -135,46 +131,6 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     if task.planner not in SOLVERS:  # those are loaded by the workers
         solver(task.planner)
     return task
-
-
-def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """The phases of a visit; a fly-through needs a film.
-
-    Raises:
-        ConfigError: There is no such phase.
-    """
-    return tuple(
-        name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
-    )
-
-
-def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
-    """Return the questions of the TOML file of --questions: tables [[question]] with `text`, `choices` and `answer`.
-
-    Raises:
-        ConfigError: The file cannot be read or used, or a phase that the options are about is not shown.
-    """
-    path: Path | None = arguments.questions
-    named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
-    if missing := [name for name in named if name not in shown_phases(arguments)]:
-        raise ConfigError(f"--minimum or --questions is about the phase {missing[0]}, which is not shown")
-    if path is None:
-        return ()
-    try:
-        asked = tomllib.loads(read_text(path)).get("question") or []
-        items = [
-            {"name": f"question_{number}", "kind": "choice", "text": one["text"]}
-            | {"choices": one["choices"], "right": one["answer"]}
-            for number, one in enumerate(asked, 1)
-        ]
-        found: tuple[Item, ...] = msgspec.convert(
-            items, Annotated[tuple[Item, ...], msgspec.Meta(min_length=1)]
-        )
-        return found
-    except OSError as error:
-        raise ConfigError(f"cannot read the questions {path}: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, msgspec.ValidationError) as error:
-        raise ConfigError(f"{path} has no questions: {error}") from error
 
 
 def _serve(arguments: argparse.Namespace, task: TrialConfig, listener: socket.socket) -> None:

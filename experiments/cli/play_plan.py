@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from experiments.cli.play import questions_of, shown_phases
+from experiments.cli.play_phases import questions_of, shown_phases
 from experiments.people.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
 from experiments.people.recruiter import OpenLink
 from experiments.people.store import Assignment, CellQuota

@@ -17,8 +17,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from experiments.blame import shown
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, shown
 from mjsim.support.files import read_text
 
 SHAPES = ("constant", "normal", "lognormal", "uniform", "beta", "mixture")

@@ -9,11 +9,10 @@ from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 from experiments.errors import StoreError
-from experiments.people import VISITS
 from experiments.people.collect import person_name, person_number, visit_name
 from experiments.people.copies import DATABASES, Copy, copies, forget_copies
 from experiments.people.export import DATA, RUNS
-from experiments.people.folders import VisitFolders
+from experiments.people.folders import VISITS, VisitFolders
 from experiments.people.store import Person, Store, change_database
 from experiments.study.table import ANALYSIS, FILES
 from experiments.trials.table import NAME, read_rows, write_tables

@@ -19,6 +19,8 @@ from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import JOURNALS, VISIT
 from mjsim.support.files import write_text_atomically
 
+VISITS = "visits"  # folder of a study's visits in its own folder
+
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     """A phase that is over, as the event `phase_ended` has it; `reason` is why a training ended."""

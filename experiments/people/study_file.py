@@ -24,6 +24,7 @@ from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
 from mjsim.support.files import read_bytes
 
+TEMPLATE = Path(__file__).with_name("template.toml")  # of `mjsim study init`
 PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from experiments.blame import definition, describe, shown
-from experiments.errors import UserCodeError
+from experiments.errors import UserCodeError, definition, describe, shown
 from experiments.session.user_code import is_own, user_code
 from planner.checker import check, replayed
 from planner.errors import ProblemError

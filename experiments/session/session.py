@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from experiments.blame import describe
-from experiments.errors import RecordError, SessionError, UserCodeError
+from experiments.errors import RecordError, SessionError, UserCodeError, describe
 from experiments.participants.base import Participant
 from experiments.record.reader import Record
 from experiments.record.writer import RecordWriter

@@ -10,8 +10,16 @@ from typing import Any, get_args
 
 import numpy as np
 
-from experiments.blame import CALL_LIMIT, PACKAGES, definition, describe, place, shown
-from experiments.errors import ConfigError, UserCodeError
+from experiments.errors import (
+    CALL_LIMIT,
+    PACKAGES,
+    ConfigError,
+    UserCodeError,
+    definition,
+    describe,
+    place,
+    shown,
+)
 from experiments.house import House
 from experiments.participants import participant
 from experiments.participants.base import Participant, Percept

@@ -8,8 +8,7 @@ from typing import Any
 
 import msgspec
 
-from experiments.blame import shown
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, shown
 from experiments.record.displays import Displays
 from experiments.record.metrics import CIRCUMSTANCES, Metrics
 from experiments.study.designs import FOLDER

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.blame import describe
-from experiments.errors import UserCodeError
+from experiments.errors import UserCodeError, describe
 from experiments.house import House
 from experiments.procedure.familiarise import Familiarisation, familiarise
 from experiments.record import records

@@ -13,6 +13,7 @@ from experiments.web.controls import Input
 from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
 from hud.state import HudState, Marker, MiniMap, Pointer
 
+HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable that tells the fork server the house of most sessions
 VERSION = 1  # of the head of a frame
 MAX_TEXT = 64 * 1024  # bytes of a message from the browser
 MAX_INPUTS = 64  # of one message

@@ -25,7 +25,7 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
-    from experiments.people import VISITS
+    from experiments.people.folders import VISITS
     from experiments.people.retention import forget_old
 
     visits, days, dry = arguments.folder / VISITS, study.settings.limits.keep_days, arguments.dry_run

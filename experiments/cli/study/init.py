@@ -22,7 +22,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from experiments.people import TEMPLATE
+    from experiments.people.study_file import TEMPLATE
     from experiments.record.run_directory import check_file
     from mjsim.support.files import read_text, write_text_atomically
 

@@ -109,9 +109,8 @@ async def _serve(
 ) -> None:
     import numpy as np
 
-    from experiments.people import VISITS
     from experiments.people.collect import check_people
-    from experiments.people.folders import VisitFolders
+    from experiments.people.folders import VISITS, VisitFolders
     from experiments.people.researcher.app import ResearcherServer, Watched
     from experiments.people.researcher.metrics import Metrics, Timed
     from experiments.people.retention import forget_daily

@@ -12,9 +12,8 @@ import numpy as np
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
-from experiments.people import VISITS
 from experiments.people.collect import collect
-from experiments.people.folders import VisitFolders
+from experiments.people.folders import VISITS, VisitFolders
 from experiments.people.phases.base import Phase
 from experiments.people.phases.comprehension import Comprehension
 from experiments.people.phases.played import Played

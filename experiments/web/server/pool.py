@@ -10,10 +10,9 @@ from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
-from experiments.web.protocol import LENGTH, WireMessage, decode_from_worker, packed
+from experiments.web.protocol import HOUSE, LENGTH, WireMessage, decode_from_worker, packed
 
 PRELOADED = "experiments.web.worker.preload"
-HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable that it reads
 SETTINGS = {
     "MALLOC_ARENA_MAX": "1",  # one heap for each thread would keep what each once needed
     "LP_NUM_THREADS": "1",  # of software rendering; many workers share the machine

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from experiments.blame import describe
+from experiments.errors import describe
 from experiments.web.protocol import Frame, Pictures, View
 from experiments.web.state import RUNNING, Trigger
 from experiments.web.worker.clock import Send

@@ -10,7 +10,7 @@ from queue import SimpleQueue
 
 import msgspec
 
-from experiments.blame import describe
+from experiments.errors import describe
 from experiments.house import House
 from experiments.record.run_directory import is_run
 from experiments.session.endings import INTERRUPTED

@@ -2,7 +2,7 @@
 
 import os
 
-from experiments.web.server.pool import HOUSE
+from experiments.web.protocol import HOUSE
 from experiments.web.worker import main as main
 from experiments.web.worker.houses import preload
 

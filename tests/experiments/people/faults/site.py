@@ -15,7 +15,7 @@ from sqlalchemy import create_engine, make_url, select, text, update
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 from benchmarks.support.study_people import PROXIED, ask
 from experiments.cli.main import main
-from experiments.people import VISITS
+from experiments.people.folders import VISITS
 from experiments.people.store.tables import payment
 from experiments.people.store.values import utc_now
 from experiments.record.journal import JOURNAL
