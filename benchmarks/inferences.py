@@ -14,10 +14,10 @@ import msgspec
 import numpy as np
 
 from experiments.analysis.statistics.effects import ALPHA
+from experiments.analysis.study.measures import read_measures
+from experiments.analysis.study.table import StudyTable, read_study
 from experiments.errors import StatisticsError
-from experiments.study import simulate as study
-from experiments.study.measures import read_measures
-from experiments.study.table import StudyTable, read_study
+from experiments.trials import simulate as study
 from experiments.trials.batch import run_batch
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.page import Picture
-from experiments.study.figures import svg
+from experiments.analysis.report.figures import svg
 from studies.published import Published
 from studies.score import EFFECT_SIZE, Score
 

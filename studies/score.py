@@ -15,10 +15,10 @@ import numpy as np
 from experiments.analysis.page import p_value
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.study.measures import LIKERT_PREFIX
+from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
 from experiments.record.origin import RECORDED
-from experiments.study.measures import LIKERT_PREFIX
-from experiments.study.table import StudyTable
 from experiments.trials.exclusions import LeftOut
 from studies.prediction import effect_found, log_score, population_interval, prediction_interval
 from studies.published import Direction, Published, PublishedTest

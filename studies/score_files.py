@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.analysis.page import Block, Paragraph, p_value, page, table
+from experiments.analysis.study.robustness import left_out_table
 from experiments.record.files import write_json
-from experiments.study.robustness import left_out_table
 from mjsim.support.files import write_text_atomically
 from studies.forest import forest
 from studies.published import Published, inconsistencies

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from experiments.analysis.statistics.anova import two_way_squares
+from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
-from experiments.study.table import StudyTable
 from studies.published import Published, PublishedTest
 
 Cell = tuple[str, int]

@@ -9,8 +9,8 @@ from scipy.stats import linregress
 from experiments.analysis.statistics.anova import Values, one_way, two_way
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.analysis.statistics.pairs import tukey_differs, tukey_quantile
+from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
-from experiments.study.table import StudyTable
 from studies.published import Direction, Published
 
 

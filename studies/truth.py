@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from experiments.analysis.statistics.anova import Values
-from experiments.study.table import StudyTable
+from experiments.analysis.study.table import StudyTable
 from studies.published import Published, PublishedTest
 from studies.score_population import effect_squares
 

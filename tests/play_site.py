@@ -10,10 +10,10 @@ from study_site import MadeInItsLoop
 
 from experiments.cli import play
 from experiments.cli.play_plan import NAME, plan_of_play
-from experiments.people.folders import VisitFolders
-from experiments.people.server.app import ServerOptions, VisitServer
-from experiments.people.server.procedure import Procedure
-from experiments.people.store import Store
+from experiments.visit.folders import VisitFolders
+from experiments.visit.procedure import Procedure
+from experiments.visit.server.app import ServerOptions, VisitServer
+from experiments.visit.store import Store
 
 
 def arguments_of(*words):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from experiments.study.measures import read_measures
-from experiments.study.table import study_table
+from experiments.analysis.study.measures import read_measures
+from experiments.analysis.study.table import study_table
 from studies.published import read_published
 
 SIZES = read_published().people.sizes()  # of the published study

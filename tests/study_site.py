@@ -13,14 +13,14 @@ import numpy as np
 from scripted_workers import ScriptedPool
 
 from experiments.cli.server import http_server, listen, url_of
-from experiments.people.folders import VisitFolders
-from experiments.people.researcher.app import ResearcherServer, Watched
-from experiments.people.researcher.metrics import Metrics, Timed
-from experiments.people.server.app import ServerOptions, VisitServer
-from experiments.people.server.procedure import Procedure
-from experiments.people.store import Store
-from experiments.people.study_file import read_people_study
-from experiments.people.study_plan import plan_of
+from experiments.study.file import read_people_study
+from experiments.study.plan import plan_of
+from experiments.study.researcher.app import ResearcherServer, Watched
+from experiments.study.researcher.metrics import Metrics, Timed
+from experiments.visit.folders import VisitFolders
+from experiments.visit.procedure import Procedure
+from experiments.visit.server.app import ServerOptions, VisitServer
+from experiments.visit.store import Store
 
 HOST = "127.0.0.1"
 PASSWORD = "correct horse battery"

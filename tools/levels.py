@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.house import House
 from experiments.record.run_directory import check_file
-from experiments.record.topdown import planned_path, task_picture
+from experiments.trials.floor_plan import planned_path, task_picture
 from experiments.trials.setup import prepared_planner, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from tools.gallery import save_png

@@ -11,10 +11,10 @@ from sqlalchemy import Engine, create_engine, insert
 
 from benchmarks.support.grown_records import Source, grow_visits
 from experiments.cli.study.database import DATABASE, sqlite_url
-from experiments.people.store import Store
-from experiments.people.store.tables import answer, assignment, person, phase, trial
-from experiments.people.study_file import read_people_study
 from experiments.record.phases import TASK
+from experiments.study.file import read_people_study
+from experiments.visit.store import Store
+from experiments.visit.store.tables import answer, assignment, person, phase, trial
 
 STUDY = """
 [[cells]]

@@ -13,9 +13,9 @@ from urllib.parse import urlsplit
 
 import httpx
 
-from experiments.people.tokens import token_hash
 from experiments.record.journal import JOURNAL
 from experiments.record.run_directory import JOURNALS
+from experiments.visit.tokens import token_hash
 
 PATIENCE = 400.0  # s; a loaded machine may be slow, and may have to compile all kernels first
 TASK_ALONE = ("--phases", "task")  # words of a server whose visits consist of the task

@@ -61,7 +61,7 @@ def film_house(
 
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.house import House
-    from experiments.procedure.film import write_flythrough
+    from experiments.session.film import write_flythrough
 
     columns = (
         TextColumn("frames of the film"),

@@ -124,7 +124,7 @@ def _gallery(arguments: argparse.Namespace) -> int:
 
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.trials.design import counted
-    from experiments.web.gallery.gallery import homes_of, write_gallery
+    from experiments.web.viewing.gallery import homes_of, write_gallery
 
     if not arguments.sources:
         raise ConfigError("a gallery needs houses: name some, such as apartment or generated:0:20")
@@ -153,7 +153,7 @@ def _gallery(arguments: argparse.Namespace) -> int:
 def _generate(arguments: argparse.Namespace) -> int:
     """Write the house of a seed into a folder, checked, with pictures: whole or not at all."""
     from experiments.house import House
-    from experiments.procedure.house_pictures import draw_house
+    from experiments.session.house_pictures import draw_house
     from mjsim.house.catalogue.model_files import copy_house
     from mjsim.support.files import exchange, work_folder
 

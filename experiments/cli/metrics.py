@@ -11,7 +11,7 @@ from typing import Any
 
 from experiments.cli.options import add_command, add_force
 from experiments.errors import RecordError, ReplayError
-from experiments.people.copies import note_derived
+from experiments.study.data.copies import note_derived
 from mjsim.support.files import write_text_atomically
 
 DESCRIPTION = """\

@@ -148,10 +148,10 @@ async def _serve_visits(
     import numpy as np
 
     from experiments.cli.play_plan import NAME, plan_of_play
-    from experiments.people.folders import VisitFolders
-    from experiments.people.server.app import ServerOptions, VisitServer
-    from experiments.people.server.procedure import Procedure
-    from experiments.people.store import Store
+    from experiments.visit.folders import VisitFolders
+    from experiments.visit.procedure import Procedure
+    from experiments.visit.server.app import ServerOptions, VisitServer
+    from experiments.visit.store import Store
 
     store = await Store.open(sqlite_url(arguments.out / DATABASE), NAME, "0" * 64)
     folders = VisitFolders(arguments.out.absolute())

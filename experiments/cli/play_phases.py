@@ -8,8 +8,8 @@ from typing import Annotated
 import msgspec
 
 from experiments.errors import ConfigError
-from experiments.people.items import Item
 from experiments.record.phases import FLYTHROUGH, STORY, phases_of
+from experiments.visit.texts.items import Item
 from mjsim.support.files import read_text
 
 

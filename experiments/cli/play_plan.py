@@ -10,14 +10,14 @@ import msgspec
 from msgspec.structs import replace
 
 from experiments.cli.play_phases import questions_of, shown_phases
-from experiments.people.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
-from experiments.people.recruiter import OpenLink
-from experiments.people.store import Assignment, CellQuota
-from experiments.people.texts import Section, read_texts, story_file
-from experiments.procedure.story import story_text
 from experiments.record.phases import STORY, TRAINING
+from experiments.session.story import story_text
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import MAX_SEED, TrialConfig
+from experiments.visit.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan
+from experiments.visit.recruiter import OpenLink
+from experiments.visit.store import Assignment, CellQuota
+from experiments.visit.texts import Section, read_texts, story_file
 
 NAME = "play"  # name of the study in the database
 MINUTES = 15.0

@@ -21,7 +21,7 @@ from experiments.errors import ConfigError, ReplayError
 from experiments.session.film_config import CAMERAS, FIRST_PERSON
 
 if TYPE_CHECKING:
-    from experiments.replay.replay import ReplayReport
+    from experiments.trials.replay.replay import ReplayReport
 
 DESCRIPTION = """\
 Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
@@ -106,9 +106,9 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars
-    from experiments.people.copies import note_derived
     from experiments.record.run_directory import check_file
-    from experiments.replay.replay import ReplayFilm, replay
+    from experiments.study.data.copies import note_derived
+    from experiments.trials.replay.replay import ReplayFilm, replay
 
     film = None
     if arguments.video is not None:

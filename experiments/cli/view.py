@@ -44,9 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     from experiments.cli.replay import run_of
     from experiments.cli.terminal import error_console, progress_bars
-    from experiments.people.copies import note_derived
     from experiments.record.run_directory import check_file
-    from experiments.web.view.page import view_page
+    from experiments.study.data.copies import note_derived
+    from experiments.web.viewing.page import view_page
     from mjsim.support.files import replacing
 
     if arguments.out is not None:

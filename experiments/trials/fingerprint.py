@@ -14,8 +14,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from experiments.participants import participant_names
-from experiments.procedure.story import story_text
 from experiments.record.phases import STORY
+from experiments.session.story import story_text
 from experiments.trials.trial_config import PATHS, TrialConfig
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.analysis.study.table import StudyTable
 from experiments.errors import RecordError, StatisticsError
 from experiments.participants.distribution import Distributions
 from experiments.record.origin import origin_of
-from experiments.study.table import StudyTable
 from experiments.trials.exclusions import LeftOut
 from mjsim.support.files import read_text
 from studies.calibration.inference import OBJECTS, Cells, Fit, Rows, fit
@@ -128,7 +128,7 @@ def _value(row: Any, name: str) -> float:
     value = row.get(f"behaviour_{name.replace('.', '_')}")
     if value is None:
         raise RecordError(
-            f"the pool has no {name}; its people must be guests, as in experiments/study/designs/pool.toml"
+            f"the pool has no {name}; its people must be guests, as in experiments/trials/designs/pool.toml"
         )
     return float(value)
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.page import Block, Paragraph, Picture, page, table
+from experiments.analysis.report.figures import svg
+from experiments.analysis.study.robustness import left_out_table
 from experiments.record.files import write_json
-from experiments.study.figures import svg
-from experiments.study.robustness import left_out_table
 from mjsim.support.files import write_text_atomically
 from studies.calibration.calibrate import Calibration, fitted_study
 from studies.calibration.inference import missed_orders

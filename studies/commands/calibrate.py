@@ -64,11 +64,11 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.cli.terminal import error_console, progress_bars
 
     require_extra("study")
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.table import read_study
     from experiments.errors import ConfigError
     from experiments.record.run_directory import check_file
-    from experiments.study.measures import read_measures
-    from experiments.study.simulate import study_path
-    from experiments.study.table import read_study
+    from experiments.trials.simulate import study_path
     from studies.calibration.calibrate import calibrate
     from studies.calibration.files import FILES, PAGE, write_calibration
     from studies.calibration.population import read_free_parameters

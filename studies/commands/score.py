@@ -39,10 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
         RecordError: The folder is no study, or files are in the way.
     """
     require_extra("study")
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.table import ANALYSIS, read_study
     from experiments.errors import ConfigError
     from experiments.record.run_directory import check_file
-    from experiments.study.measures import read_measures
-    from experiments.study.table import ANALYSIS, read_study
     from studies.published import read_published
     from studies.score import score
     from studies.score_files import FILES, write_score

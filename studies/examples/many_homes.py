@@ -22,9 +22,9 @@ from rich.console import Console
 from experiments.analysis.comparison_plot import mark_origin
 from experiments.analysis.statistics.by_house import differences_by_house
 from experiments.analysis.statistics.mixed import mixed_model
-from experiments.study.analysis import random_factors
-from experiments.study.measures import read_measures
-from experiments.study.table import StudyTable, read_study
+from experiments.analysis.study.analysis import random_factors
+from experiments.analysis.study.measures import read_measures
+from experiments.analysis.study.table import StudyTable, read_study
 from mjsim.support.files import replacing
 
 FIRST, SECOND = "none", "optimal"  # of the picture

@@ -14,9 +14,9 @@ from websockets.sync.client import connect
 
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 from benchmarks.support.ports import free_ports
-from experiments.people.store import Store, utc_now
-from experiments.people.store.hosts import SILENT
-from experiments.people.tokens import token_hash
+from experiments.visit.store import Store, utc_now
+from experiments.visit.store.hosts import SILENT
+from experiments.visit.tokens import token_hash
 
 PEOPLE = 6
 NOWHERE = (404, 502)  # whichever host NGINX asks last

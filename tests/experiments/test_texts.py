@@ -13,7 +13,7 @@ import pytest
 import experiments
 from experiments.errors import ConfigError
 from experiments.house import TEXTS, read_words
-from experiments.people.study_file import PHASES
+from experiments.study.file import PHASES
 from experiments.web.protocol import PauseReason
 from hud.compose import Compositor, compose
 from hud.conditions import condition
@@ -59,7 +59,8 @@ def replaced(key):
 def test_each_text_is_shown_somewhere():
     shown = code(
         "experiments/cli/play_plan.py",
-        "experiments/people/**/*.py",
+        "experiments/study/**/*.py",
+        "experiments/visit/**/*.py",
         "experiments/web/**/*.py",
         "hud/**/*.py",
         "experiments/record/*.py",

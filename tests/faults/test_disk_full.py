@@ -13,8 +13,8 @@ from msgspec import structs
 from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.files import read_json
-from experiments.replay.replay import replay
 from experiments.session.film_config import FilmConfig
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST
 

@@ -10,8 +10,8 @@ import pytest
 
 from experiments.record import records
 from experiments.record.files import read_json
-from experiments.replay.replay import replay
 from experiments.session.first_person import FilmConfig
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, PROBLEM, ROOT, one_line
 from mjsim.render import context
@@ -105,7 +105,7 @@ def test_a_driver_that_fails_late_costs_the_pictures_alone(
 ):
     """As a GPU that is lost: at the first frame, or in the middle of the film; the house was never drawn before."""
     cache = tmp_path_factory.mktemp("cache")
-    monkeypatch.setattr("experiments.record.topdown.cache_base", lambda: cache)
+    monkeypatch.setattr("experiments.trials.floor_plan.cache_base", lambda: cache)
     context.gl_info()
     lost = Driver(context._PROCESS._gl, uses, error())
     monkeypatch.setattr(context._PROCESS, "_gl", lost)

@@ -15,8 +15,8 @@ import pytest
 from experiments.cli.main import main
 from experiments.record import records, run_directory
 from experiments.record.checksums import CHECKSUMS
-from experiments.replay.replay import replay
 from experiments.trials import trial
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_reader import ROWS
 from faults.conftest import BRIEF

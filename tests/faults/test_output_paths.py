@@ -73,7 +73,7 @@ def nothing_is_computed(monkeypatch):
     for name in ("experiments.house.House.load", "tools.gallery.take_pictures", "planner.solver.solver"):
         monkeypatch.setattr(name, fail)
     monkeypatch.setattr("experiments.cli.plan.solver", fail)
-    monkeypatch.setattr("experiments.replay.replay.replay", fail)
+    monkeypatch.setattr("experiments.trials.replay.replay.replay", fail)
     monkeypatch.setattr("mjsim.house.check.check_path", fail)
     monkeypatch.setattr("experiments.analysis.comparison.read_blocks", fail)
 

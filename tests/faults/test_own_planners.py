@@ -10,7 +10,7 @@ from experiments.errors import UserCodeError
 from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from faults.conftest import one_line

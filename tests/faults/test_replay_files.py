@@ -17,7 +17,7 @@ from experiments.record.files import read_arrays, read_json, save_arrays, write_
 from experiments.record.metrics import CIRCUMSTANCES
 from experiments.record.reader import read_run
 from experiments.record.verify import checksum_mismatches, derived_mismatches
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import TrialConfig, run_trial
 from faults.test_malformed_files import BAD_TEXTS
 

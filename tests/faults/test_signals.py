@@ -15,8 +15,8 @@ from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
 from experiments.record.writer import RecordWriter
-from experiments.replay.replay import replay
 from experiments.session.signals import PATIENCE, Stopped, signals_postponed, signals_raised
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST, ROOT, one_line
 from mjsim.support.files import WORK

@@ -112,8 +112,8 @@ def prepare(folder: Path) -> None:
 
 async def _played(folder: Path) -> None:
     """A study in which one person has played, and its backup."""
-    from experiments.people.store import Store
     from experiments.record.checksums import sha256_of
+    from experiments.visit.store import Store
 
     served = folder / "served"
     shutil.copytree(folder / "run", served / "visits" / ("a" * 64) / "task")

@@ -13,8 +13,8 @@ from experiments.cli import batch, play
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.records import EventLog
-from experiments.replay.log_source import LogSource
 from experiments.trials import setup
+from experiments.trials.replay.log_source import LogSource
 from experiments.trials.setup import prepare_session, prepared_planner
 from experiments.trials.trial_config import TrialConfig
 from mjsim.house.scene.scene import compose

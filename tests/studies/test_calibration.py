@@ -12,8 +12,8 @@ from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.participants.distribution import Distributions, distribution
 from experiments.participants.guest import PARAMETERS
 from experiments.record.origin import SIMULATED
-from experiments.study.simulate import read_study, study_path
 from experiments.trials.design import read_design
+from experiments.trials.simulate import read_study, study_path
 from experiments.trials.table import write_tables
 from studies import score_rules
 from studies.calibration import inference, surrogate

@@ -10,9 +10,9 @@ from msgspec import structs
 from scipy import stats
 from study_people import SIZES, made_up_people, table_of
 
+from experiments.analysis.study.measures import read_measures
 from experiments.cli.main import main
 from experiments.errors import StatisticsError
-from experiments.study.measures import read_measures
 from experiments.trials.table import write_tables
 from studies import score_rules
 from studies.prediction import log_score, prediction_interval

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from experiments.cli.main import main
-from experiments.record.topdown import PLANNED, house_picture
+from experiments.trials.floor_plan import PLANNED, house_picture
 from tools.gallery import SITUATIONS, contact_sheet
 
 

@@ -20,7 +20,7 @@ People who did not finish are left out, and so are those that --exclude selects 
 report lists them, the reasons, and how results change without each rule.
 
 Which column stands for which measure, and what the items of the survey are called, is fixed in
-experiments/study/designs/metrics.toml, or in a file of your own. docs/study.md explains how to read it. All output
+experiments/trials/designs/metrics.toml, or in a file of your own. docs/study.md explains how to read it. All output
 from simulated people is marked as such."""
 
 
@@ -53,14 +53,14 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra("study")
-    from experiments.people.copies import note_derived
-    from experiments.study.analysis import analyse
-    from experiments.study.files import check_files, write_analysis
-    from experiments.study.measures import read_measures
-    from experiments.study.preregistration import departures, read_preregistration
-    from experiments.study.report import report
-    from experiments.study.robustness import Selection, leave_one_out
-    from experiments.study.table import ANALYSIS, REPORT, people_path, read_people, study_table
+    from experiments.analysis.planning.preregistration import departures, read_preregistration
+    from experiments.analysis.report.report import report
+    from experiments.analysis.study.analysis import analyse
+    from experiments.analysis.study.files import check_files, write_analysis
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.robustness import Selection, leave_one_out
+    from experiments.analysis.study.table import ANALYSIS, REPORT, people_path, read_people, study_table
+    from experiments.study.data.copies import note_derived
     from experiments.trials.design import read_exclusions
     from experiments.trials.exclusions import Exclusions
 

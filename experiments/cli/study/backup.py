@@ -14,7 +14,7 @@ from experiments.cli.study.database import (
 )
 
 if TYPE_CHECKING:
-    from experiments.people.store import Store
+    from experiments.visit.store import Store
 
 DESCRIPTION = """\
 Write the whole database of a study, as of one moment, to a new file; the study may be served meanwhile. Journals and
@@ -37,8 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _back_up(store: "Store", arguments: argparse.Namespace) -> None:
-    from experiments.people.copies import note_copy
-    from experiments.people.store.copies import check_new
+    from experiments.study.data.copies import note_copy
+    from experiments.visit.store.copies import check_new
 
     check_new(arguments.out)  # what is not ours must not be noted as a copy
     note_copy(arguments.folder, "backup", arguments.out)

@@ -14,9 +14,9 @@ from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
-    from experiments.people.readiness.dry_run import Walked
-    from experiments.people.recruiter import Recruiter
-    from experiments.people.study_file import Study
+    from experiments.study.file import Study
+    from experiments.study.rehearsal.dry_run import Walked
+    from experiments.visit.recruiter import Recruiter
     from experiments.web.server.pool import WorkerPool
 
 DESCRIPTION = """\
@@ -47,10 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Check; 1 if there is a problem."""
     study = people_study(arguments)
     require_extra("study")
-    from experiments.people.phases import phases_of
-    from experiments.people.readiness.costs import durations, simulate
-    from experiments.people.readiness.problems import located, problems_of_file, problems_of_length
-    from experiments.people.study_plan import plan_of
+    from experiments.study.plan import plan_of
+    from experiments.study.rehearsal.costs import durations, simulate
+    from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
+    from experiments.visit.phases import phases_of
     from experiments.web.server.pool import WorkerPool
 
     if arguments.out is not None and arguments.out.exists() and not arguments.out.is_dir():
@@ -81,8 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _recruiter(study: "Study") -> "Recruiter":
     """The study's platform, or an open link where its codes are missing."""
-    from experiments.people.recruiter import OpenLink
-    from experiments.people.recruitment import recruiter
+    from experiments.study.recruitment import recruiter
+    from experiments.visit.recruiter import OpenLink
 
     try:
         return recruiter(study.settings.recruitment)
@@ -93,8 +93,8 @@ def _recruiter(study: "Study") -> "Recruiter":
 async def _walk(
     study: "Study", recruiter: "Recruiter", folder: Path, pool: "WorkerPool", out: Path | None
 ) -> "Walked":
-    from experiments.people.readiness.dry_run import dry_run
-    from experiments.people.readiness.pictures import BROWSERS, browser, camera, write_contact_sheet
+    from experiments.study.rehearsal.dry_run import dry_run
+    from experiments.study.rehearsal.pictures import BROWSERS, browser, camera, write_contact_sheet
 
     async def nothing(name: str, url: str) -> None:
         pass
@@ -127,7 +127,7 @@ def _print_length(study: "Study", seconds: dict[str, float], shortest: float, lo
 
 
 def _print_cost(study: "Study") -> None:
-    from experiments.people.readiness.costs import cost
+    from experiments.study.rehearsal.costs import cost
 
     pay, found = study.settings.pay, cost(study)
     print(f"cost      {study.people} people x {pay.reward:.2f} = {found.rewards:.2f} {pay.currency}")
@@ -139,7 +139,7 @@ def _print_cost(study: "Study") -> None:
 
 
 def _print_power(study: "Study", arguments: argparse.Namespace) -> None:
-    from experiments.people.readiness.costs import detectable
+    from experiments.study.rehearsal.costs import detectable
 
     for effect, size in detectable(study).items():
         print(
@@ -150,10 +150,10 @@ def _print_power(study: "Study", arguments: argparse.Namespace) -> None:
             "power     for a measure: mjsim study simulate, then mjsim study check --pool DIR (docs/study.md)"
         )
         return
-    from experiments.study.cost import StudyCost
-    from experiments.study.measures import read_measures
-    from experiments.study.power import Wanted, plan_power
-    from experiments.study.table import read_study
+    from experiments.analysis.planning.cost import StudyCost
+    from experiments.analysis.planning.power import Wanted, plan_power
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.table import read_study
 
     cells = [(cell.trials[0].assistance, cell.trials[0].objects) for cell in study.cells]
     wanted = Wanted(arguments.measure)

@@ -43,9 +43,9 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Collect; 1 if a run cannot be used."""
     require_extra("people")
-    from experiments.people.collect import TEXTS, collect, collect_visits, write_collected
-    from experiments.people.copies import note_copy, note_derived
     from experiments.record.run_directory import check_file
+    from experiments.study.data.collect import TEXTS, collect, collect_visits, write_collected
+    from experiments.study.data.copies import note_copy, note_derived
     from experiments.trials.table import NAME
 
     for name in (f"{NAME}.parquet", f"{NAME}.csv", TEXTS):

@@ -11,8 +11,8 @@ from experiments.errors import ConfigError, RecordError
 from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
-    from experiments.people.store import Store
-    from experiments.people.study_file import Study
+    from experiments.study.file import Study
+    from experiments.visit.store import Store
 
 T = TypeVar("T")
 DATABASE = "study.db"
@@ -28,8 +28,8 @@ def add_served_study(parser: argparse.ArgumentParser) -> None:
 def people_study(arguments: argparse.Namespace) -> "Study":
     """Read the study file of a command; a ConfigError if the extra `people` is missing or the file is unusable."""
     require_extra("people")
-    from experiments.people.study_file import read_people_study
-    from experiments.study.simulate import study_path
+    from experiments.study.file import read_people_study
+    from experiments.trials.simulate import study_path
 
     return read_people_study(study_path(arguments.study))
 
@@ -41,7 +41,7 @@ def with_store(
     url: str | None = None,
 ) -> T:
     """Open the database of a study, do `work` with it, and close it, also after a signal. Return the result."""
-    from experiments.people.store import Store
+    from experiments.visit.store import Store
 
     async def opened() -> T:
         store = await Store.open(url or database_url(arguments), study.settings.name, study.sha256)

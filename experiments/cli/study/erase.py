@@ -23,7 +23,7 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
-    from experiments.people.erase import erase
+    from experiments.study.data.erase import erase
 
     person, who = arguments.person, arguments.who
     erased = with_store(study, arguments, lambda store: erase(store, arguments.folder, person, who))

@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Export; 1 if a run cannot be used."""
     study = people_study(arguments)
-    from experiments.people.export import check_export, export
+    from experiments.study.data.export import check_export, export
 
     folder, out, force = arguments.folder, arguments.out, arguments.force
     check_export(out, replace=force)

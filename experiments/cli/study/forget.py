@@ -25,8 +25,8 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
-    from experiments.people.folders import VISITS
-    from experiments.people.retention import forget_old
+    from experiments.study.data.retention import forget_old
+    from experiments.visit.folders import VISITS
 
     visits, days, dry = arguments.folder / VISITS, study.settings.limits.keep_days, arguments.dry_run
     if days is None:

@@ -7,7 +7,7 @@ from experiments.cli.options import add_command
 from experiments.cli.study.database import add_database, add_served_study, people_study, with_store
 
 if TYPE_CHECKING:
-    from experiments.people.store import Store
+    from experiments.visit.store import Store
 
 DESCRIPTION = """\
 List the hosts that serve a study (`mjsim study serve --host-name`), let one of them take no new visits, or give away

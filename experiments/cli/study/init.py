@@ -22,8 +22,8 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from experiments.people.study_file import TEMPLATE
     from experiments.record.run_directory import check_file
+    from experiments.study.file import TEMPLATE
     from mjsim.support.files import read_text, write_text_atomically
 
     check_file(arguments.study, replace=arguments.force)

@@ -10,9 +10,9 @@ from experiments.cli.study.database import add_database, add_served_study, peopl
 from experiments.errors import ConfigError
 
 if TYPE_CHECKING:
-    from experiments.people.recruitment.payer import Payer
-    from experiments.people.store import Store
-    from experiments.people.study_file import Study
+    from experiments.study.file import Study
+    from experiments.study.payments.platform import Payer
+    from experiments.visit.store import Store
 
 DESCRIPTION = """\
 Print who gets what by the rules of [study.pay], why, and whether it was paid. What is printed is noted in the ledger,
@@ -59,8 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) -> int:
-    from experiments.people.recruitment import payer
-    from experiments.people.rehearsal.passed import require_rehearsal
+    from experiments.study.recruitment import payer
+    from experiments.study.rehearsal.passed import require_rehearsal
 
     client = payer(study.settings) if arguments.send or arguments.reject else None
     try:
@@ -82,8 +82,8 @@ async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) ->
 
 
 async def _print(store: "Store", study: "Study", *, dry: bool) -> None:
-    from experiments.people.payments import decide, due, undecided
-    from experiments.people.store.ledger import by_key, paid
+    from experiments.study.payments.rules import decide, due, undecided
+    from experiments.visit.store.ledger import by_key, paid
 
     history = await store.ledger.history()
     rejected = {event.person_id for event in history if event.kind == "rejection"}
@@ -108,7 +108,7 @@ async def _print(store: "Store", study: "Study", *, dry: bool) -> None:
 
 async def _send(store: "Store", study: "Study", client: "Payer") -> int:
     """Let the platform pay; 1 if something is still owed then."""
-    from experiments.people.sending import Sender
+    from experiments.study.payments.payouts import Sender
 
     async for sent in Sender(study.settings.name, store, client).send():
         print(f"{sent.key}  {sent.state}  {sent.text}", flush=True)
@@ -118,8 +118,8 @@ async def _send(store: "Store", study: "Study", client: "Payer") -> int:
 
 
 async def _reject(store: "Store", study: "Study", client: "Payer", arguments: argparse.Namespace) -> None:
-    from experiments.people.collect import person_number
-    from experiments.people.payments import reject
+    from experiments.study.data.collect import person_number
+    from experiments.study.payments.rules import reject
 
     if len(arguments.reason) < client.shortest_reason:
         raise ConfigError(

@@ -65,15 +65,15 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra("study")
+    from experiments.analysis.planning.cost import StudyCost
+    from experiments.analysis.planning.power import Wanted, plan_power
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.table import read_study
     from experiments.errors import ConfigError
     from experiments.record.files import write_json
     from experiments.record.run_directory import check_file
-    from experiments.study.cost import StudyCost
-    from experiments.study.measures import read_measures
-    from experiments.study.power import Wanted, plan_power
-    from experiments.study.simulate import study_path
-    from experiments.study.table import read_study
     from experiments.trials.design import read_design
+    from experiments.trials.simulate import study_path
 
     if arguments.seed < 0:
         raise ConfigError(f"--seed {arguments.seed} must not be negative")
@@ -103,11 +103,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _homes(arguments: argparse.Namespace) -> int:
     """Power by numbers of homes and people."""
+    from experiments.analysis.planning.homes_power import draw, homes_power
+    from experiments.analysis.study.measures import read_measures
+    from experiments.analysis.study.table import read_study
     from experiments.record.files import write_json
     from experiments.record.run_directory import check_file
-    from experiments.study.homes_power import draw, homes_power
-    from experiments.study.measures import read_measures
-    from experiments.study.table import read_study
 
     if arguments.plot is not None:
         check_file(arguments.plot, replace=arguments.force)

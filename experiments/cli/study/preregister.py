@@ -30,10 +30,10 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra("study")
+    from experiments.analysis.planning.preregistration import write_preregistration
+    from experiments.analysis.study.measures import FILE
     from experiments.record.run_directory import check_file
-    from experiments.study.measures import FILE
-    from experiments.study.preregistration import write_preregistration
-    from experiments.study.simulate import study_path
+    from experiments.trials.simulate import study_path
 
     check_file(arguments.out, replace=arguments.force)
     measures = FILE if arguments.measures is None else arguments.measures

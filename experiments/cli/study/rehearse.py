@@ -13,10 +13,10 @@ from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
 if TYPE_CHECKING:
-    from experiments.people.rehearsal.person import Rehearsed
-    from experiments.people.rehearsal.report import Report
-    from experiments.people.rehearsal.run import Settings
-    from experiments.people.study_file import Study
+    from experiments.study.file import Study
+    from experiments.study.rehearsal.person import Rehearsed
+    from experiments.study.rehearsal.report import Report
+    from experiments.study.rehearsal.run import Settings
 
 SHOWN = 20  # faults that are printed
 DESCRIPTION = """\
@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Rehearse; 1 if something went wrong."""
     study = people_study(arguments)
     require_extra("study")
-    from experiments.people.rehearsal.report import REPORT
-    from experiments.people.rehearsal.run import Settings
+    from experiments.study.rehearsal.report import REPORT
+    from experiments.study.rehearsal.run import Settings
 
     people = arguments.people or study.people
     settings = Settings(
@@ -81,9 +81,9 @@ async def _run(study: "Study", settings: "Settings", arguments: argparse.Namespa
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars
-    from experiments.people.rehearsal.report import report
-    from experiments.people.rehearsal.run import SERVED, rehearse
-    from experiments.people.store import Store
+    from experiments.study.rehearsal.report import report
+    from experiments.study.rehearsal.run import SERVED, rehearse
+    from experiments.visit.store import Store
 
     columns = TextColumn("people"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     outcomes: Counter[str] = Counter()
@@ -108,7 +108,7 @@ def _analyse(study: "Study", out: Path) -> None:
     """Analyse as real people are analysed; too few people for that are no fault of the study."""
     from experiments.cli.study import analyze
     from experiments.errors import RecordError
-    from experiments.people.rehearsal.report import TABLE
+    from experiments.study.rehearsal.report import TABLE
 
     exclude = None if study.exclusions is None else study.path
     given = {"exclude": exclude, "preregistration": None, "measures": None, "force": True}

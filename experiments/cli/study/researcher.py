@@ -18,7 +18,7 @@ from experiments.cli.study.database import (
 from experiments.errors import ConfigError
 
 if TYPE_CHECKING:
-    from experiments.people.store import Store
+    from experiments.visit.store import Store
 
 ROLES = ("owner", "assistant", "viewer")
 SHORTEST = 12  # characters of a password

@@ -26,8 +26,8 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra("people")
-    from experiments.people.copies import note_derived
-    from experiments.people.store import restore
+    from experiments.study.data.copies import note_derived
+    from experiments.visit.store import restore
 
     url = arguments.database
     if "://" not in url:

@@ -25,7 +25,7 @@ from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH
 
 if TYPE_CHECKING:  # imported when the command runs, so that other commands start fast
-    from experiments.people.study_file import Study
+    from experiments.study.file import Study
     from experiments.web.server.pool import WorkerPool
 
 SECRET_FILE, FILM = "secret", "flythrough.mp4"
@@ -70,12 +70,12 @@ def add_parser(commands: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
-    from experiments.people.copies import INDEX
-    from experiments.people.phases import phases_of
-    from experiments.people.study_plan import plan_of
+    from experiments.study.data.copies import INDEX
+    from experiments.study.plan import plan_of
+    from experiments.visit.phases import phases_of
 
     if arguments.rehearsal is not None:
-        from experiments.people.rehearsal.plan import rehearsed
+        from experiments.study.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
     phases_of(plan_of(study))  # custom phases or codes of the platform may be missing
@@ -109,15 +109,15 @@ async def _serve(
 ) -> None:
     import numpy as np
 
-    from experiments.people.collect import check_people
-    from experiments.people.folders import VISITS, VisitFolders
-    from experiments.people.researcher.app import ResearcherServer, Watched
-    from experiments.people.researcher.metrics import Metrics, Timed
-    from experiments.people.retention import forget_daily
-    from experiments.people.server.app import ServerOptions, VisitServer
-    from experiments.people.server.procedure import Procedure
-    from experiments.people.store import Store
-    from experiments.people.study_plan import plan_of
+    from experiments.study.data.collect import check_people
+    from experiments.study.data.retention import forget_daily
+    from experiments.study.plan import plan_of
+    from experiments.study.researcher.app import ResearcherServer, Watched
+    from experiments.study.researcher.metrics import Metrics, Timed
+    from experiments.visit.folders import VISITS, VisitFolders
+    from experiments.visit.procedure import Procedure
+    from experiments.visit.server.app import ServerOptions, VisitServer
+    from experiments.visit.store import Store
 
     url = arguments.database or sqlite_url(arguments.out / DATABASE)
     store = await Store.open(url, study.settings.name, study.sha256)

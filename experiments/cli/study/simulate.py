@@ -40,7 +40,7 @@ def add_study(parser: argparse.ArgumentParser, **settings: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate the people that are missing; 1 if a trial failed."""
     from experiments.cli.terminal import error_console
-    from experiments.study.simulate import read_study, study_path
+    from experiments.trials.simulate import read_study, study_path
 
     design = read_study(study_path(arguments.study), arguments.people)
     if (code := run_share(design, arguments, "simulated people")) is not None:

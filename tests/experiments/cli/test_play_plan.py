@@ -65,5 +65,5 @@ def test_every_visit_has_seeds_that_tables_can_hold():
 def test_play_needs_no_extra():
     missing = "argon2", "httpx", "prometheus_client", "aiomysql", "psycopg", "matplotlib", "statsmodels"
     code = f"import sys; sys.modules |= dict.fromkeys({missing}); import experiments.cli.play_plan, "
-    code += "experiments.people.server.app, experiments.people.store"
+    code += "experiments.visit.server.app, experiments.visit.store"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -20,10 +20,10 @@ from experiments.participants.follower import Follower
 from experiments.record import records
 from experiments.record.reader import read_run
 from experiments.record.records import EventLog, read_events
-from experiments.replay.replay import replay
 from experiments.session.perception import SessionPercept
 from experiments.trials.design import read_design
 from experiments.trials.person import check_person, drawn_person
+from experiments.trials.replay.replay import replay
 from experiments.trials.setup import draw_person, prepare_session
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

@@ -10,7 +10,7 @@ from benchmarks.support.agreement import run_in_tiers
 from experiments.participants.visit_executor import VisitExecutor
 from experiments.record import records
 from experiments.record.records import read_events
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.values.actions import WAIT, Move, Wait

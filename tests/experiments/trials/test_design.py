@@ -6,9 +6,9 @@ import pytest
 from sessions import prepared
 
 from experiments.errors import ConfigError
-from experiments.study.simulate import read_study, study_path
 from experiments.trials.design import numbers, read_design
 from experiments.trials.setup import trial_episode
+from experiments.trials.simulate import read_study, study_path
 from experiments.trials.trial_config import TrialConfig
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "designs"

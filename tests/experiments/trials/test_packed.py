@@ -6,12 +6,12 @@ from contextlib import closing
 import pytest
 from user_code import participant
 
+from experiments.analysis.planning.preregistration import _settings_of_runs
+from experiments.analysis.report.paths import _run_of
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.archive import adopt, new_archive, pack, run_paths
 from experiments.record.run_directory import TRIALS
-from experiments.study.paths import _run_of
-from experiments.study.preregistration import _settings_of_runs
 from experiments.trials import batch, trial_reader
 from experiments.trials.batch import run_batch
 from experiments.trials.batch_checks import check_trials

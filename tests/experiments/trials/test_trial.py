@@ -12,7 +12,7 @@ from user_code import participant
 from experiments.record import records
 from experiments.record.files import read_json
 from experiments.record.records import read_events
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from mjsim.values.episode import Episode

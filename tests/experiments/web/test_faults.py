@@ -13,7 +13,7 @@ from benchmarks.support.play_browser import SimulatedBrowser, begin_task
 from benchmarks.support.play_server import PlayProcess, fill_disk, parent_of, resident_memory, worker_of
 from experiments.record.phases import TASK
 from experiments.record.records import EVENTS, read_events
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 
 FAULTS_OF_A_VISIT = 12
 MAX_ROWS = 100

@@ -9,8 +9,8 @@ import pytest
 from nginx_site import NGINX
 
 from benchmarks.play import FAST
-from experiments.people.server.arrivals import NEW_PEOPLE
-from experiments.people.server.trials import SOCKETS_OF_A_PERSON
+from experiments.visit.server.admission import NEW_PEOPLE
+from experiments.visit.server.trials import SOCKETS_OF_A_PERSON
 from tests.experiments.web.hostile_machine import measure_hostile
 
 pytestmark = pytest.mark.slow

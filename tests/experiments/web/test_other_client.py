@@ -8,7 +8,7 @@ from benchmarks.play import FAST
 from benchmarks.support.play_server import PlayProcess
 from experiments.record import records
 from experiments.record.files import read_json
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from tests.experiments.web.other_client import OtherClient, begin_visit
 
 MOVED = 0.3  # m between two snapshots, which nobody walks

@@ -6,7 +6,7 @@ import msgspec
 
 from experiments.house import House
 from experiments.record import records
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
 from tests.experiments.web.browser.key_presser import KeyPresser, choose

@@ -3,7 +3,7 @@
 import pytest
 from study_site import served
 
-from tests.experiments.people.test_admission import CODES, PHASES, agree, ids, leave
+from tests.experiments.visit.server.test_admission import CODES, PHASES, agree, ids, leave
 from tests.experiments.web.browser.test_accessibility import violations
 
 RECRUITMENT = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
@@ -11,7 +11,7 @@ RECRUITMENT = f'[study.recruitment]\nplatform = "prolific"\n{CODES}'
 
 @pytest.mark.slow
 def test_who_waits_goes_on_also_without_scripts_and_who_began_here_continues(tmp_path, chromium, monkeypatch):
-    monkeypatch.setattr("experiments.people.server.trials.REFRESH", (1.0, 1.0))
+    monkeypatch.setattr("experiments.visit.server.trials.REFRESH", (1.0, 1.0))
     with served(tmp_path, PHASES + RECRUITMENT, workers=1) as site, site.client() as client:
         first, second, third, last = (site.begin(client, **ids(number)) for number in range(4))
         for link in (first, second, third):

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.play import FAST
 from benchmarks.support.play_server import PlayProcess
 from experiments.record.reader import read_run
-from experiments.replay.replay import ReplayFilm, as_seen, replay
+from experiments.trials.replay.replay import ReplayFilm, as_seen, replay
 from tests.experiments.web.browser.key_presser import choose
 from tools.drawn_pairs import decoded, ssim
 

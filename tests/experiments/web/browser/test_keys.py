@@ -10,7 +10,7 @@ from benchmarks.support.play_server import PlayProcess
 from experiments.house import House
 from experiments.record import records
 from experiments.record.records import read_events
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition_names

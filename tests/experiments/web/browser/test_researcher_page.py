@@ -56,7 +56,7 @@ def reading(site, link):
 
 @pytest.mark.parametrize("look", [DESK, PHONE])
 def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look, monkeypatch):
-    monkeypatch.setattr("experiments.people.researcher.app.PAGE_SIZE", 1)
+    monkeypatch.setattr("experiments.study.researcher.app.PAGE_SIZE", 1)
     link = consented(site)
     consented(site)
     page = chromium.new_context(**look).new_page()
@@ -111,7 +111,7 @@ def test_numbers_change_by_themselves_and_a_session_is_watched(site, request, br
 
 
 def test_all_works_without_scripts(site, chromium, monkeypatch):
-    monkeypatch.setattr("experiments.people.researcher.app.PAGE_SIZE", 1)
+    monkeypatch.setattr("experiments.study.researcher.app.PAGE_SIZE", 1)
     consented(site)
     consented(site)
     plain = chromium.new_context(java_script_enabled=False).new_page()

@@ -15,10 +15,10 @@ from nginx_site import NGINX, make_certificate, nginx_before
 
 from benchmarks.support.play_server import PATIENCE
 from benchmarks.support.ports import free_ports, listens
-from tests.experiments.people.platforms.emulator import SECRET
-from tests.experiments.people.platforms.external_question import ExternalQuestion
-from tests.experiments.people.platforms.prolific import STUDY as PROLIFIC_STUDY
-from tests.experiments.people.platforms.prolific import Prolific
+from tests.experiments.study.platforms.emulator import SECRET
+from tests.experiments.study.platforms.external_question import ExternalQuestion
+from tests.experiments.study.platforms.prolific import STUDY as PROLIFIC_STUDY
+from tests.experiments.study.platforms.prolific import Prolific
 from tests.experiments.web.browser.key_presser import WATCH
 from tests.experiments.web.browser.pages import FIREFOX, XVFB, Chromium, firefox, virtual_screen
 from tests.experiments.web.browser.study_visit import STUDY, StudyVisit

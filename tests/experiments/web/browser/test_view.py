@@ -5,7 +5,7 @@ import pytest
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.web.modules import STATIC
-from experiments.web.view.page import view_page
+from experiments.web.viewing.page import view_page
 
 HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card
 LOADED = "document.getElementById('debug').textContent === ''"

@@ -6,7 +6,7 @@ import cv2
 import pytest
 
 from experiments.cli.main import main
-from experiments.web.gallery import gallery
+from experiments.web.viewing import gallery
 from tests.example_house import write_example_house
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from experiments.record.reader import read_run
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from experiments.web.view import timeline
-from experiments.web.view.recorder import DECIMALS, RunRecorder
+from experiments.web.viewing import timeline
+from experiments.web.viewing.recorder import DECIMALS, RunRecorder
 
 ROUNDING = 0.51 * 10.0**-DECIMALS
 

@@ -16,7 +16,7 @@ from experiments.record.journal import read_entries
 from experiments.record.reader import read_journal
 from experiments.record.records import EVENTS, FILES, METRICS, TOPDOWN, TRAJECTORY
 from experiments.record.verify import damage
-from experiments.replay.replay import replay
+from experiments.trials.replay.replay import replay
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.controls import Input

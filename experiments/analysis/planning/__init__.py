@@ -1,0 +1,1 @@
+"""Planning of studies: power, homes, preregistration and cost."""

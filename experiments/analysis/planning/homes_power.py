@@ -1,0 +1,134 @@
+"""Power of a study in several homes: more homes, more people, or more trials of each?
+
+The variances are those of a mixed model of simulated people. The design is balanced: each condition has the same number
+of people, everybody has the same number of trials, and all conditions share the homes. Then what all conditions
+of a home share cancels, and the mean of a condition varies by people, by what it does in its homes, and by trials.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.statistics.mixed import MIN_LEVELS, mixed_model
+from experiments.analysis.statistics.power import power_of
+from experiments.analysis.study.analysis import random_factors
+from experiments.analysis.study.table import StudyTable
+from experiments.errors import ConfigError, StatisticsError
+from mjsim.support.files import replacing
+
+SLOPE = "house x assistance"
+
+
+@dataclass(frozen=True)
+class HomesPower:
+    """Power to find a difference between conditions, by numbers of homes and of people a condition."""
+
+    origin: str  # whether the people of the pool were simulated
+    column: str  # of the measure
+    trials: int  # of each person
+    means: Mapping[str, float]  # by condition
+    variances: Mapping[str, float]  # of people, of conditions within houses, and of what is left
+    homes: tuple[int, ...]
+    people: tuple[int, ...]  # of each condition
+    power: tuple[tuple[float, ...], ...]  # by homes and people
+
+
+def homes_power(
+    table: StudyTable,
+    measure: str,
+    homes: Sequence[int],
+    people: Sequence[int],
+    trials: int,
+    *,
+    difference: float | None = None,
+    alpha: float = 0.05,
+) -> HomesPower:
+    """Power of all these designs, `trials` of each person; people with several trials in several homes are the pool.
+
+    The means are those of the pool, or the extremes differ by `difference`, with the others in the middle. Raises
+    `ConfigError` for a design that is none, `StatisticsError` if the pool does not tell the variances.
+    """
+    if measure not in table.columns:
+        raise ConfigError(f"there is no measure {measure!r}; there are {', '.join(table.columns)}")
+    if min(homes) < MIN_LEVELS or min(people) < 2 or not 1 <= trials <= min(homes):
+        raise ConfigError(
+            f"homes {min(homes)}, people {min(people)}, trials {trials}: at least {MIN_LEVELS} homes, 2 people of a "
+            "condition, and 1 trial in each of the homes at most are possible"
+        )
+    variances = _variances(table, measure)
+    means = {c: float(values.mean()) for c, values in table.groups(measure).items()}
+    if difference is not None:
+        names = list(means)
+        means = dict.fromkeys(names, difference / 2) | {names[0]: 0.0, names[-1]: difference}
+    effect = list(means.values())
+    found = tuple(
+        tuple(power_of_design(effect, variances, n, m, trials, alpha) for m in people) for n in homes
+    )
+    return HomesPower(
+        table.origin, table.sources[measure], trials, means, variances, tuple(homes), tuple(people), found
+    )
+
+
+def _variances(table: StudyTable, measure: str) -> dict[str, float]:
+    here = table.take(np.flatnonzero(~np.isnan(table.columns[measure])))
+    factors = random_factors(here)
+    if missing := {"person", SLOPE} - set(factors):
+        raise StatisticsError(
+            f"the pool does not tell the variance of {', '.join(sorted(missing))}: people need several trials "
+            "(trials_per_person), and houses several trials of a condition"
+        )
+    model = mixed_model(here.columns[measure], here.assistance, here.objects, factors)
+    found = {name: model.random[name].variance for name in ("person", SLOPE)}
+    return found | {"residual": model.residual_variance}
+
+
+def power_of_design(
+    means: Sequence[float],
+    variances: Mapping[str, float],
+    homes: int,
+    people: int,
+    trials: int,
+    alpha: float = 0.05,
+) -> float:
+    """Power of the F test of the conditions, with Satterthwaite's degrees of freedom; `people` are of each condition.
+
+    No more homes are used than there are trials of a condition.
+    """
+    count, each = len(means), people * trials
+    used = min(homes, each)
+    left = variances["residual"]
+    of_people = left + trials * variances["person"]  # expected mean squares
+    of_homes = left + each / used * variances[SLOPE]
+    freedom = count * (people - 1), (count - 1) * (used - 1)
+    rest = max(count * each - sum(freedom) - used, freedom[0])  # no fewer, where people share no homes
+    variance = (of_people + of_homes - left) / each  # of the mean of a condition, but for what all share
+    parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
+    df2 = variance**2 * each**2 / float(parts.sum())
+    effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance
+    return power_of(effect / (1.0 + effect), count - 1, df2, 1, alpha)
+
+
+def draw(path: Path, found: HomesPower, measure: str) -> None:
+    """A line for each number of people: power by the number of homes."""
+    figure = Figure(figsize=(6.0, 3.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    for k, people in enumerate(found.people):
+        axes.plot(found.homes, [row[k] for row in found.power], "o-", ms=4, label=f"{people} people")
+    axes.axhline(0.8, color="#999999", lw=0.8, ls="--")
+    axes.set_xscale("log")
+    axes.set_xticks(found.homes, [str(n) for n in found.homes], minor=False)
+    axes.minorticks_off()
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel("homes")
+    axes.set_ylabel(f"power to find the effect on {measure}")
+    axes.legend(title=f"in a condition, {found.trials} trials each", fontsize=8, frameon=False)
+    axes.spines[["top", "right"]].set_visible(False)
+    mark_origin(figure, found.origin)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=120, metadata={"Software": "mjsim"})

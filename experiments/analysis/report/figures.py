@@ -1,0 +1,178 @@
+"""Figures of a study as inline SVG: no links, no scripts, equal bytes for equal data."""
+
+import io
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from experiments.analysis.comparison import mean_interval
+from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.page import Picture
+from experiments.analysis.study.analysis import Analysis
+from experiments.analysis.study.measures import LIKERT_PREFIX
+from experiments.analysis.study.table import ANSWERS, StudyTable
+
+# Okabe-Ito colours, distinct for all common kinds of colour vision.
+COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
+MARKERS = ("o", "s", "^", "D", "v", "P")
+ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
+RASTER_DPI = 200  # of dots that become a picture
+PANEL = (3.0, 2.6)  # inches
+JITTER = 0.12  # of a category's width
+MAX_DOTS = 2000  # dots that are drawn as vectors; more become a picture, which is smaller
+
+
+def by_condition(table: StudyTable, labels: Mapping[str, str]) -> Picture:
+    """A row of panels per measure: each person as a dot, and means with their 95 % confidence intervals."""
+    levels = table.levels()
+    figure = Figure(figsize=(PANEL[0] * len(levels), PANEL[1] * len(labels)), layout="constrained")
+    for panels, name in zip(grid(figure, len(labels), len(levels)), labels, strict=True):
+        for axes, objects in zip(panels, levels, strict=True):
+            _draw_people(axes, table, name, objects)
+            axes.set_ylim(*_limits(table, name))
+        panels[0].set_ylabel(labels[name], fontsize=8)
+    for axes, objects in zip(figure.axes, levels, strict=False):
+        axes.set_title(f"{objects} objects", fontsize=9)
+    caption = "Each dot is a person; black: means with 95 % confidence intervals (Student's t)."
+    return framed(figure, "Measures by condition and number of objects", table, caption)
+
+
+def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
+    groups = table.groups(name, objects)
+    for place, (condition, values) in enumerate(groups.items()):
+        # A fixed jitter: equal data give equal figures.
+        shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
+        dots = axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
+        dots[0].set_rasterized(len(values) > MAX_DOTS)
+        low, high = mean_interval(values) or (values.mean(), values.mean())
+        error = [[values.mean() - low], [high - values.mean()]]
+        axes.errorbar(place + 0.28, values.mean(), error, fmt="o", color="black", capsize=3, ms=5)
+    axes.set_xticks(range(len(groups)), list(groups))
+
+
+def interactions(table: StudyTable, labels: Mapping[str, str]) -> Picture:
+    """A panel per measure: means by number of objects, a line per condition, with 95 % confidence intervals."""
+    figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
+    for axes, name in zip(grid(figure, 1, len(labels))[0], labels, strict=True):
+        for k, condition in enumerate(table.conditions()):
+            _draw_line(axes, table, name, condition, shift=0.25 * (k - (len(table.conditions()) - 1) / 2))
+        axes.set_xticks(table.levels())
+        axes.set_xlabel("objects", fontsize=8)
+        axes.set_ylabel(labels[name], fontsize=8)
+        axes.set_ylim(*_limits(table, name))
+    figure.axes[0].legend(fontsize=7, frameon=False)
+    caption = (
+        "Means by number of objects with 95 % confidence intervals, beside each other. Each measure has the axis "
+        "of the figure above."
+    )
+    return framed(figure, "Means by number of objects and condition", table, caption)
+
+
+def variances(table: StudyTable, name: str, label: str) -> Picture:
+    """Distribution of a measure in each cell: a row of histograms per condition."""
+    levels, conditions = table.levels(), table.conditions()
+    figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
+    panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True, sharey=True)
+    values = table.columns[name][~np.isnan(table.columns[name])]
+    edges = np.linspace(values.min(), values.max() if np.ptp(values) else values.min() + 1.0, 16)
+    for row, condition in zip(panels, conditions, strict=True):
+        for axes, objects in zip(row, levels, strict=True):
+            found = table.groups(name, objects).get(condition)
+            if found is not None:
+                axes.hist(found, edges, color=_colour(table, condition))
+            axes.tick_params(labelsize=7)
+        row[0].set_ylabel(f"{condition}\n(people)", fontsize=8)
+    for axes, objects in zip(panels[0], levels, strict=True):
+        axes.set_title(f"{objects} objects", fontsize=8)
+    figure.supxlabel(label, fontsize=9)
+    caption = "Number of people by value, in each cell."
+    return framed(figure, f"Distribution of {label.lower()}", table, caption)
+
+
+def answers(analysis: Analysis) -> Picture:
+    """Shares of the answers to every survey item by condition, all numbers of objects together."""
+    table = analysis.table
+    items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
+    figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
+    for axes, item in zip(grid(figure, len(items), 1)[:, 0], items, strict=True):
+        groups = table.groups(item)
+        for place, values in enumerate(groups.values()):
+            left = 0.0
+            for answer, colour in zip(range(ANSWERS[0], ANSWERS[1] + 1), ANSWER_COLOURS, strict=True):
+                share = float((values == answer).mean())
+                axes.barh(-place, share, left=left, color=colour, height=0.8)
+                left += share
+        axes.set_yticks([-k for k in range(len(groups))], list(groups))
+        axes.set_title(analysis.measures.likert[item.removeprefix(LIKERT_PREFIX)], fontsize=9, loc="left")
+        axes.set_xlim(0, 1)
+    figure.supxlabel("share of people", fontsize=9)
+    caption = "Shares of the answers from 1 (brown, disagree) to 5 (violet, agree), all numbers of objects together."
+    return framed(figure, "Answers by condition", table, caption)
+
+
+def svg(figure: Figure, title: str, caption: str) -> Picture:
+    """A figure as a block of a page."""
+    FigureCanvasSVG(figure)
+    text = io.StringIO()
+    with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
+        figure.savefig(text, format="svg", dpi=RASTER_DPI, metadata={"Date": None})
+    found = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
+    found = found[found.index("<svg") :]
+    found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)
+    found = found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1)
+    drawing = Markup(found)  # nosec B704  # titles and drawings of this package
+    return Picture(drawing, caption)
+
+
+def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> Picture:
+    """A figure of a study, marked with the origin of its people."""
+    mark_origin(figure, table.origin)
+    return svg(figure, f"{title}. {table.origin}.", caption)
+
+
+def grid(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
+    panels: NDArray[Any] = figure.subplots(rows, columns, squeeze=False)
+    for axes in panels.ravel():
+        axes.tick_params(labelsize=7)
+        axes.spines[["top", "right"]].set_visible(False)
+    return panels
+
+
+def _limits(table: StudyTable, name: str) -> tuple[float, float]:
+    """Ends of the axis of a measure, the same in all figures."""
+    values = table.columns[name]
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = 0.04 * (high - low) or 0.5
+    return low - margin, high + margin
+
+
+def _colour(table: StudyTable, condition: str) -> str:
+    return COLOURS[table.conditions().index(condition) % len(COLOURS)]
+
+
+def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: float) -> None:
+    found = [(n, table.groups(name, n).get(condition)) for n in table.levels()]
+    known = [(n, v) for n, v in found if v is not None]
+    if not known:
+        return
+    means = np.array([v.mean() for _, v in known])
+    bounds = np.array([mean_interval(v) or (v.mean(), v.mean()) for _, v in known])
+    axes.errorbar(
+        [n + shift for n, _ in known],
+        means,
+        [means - bounds[:, 0], bounds[:, 1] - means],
+        color=_colour(table, condition),
+        marker=MARKERS[table.conditions().index(condition) % len(MARKERS)],
+        ms=4,
+        lw=1.3,
+        capsize=2,
+        label=condition,
+    )

@@ -1,0 +1,270 @@
+"""The analysis of a study: descriptions, tests and models; those that cannot be computed give a reason."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.analysis.comparison import Interval, mean_interval
+from experiments.analysis.statistics.anova import EFFECTS, Values, brown_forsythe, one_way, two_way, welch
+from experiments.analysis.statistics.by_house import HouseDifference, differences_by_house
+from experiments.analysis.statistics.diagnostics import diagnose
+from experiments.analysis.statistics.effects import FTest
+from experiments.analysis.statistics.mixed import MIN_LEVELS, MixedModel, WaldTest, mixed_model
+from experiments.analysis.statistics.mixtures import fit_mixtures
+from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, ordinal_model
+from experiments.analysis.statistics.pairs import compare_pairs
+from experiments.analysis.statistics.power import POWER, detectable_eta_squared
+from experiments.analysis.statistics.unequal import hc3, welch_james
+from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
+from experiments.analysis.study.table import StudyTable
+from experiments.errors import StatisticsError
+
+ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
+MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
+OUT_OF_MEMORY = (
+    "there is not enough memory; analyse fewer trials, or trials with fewer persons, houses or conditions"
+)
+STRICT = "nd_strict_2n"  # holds how many visits deviated, as its denominator is known
+
+
+Test = FTest | WaldTest | Chi2Test
+
+
+@dataclass(frozen=True)
+class Result:
+    """A test or model of a measure at a number of objects (None: over all), or the reason why it has no value."""
+
+    measure: str
+    kind: str
+    objects: int | None
+    value: Any
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Description:
+    """A measure in a cell; `interval` is Student's 95 % confidence interval of the mean, None for one person."""
+
+    measure: str
+    assistance: str
+    objects: int
+    people: int
+    mean: float
+    interval: Interval
+    deviation: float | None
+    median: float
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The people and measures of a study, with descriptions by measure and cell, tests and models."""
+
+    table: StudyTable
+    measures: Measures
+    descriptions: tuple[Description, ...]
+    results: tuple[Result, ...]
+
+    def find(self, measure: str, kind: str, objects: int | None = None) -> Result | None:
+        """The result of this measure, kind and number of objects."""
+        wanted = measure, kind, objects
+        return next((r for r in self.results if (r.measure, r.kind, r.objects) == wanted), None)
+
+    def as_json(self) -> dict[str, Any]:
+        sizes = [{"assistance": c, "objects": n, "people": k} for (c, n), k in self.table.sizes().items()]
+        return {
+            "origin": self.table.origin,
+            "people": len(self.table.rows),
+            "cells": sizes,
+            "notes": list(self.table.notes),
+            "left_out": [asdict(person) for person in self.table.left_out],
+            "gaps": [asdict(gap) for gap in self.table.gaps],
+            "columns": dict(self.table.sources),
+            "descriptions": [asdict(d) for d in self.descriptions],
+            "results": [vars(r) | {"value": plain(r.value)} for r in self.results],
+        }
+
+
+def plain(value: Any) -> Any:
+    if isinstance(value, FTest):
+        return value.as_json()
+    if isinstance(value, dict):
+        return {name: plain(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [plain(one) for one in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return value
+
+
+def analyse(table: StudyTable, measures: Measures) -> Analysis:
+    """Compute all descriptions, tests and models that the data allow."""
+    results = test_results(table, measures)
+    for name in table.columns:
+        if name in measures.objective or name.startswith(LIKERT_PREFIX):
+            for objects in table.levels():
+                work = partial(compare_pairs, table.groups(name, objects), measures.equivalence.pair)
+                results.append(_attempt(name, "pairs", objects, work))
+        if name in measures.objective:
+            results.append(_attempt(name, BY_HOUSE, None, partial(_by_house, table, name)))
+            results.append(_attempt(name, "diagnostics", None, partial(diagnose, cells_of(table, name))))
+    results += [more for r in results for more in _sensitivity(r, measures)]
+    results += _acceptance(table)
+    return Analysis(table, measures, tuple(_describe(table)), tuple(results))
+
+
+def test_results(table: StudyTable, measures: Measures) -> list[Result]:
+    """Everything that `tests_of` a result yields: F tests, mixed and ordinal models."""
+    results = []
+    for name in table.columns:
+        answers = name.startswith(LIKERT_PREFIX)
+        for objects in table.levels():
+            results += _answer_tests(table, name, objects) if answers else one_way_tests(table, name, objects)
+        if len(table.levels()) > 1 and not answers:
+            results += two_way_tests(table, name)
+        if name in measures.objective:
+            results.append(_attempt(name, MIXED, None, partial(_mixed, table, name)))
+            if len(set(table.numbers(ROOMS).tolist())) > 1:
+                work = partial(_mixed, table, name, ROOMS)
+                results.append(_attempt(name, f"{MIXED}, {ROOMS}", None, work))
+    return results
+
+
+def tests_of(result: Result) -> Iterator[tuple[str, Test]]:
+    """Tests of a result with the names of their effects."""
+    if isinstance(result.value, FTest):
+        yield EFFECTS[0], result.value
+    elif isinstance(result.value, OrdinalModel):
+        yield EFFECTS[0], result.value.test
+    elif isinstance(result.value, MixedModel):
+        yield from result.value.tests.items()
+    elif isinstance(result.value, dict):
+        yield from ((effect, test) for effect, test in result.value.items() if isinstance(test, FTest))
+
+
+def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], Any]) -> Result:
+    try:
+        return Result(measure, kind, objects, work(), None)
+    except StatisticsError as error:
+        return Result(measure, kind, objects, None, str(error))
+    except MemoryError:
+        return Result(measure, kind, objects, None, OUT_OF_MEMORY)
+
+
+def _sensitivity(result: Result, measures: Measures) -> Iterator[Result]:
+    """What a study of this size can show, of Fisher's analysis of a measure."""
+    test, bound = result.value, measures.equivalence.eta_squared
+    if result.kind == ONE_WAY and test is not None and not result.measure.startswith(LIKERT_PREFIX):
+        size = detectable_eta_squared(test.df1, test.df2, test.people)
+        of = result.measure, result.objects
+        yield Result(of[0], "equivalence", of[1], {"bound": bound, "p": test.p_of_equivalence(bound)}, None)
+        yield Result(of[0], "power", of[1], {"power": POWER, "detectable_eta_squared": size}, None)
+
+
+def one_way_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
+    """F tests of a measure at a number of objects."""
+    groups = table.groups(name, objects)
+    members = [c for c, values in groups.items() for _ in values]
+    pooled = np.concatenate([np.empty(0), *groups.values()]), np.array(members), np.zeros(len(members))
+    return [
+        _attempt(name, ONE_WAY, objects, partial(one_way, groups)),
+        _attempt(name, "welch", objects, partial(welch, groups)),
+        _attempt(name, "brown-forsythe", objects, partial(brown_forsythe, groups)),
+        _attempt(name, "HC3", objects, lambda: hc3(*pooled)[EFFECTS[0]]),
+    ]
+
+
+def two_way_tests(table: StudyTable, name: str) -> list[Result]:
+    """F tests of a measure over all numbers of objects."""
+    known = ~np.isnan(table.columns[name])
+    factors = table.columns[name][known], table.assistance[known], table.objects[known]
+    return [
+        _attempt(name, TWO_WAY, None, partial(two_way, *factors)),
+        _attempt(name, "two-way, Type III", None, partial(two_way, *factors, kind=3)),
+        _attempt(name, "two-way, Welch-James", None, partial(welch_james, *factors)),
+        _attempt(name, "two-way, HC3", None, partial(hc3, *factors)),
+    ]
+
+
+def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
+    """Known values of a column by cell, those of each number of objects together."""
+    return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
+
+
+def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
+    values, known = table.columns[name], ~np.isnan(table.columns[name])
+    if covariate is not None:
+        known &= ~np.isnan(table.numbers(covariate))
+    here = table.take(np.flatnonzero(known))
+    if len(set(here.assistance.tolist())) < 2:
+        raise StatisticsError("there is only one assistance condition")
+    with_covariate = None if covariate is None else (covariate, here.numbers(covariate))
+    return mixed_model(values[known], here.assistance, here.objects, random_factors(here), with_covariate)
+
+
+def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
+    """The house, and what repeats besides: people with several trials, their order, conditions within a house."""
+    rows, houses = len(table.rows), len(set(table.houses.tolist()))
+    found: dict[str, NDArray[Any]] = {}
+    if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
+        found["person"] = table.people
+        trials = table.numbers("trial_number")
+        if (
+            len(set(trials.tolist())) > 2 and not np.isnan(trials).any()
+        ):  # two levels say nothing of a variance
+            found["trial_number"] = trials
+    if houses >= MIN_LEVELS or not found:
+        found["house"] = table.houses
+        both = np.char.add(np.char.add(table.houses, "/"), table.assistance)
+        if houses < len(set(both.tolist())) < rows:
+            found["house x assistance"] = both
+    return found
+
+
+def _by_house(table: StudyTable, name: str) -> list[HouseDifference]:
+    known = ~np.isnan(table.columns[name])
+    here = table.take(np.flatnonzero(known))
+    return differences_by_house(
+        table.columns[name][known], here.assistance, here.objects, here.houses, here.conditions()
+    )
+
+
+def _acceptance(table: StudyTable) -> list[Result]:
+    """Mixtures by condition, over the visits that each person made."""
+    if STRICT not in table.columns:
+        return [Result(STRICT, "acceptance", None, None, f"{STRICT} is not known")]
+    results = []
+    for condition in table.conditions():
+        made = table.visits()
+        here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
+        visits = made[here]
+        deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
+        accepted = np.clip(visits - deviations, 0, visits)  # without `visits`, drops count as deviations only
+        kind = f"acceptance, {condition}"
+        results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))
+    return results
+
+
+def _answer_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
+    groups: Mapping[str, Values] = table.groups(name, objects)
+    return [
+        _attempt(name, ONE_WAY, objects, partial(one_way, groups)),
+        _attempt(name, "ordinal", objects, partial(ordinal_model, groups)),
+    ]
+
+
+def _describe(table: StudyTable) -> list[Description]:
+    found = []
+    for name in table.columns:
+        for objects in table.levels():
+            for condition, values in table.groups(name, objects).items():
+                spread = float(values.std(ddof=1)) if len(values) > 1 else None
+                mean, median = float(values.mean()), float(np.median(values))
+                interval = mean_interval(values)
+                found.append(
+                    Description(name, condition, objects, len(values), mean, interval, spread, median)
+                )
+    return found

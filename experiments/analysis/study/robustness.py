@@ -1,0 +1,191 @@
+"""Whom a study leaves out, how its results change without each rule, and what departs from its preregistration."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.analysis.page import Block, Paragraph, Table, p_value, table
+from experiments.analysis.statistics.effects import ALPHA
+from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Test, plain, test_results, tests_of
+from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
+from experiments.analysis.study.table import StudyTable, study_table
+from experiments.errors import RecordError
+from experiments.trials.exclusions import BY_NAME, UNFINISHED, Exclusions, LeftOut
+
+SHOWN = "the main tests, and all others that decide otherwise; stats.json holds every test."
+Key = tuple[str, str, str, int | None]  # measure, test, effect, objects
+
+
+@dataclass(frozen=True)
+class Change:
+    """A test with all rules, and without one of them; None where it cannot be computed."""
+
+    measure: str
+    test: str
+    effect: str
+    objects: int | None
+    all_rules: Mapping[str, Any] | None
+    without: Mapping[str, Any] | None
+    decision_changes: bool  # whether it is significant at .05 in one of the two alone
+
+
+@dataclass(frozen=True)
+class LeaveOneOut:
+    """What a rule does."""
+
+    rule: str
+    reason: str
+    leaves_out: int  # people
+    alone: int  # people whom no other rule leaves out: they are back without it
+    changes: tuple[Change, ...]  # of every test; empty where the rule changes no one's inclusion
+    refused: str | None = None  # why there are no results without it
+
+
+def leave_one_out(
+    everybody: Sequence[Mapping[str, Any]], measures: Measures, path: Path, exclusions: Exclusions
+) -> list[LeaveOneOut]:
+    """For each rule, and for the people who are left out by name, the tests with and without it."""
+    found = []
+    whole = study_table(everybody, measures, path, exclusions)
+    tests = _tests(whole, measures)
+    for rule, reason, rest in _without_each(exclusions):
+        theirs = [person for person in whole.left_out if rule in person.rules]
+        alone = sum(len(person.rules) == 1 for person in theirs)
+        changes: tuple[Change, ...] = ()
+        refused = None
+        try:
+            others = _tests(study_table(everybody, measures, path, rest), measures) if alone else {}
+            changes = tuple(
+                _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
+            )
+        except RecordError as error:  # the rule leaves out an impossible value, which is refused without it
+            refused = str(error)
+        found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
+    return found
+
+
+def _without_each(exclusions: Exclusions) -> Iterator[tuple[str, str, Exclusions]]:
+    for rule in exclusions.all_rules():
+        rest = tuple(other for other in exclusions.rules if other != rule)
+        kept = "keep" if str(rule) == str(UNFINISHED) else exclusions.unfinished
+        yield str(rule), rule.reason, msgspec.structs.replace(exclusions, rules=rest, unfinished=kept)
+    if exclusions.people:
+        reasons = "; ".join(dict.fromkeys(person.reason for person in exclusions.people))
+        yield BY_NAME, reasons, msgspec.structs.replace(exclusions, people=())
+
+
+def _tests(people: StudyTable, measures: Measures) -> dict[Key, Test]:
+    return {
+        (result.measure, result.kind, effect, result.objects): test
+        for result in test_results(people, measures)
+        for effect, test in tests_of(result)
+    }
+
+
+def _change(key: Key, one: Test | None, other: Test | None) -> Change:
+    decisions = [test is not None and test.p < ALPHA for test in (one, other)]
+    whole, without = (None if test is None else plain(test) for test in (one, other))
+    return Change(*key, whole, without, decisions[0] != decisions[1])
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was decided about the people of a study."""
+
+    rules: Sequence[LeaveOneOut]
+    preregistration: str | None = None  # SHA-256 of the file
+    departures: Sequence[str] = ()  # from it
+
+    def as_json(self) -> dict[str, Any]:
+        frozen = {"sha256": self.preregistration, "departures": list(self.departures)}
+        return {
+            "exclusions": [asdict(rule) for rule in self.rules],
+            "preregistration": None if self.preregistration is None else frozen,
+        }
+
+    def sections(self, people: StudyTable) -> tuple[tuple[str, Iterable[Block]], ...]:
+        told = (("Preregistration", _preregistered(self)),) if self.preregistration is not None else ()
+        return (*told, ("People who are left out", _left_out(people, self.rules)))
+
+
+def _preregistered(selection: Selection) -> Iterator[Block]:
+    yield Paragraph(f"SHA-256 of the preregistration: {selection.preregistration}.")
+    yield Paragraph("It departs from it:" if selection.departures else "Nothing departs from it.")
+    yield from map(Paragraph, selection.departures)
+
+
+def left_out_table(people: Iterable[LeftOut]) -> Table:
+    """Who is left out, by which rules and for what reasons."""
+    return table(
+        ("left out", "condition", "objects", "by", "reason"),
+        [
+            (p.person, p.assistance, p.objects, "; ".join(p.rules), "; ".join(p.rules.values()))
+            for p in people
+        ],
+    )
+
+
+def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Block]:
+    main = [
+        name for name, column in people.sources.items() if name != column or name.startswith(LIKERT_PREFIX)
+    ]
+    yield left_out_table(people.left_out)
+    yield table(
+        ("left out of one measure", "value", "people", "who"),
+        [(gap.measure, gap.value, len(gap.people), ", ".join(gap.people)) for gap in people.gaps],
+    )
+    if not people.left_out and not people.gaps:
+        yield Paragraph("No one.")
+    yield table(
+        ("rule", "reason", "leaves out", "by it alone", "decisions at .05 that change without it"),
+        [
+            (
+                one.rule,
+                one.reason,
+                one.leaves_out,
+                one.alone,
+                f"{sum(c.decision_changes for c in one.changes)} of {len(one.changes)}",
+            )
+            for one in found
+        ],
+    )
+    for one in found:
+        if one.changes or one.refused:
+            yield Paragraph(f"Without {one.rule}: {one.refused or SHOWN}")
+        yield table(
+            (
+                "measure",
+                "test",
+                "effect",
+                "objects",
+                "F or χ²",
+                "without",
+                "p",
+                "without",
+                "partial η²",
+                "without",
+                "decision",
+            ),
+            [
+                _change_row(c)
+                for c in one.changes
+                if c.decision_changes or (c.measure in main and c.test in MAIN)
+            ],
+        )
+
+
+MAIN = (ONE_WAY, TWO_WAY, "ordinal", "mixed model")
+
+
+def _change_row(change: Change) -> tuple[object, ...]:
+    pair = [test or {} for test in (change.all_rules, change.without)]
+    return (
+        *(change.measure, change.test, change.effect, change.objects),
+        *(test.get("statistic") for test in pair),
+        *(p_value(test.get("p")) for test in pair),
+        *(test.get("eta_squared") for test in pair),
+        "changes" if change.decision_changes else "the same",
+    )

@@ -1,1 +1,0 @@
-"""Studies with people: the study file, recruitment, pay, data and the researcher's page."""

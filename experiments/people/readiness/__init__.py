@@ -1,1 +1,0 @@
-"""Whether a study is ready for people: `mjsim study check`."""

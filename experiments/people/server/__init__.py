@@ -1,1 +1,0 @@
-"""The server of a study with people: pages and WebSockets for participants."""

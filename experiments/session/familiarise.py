@@ -1,0 +1,63 @@
+"""The knowledge of a simulated participant from the phases before the task."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.house import House
+from experiments.record.phases import FLYTHROUGH, STORY, TRAINING
+from experiments.record.records import PHASE_BEGUN, PHASE_ENDED, Event, EventLog
+from experiments.session.camera_path import bins_seen, camera_path
+from experiments.session.story import reading_time, story_text
+from mjsim.house.sight.sight import FieldOfView
+from mjsim.values.person_parameters import PersonParameters
+
+
+@dataclass(frozen=True)
+class Familiarisation:
+    """The phases before the task."""
+
+    ended: tuple[dict[str, Any], ...]  # what `phase_ended` says of each phase, in order
+    seen: frozenset[str] | None  # receptacles that the participant has seen; None if it knows them all
+
+    def trained(self, events: Sequence[Event]) -> "Familiarisation":
+        """With the training, whose log holds these events: the bin that was used is known."""
+        used = {event["receptacle"] for event in events if event["event"] == "placed"}
+        end = {"phase": TRAINING, "duration_s": events[-1]["t"], "reason": events[-1]["reason"]}
+        return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
+
+    def log(self, log: EventLog) -> None:
+        """Log it, before the clock of the task starts."""
+        for end in self.ended:
+            log.append(0.0, PHASE_BEGUN, phase=end["phase"])
+            log.append(0.0, PHASE_ENDED, **end)
+
+
+def familiarise(
+    phases: Collection[str], story: str | None, house: House, person: PersonParameters
+) -> Familiarisation:
+    """Let a simulated participant read the story and watch the fly-through, as far as the trial has them.
+
+    The bins that it sees are found by rays along the camera path, with its own field of view.
+    """
+    ended = tuple(_phases(phases, story, house, person))
+    seen = next((frozenset(end["bins"]) for end in ended if "bins" in end), None)
+    return Familiarisation(ended, seen)
+
+
+def watch_flythrough(house: House, person: PersonParameters) -> dict[str, Any]:
+    """Fields of the `phase_ended` event of a fly-through that a person watched."""
+    path = camera_path(house)
+    seen = bins_seen(house, path, FieldOfView.of(person), person.looking_interval)
+    return {"phase": FLYTHROUGH, "duration_s": round(path.duration, 6), "bins": seen}
+
+
+def _phases(
+    phases: Collection[str], story: str | None, house: House, person: PersonParameters
+) -> Iterator[dict[str, Any]]:
+    if STORY in phases:
+        text = story_text(None if story is None else Path(story))
+        yield {"phase": STORY, "duration_s": round(reading_time(text), 6)}
+    if FLYTHROUGH in phases:
+        yield watch_flythrough(house, person)

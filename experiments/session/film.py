@@ -1,0 +1,74 @@
+"""The fly-through film: the rooms of a house and its bins, with captions (PAPER section 7)."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from experiments.errors import ConfigError
+from experiments.house import House
+from experiments.session.camera_path import CameraPath, camera_path
+from experiments.session.film_config import FilmConfig
+from experiments.session.video import VideoWriter
+from hud.caption import Captions
+from mjsim.house.compiled.house import compiled_house
+from mjsim.render import CameraPose, Renderer
+from mjsim.support.files import replacing
+from mjsim.values.person_parameters import PICTURE_ASPECT, PersonParameters
+
+FPS = 25
+MIN_DURATION = 1.0  # s
+
+OnFrames = Callable[[int, int], None]
+
+
+def write_flythrough(
+    house: House,
+    path: Path,
+    film: FilmConfig,
+    *,
+    seconds: float | None = None,
+    on_progress: OnFrames = lambda *_: None,
+) -> str:
+    """Film a house, whole or not at all; the SHA-256 of the frames, which are the same for the same arguments.
+
+    The film takes `seconds`, 1 or more, or as long as the camera's own speed says. `on_progress` is called with the
+    numbers of frames that are drawn and of all.
+    """
+    if seconds is not None and seconds < MIN_DURATION:
+        raise ConfigError(f"a film of {seconds} s is too short; it takes {MIN_DURATION:.0f} s at least")
+    whole = camera_path(house)
+    duration = seconds or whole.duration
+    frames = round(duration * FPS)
+    rows = whole.at(np.linspace(0.0, whole.duration, frames, endpoint=False, dtype=np.float64))
+    with replacing(path) as temporary:
+        with VideoWriter(temporary, width=film.width, height=film.height, fps=FPS) as video:
+            _draw(house, rows, film, video, on_progress)
+        return video.frames_sha256
+
+
+def _draw(
+    house: House, rows: CameraPath, film: FilmConfig, video: VideoWriter, on_progress: OnFrames
+) -> None:
+    compiled, count = compiled_house(house.catalogue), len(rows.headings)
+    # As wide as the view of a person, in pictures of any shape.
+    half = math.tan(PersonParameters().vertical_field / 2.0) * PICTURE_ASPECT * film.height / film.width
+    captions = Captions(film.width, film.height)
+    with Renderer(compiled.model, width=film.width, height=film.height, profile=film.profile) as renderer:
+        for row in range(count):
+            heading, pitch, eye = float(rows.headings[row]), float(rows.pitches[row]), rows.positions[row]
+            gaze = [math.cos(heading) * math.cos(pitch), math.sin(heading) * math.cos(pitch), math.sin(pitch)]
+            camera = CameraPose.looking_at(eye, eye + np.array(gaze), 2.0 * math.atan(half))
+            frame = renderer.rgb(compiled.data, camera)
+            room = house.rooms.label(house.rooms.room_at(eye[:2]))
+            video.write(captions.over(frame, room, _bin_text(house, rows.bins[row])))
+            on_progress(row + 1, count)
+
+
+def _bin_text(house: House, key: str | None) -> str:
+    """Caption of a bin: its name and place."""
+    if key is None:
+        return ""
+    entry = house.catalogue.receptacles[key]
+    return f"{entry.label}: {entry.place}"

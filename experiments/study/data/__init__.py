@@ -1,0 +1,1 @@
+"""Data of a study: collect, export, copy, erase and forget."""

@@ -1,0 +1,203 @@
+"""The tidy table of a study with people: a row for each person, from the store and the runs."""
+
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, TypeVar
+
+from experiments.analysis.study.measures import LIKERT_PREFIX
+from experiments.errors import ConfigError, RecordError, ReplayError
+from experiments.record.origin import REHEARSAL
+from experiments.record.phases import TASK
+from experiments.record.run_directory import is_run, visit_folders
+from experiments.study.data.copies import INDEX
+from experiments.study.file import Study
+from experiments.trials.batch_folder import read_trial
+from experiments.trials.table import write_tables
+from experiments.visit.plan import SURVEY
+from experiments.visit.store import Answer, Person, PhaseRow, Store, TrialRow
+from experiments.visit.texts.items import Item
+from mjsim.support.files import write_text_atomically
+
+TEXTS = "texts.csv"
+FREE = ("line", "text")  # kinds of items whose answers are written freely
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how what a spreadsheet would compute begins
+Row = TypeVar("Row", Answer, PhaseRow)
+_NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Collected:
+    """What was found.
+
+    Attributes:
+        rows: Of people whose task is over, with what they did and answered.
+        texts: What people wrote freely: person, item and text.
+        unfinished: How many people there are by status of those without a row.
+        unusable: Why a run of somebody cannot be used, by person.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    texts: Sequence[tuple[str, str, str]]
+    unfinished: Mapping[str, int]
+    unusable: Mapping[str, str]
+
+
+async def collect(study: Study, store: Store, folder: Path) -> Collected:
+    """The rows of all people of a study whose runs lie in `folder`; nobody's platform id is in them.
+
+    A person who wanted their data deleted is not in them either.
+    """
+    people = [person for person in await store.people() if not person.delete_wanted]
+    check_people(study, people)
+    trials = {row.person_id: row for row in await store.trials() if row.phase == TASK}
+    answers = await store.answers()
+    answers_of, phases_of = _by_person(answers), _by_person(await store.phases())
+    rows: list[Mapping[str, Any]] = []
+    unusable: dict[str, str] = {}
+    unfinished: dict[str, int] = {}
+    items = study.texts[SURVEY].items
+    for person in people:
+        trial = trials.get(person.id)
+        if trial is None:
+            unfinished[person.status] = unfinished.get(person.status, 0) + 1
+            continue
+        try:
+            run = read_trial(folder / trial.folder)
+        except (RecordError, ReplayError, OSError) as error:
+            unusable[person_name(person)] = str(error)
+            continue
+        about = _about(person, trial, phases_of.get(person.id, ()))
+        row = {**about, **run.row, **_answers(items, answers_of.get(person.id, ()))}
+        rows.append({key: harmless(value) if isinstance(value, str) else value for key, value in row.items()})
+    return Collected(_complete(rows), _texts(items, people, answers), unfinished, unusable)
+
+
+def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
+    """Group rows by person; they are in the order of people."""
+    return {person: list(mine) for person, mine in groupby(rows, attrgetter("person_id"))}
+
+
+def check_people(study: Study, people: Sequence[Person]) -> None:
+    """Keep people and those of rehearsals apart.
+
+    Raises:
+        RecordError: Somebody is simulated and the study is no rehearsal, or the other way round.
+    """
+    simulated = sum(person.platform == REHEARSAL for person in people)
+    if simulated and not study.rehearsal:
+        raise RecordError(
+            f"{simulated} of {len(people)} people are those of a rehearsal: nobody, with answers drawn at random; "
+            "name the folder of people, or give `mjsim study collect` the option --rehearsal"
+        )
+    if study.rehearsal and simulated < len(people):
+        raise RecordError(f"{len(people) - simulated} of {len(people)} people are no rehearsal")
+
+
+def collect_visits(folder: Path) -> Collected:
+    """The rows of everybody whose task is over in a folder of `mjsim play`, or of several; nobody's link is in them."""
+    rows: list[Mapping[str, Any]] = []
+    unusable: dict[str, str] = {}
+    under_way = 0
+    for visit in visit_folders(folder):
+        name = visit_name(visit.name)
+        if not is_run(visit / TASK):
+            under_way += 1
+            continue
+        try:
+            rows.append({"participant": name, **read_trial(visit / TASK).row})
+        except (RecordError, ReplayError, OSError) as error:
+            unusable[name] = str(error)
+    return Collected(_complete(rows), [], {"under way": under_way} if under_way else {}, unusable)
+
+
+def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
+    """Write `trials.parquet`, `trials.csv` and `texts.csv` into a folder, and return their paths."""
+    out.mkdir(parents=True, exist_ok=True)
+    (out / INDEX).touch()
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("participant", "item", "text"))
+    writer.writerows((person, item, harmless(words)) for person, item, words in collected.texts)
+    write_text_atomically(out / TEXTS, text.getvalue())
+    return [*write_tables(out, collected.rows), out / TEXTS]
+
+
+def person_name(person: Person) -> str:
+    """The name of a person in tables: the number in the store."""
+    return f"p{person.id:05d}"
+
+
+def visit_name(folder: str) -> str:
+    """The name in tables of a visit without a store, whose folder's name is the hash of its link."""
+    return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
+
+
+def person_number(name: str) -> int:
+    """The number in the store of a person with a name in tables; a ConfigError where that is none."""
+    found = _NAME.fullmatch(name)
+    if found is None:
+        raise ConfigError(f"{name!r} is no person; tables name people like p00012")
+    return int(found[1])
+
+
+def harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text.startswith(FORMULA) else text
+
+
+def _about(person: Person, trial: TrialRow, phases: Sequence[PhaseRow]) -> dict[str, Any]:
+    durations = {f"phase_{phase.name}_s": phase.duration_s for phase in phases if phase.name.isidentifier()}
+    return {
+        "participant": person_name(person),
+        "platform": person.platform,
+        "status": person.status,
+        "arrived": person.created.isoformat(timespec="seconds"),
+        "task_ended": trial.finished.isoformat(timespec="seconds"),
+        **durations,
+    }
+
+
+def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]:
+    """Columns of final answers: `likert_NAME` of scales, `answer_NAME` of others; those of other phases by phase."""
+    given = {(answer.phase, answer.item): answer.value for answer in answers if answer.final}
+    columns: dict[str, Any] = {}
+    for item in items:
+        value = given.pop((SURVEY, item.name), None)
+        if item.kind == "scale":
+            columns[LIKERT_PREFIX + item.name] = value
+        elif item.kind == "several":
+            columns[f"answer_{item.name}"] = None if value is None else "; ".join(value)
+        elif item.kind not in FREE:
+            columns[f"answer_{item.name}"] = value
+    if checks := [item for item in items if item.right is not None]:
+        final = {answer.item: answer.value for answer in answers if answer.final and answer.phase == SURVEY}
+        columns["inattentive"] = sum(item.is_wrong(final.get(item.name)) for item in checks)
+    for (phase, name), value in given.items():
+        if isinstance(value, int | float | bool):
+            columns[f"{phase}_{name}"] = value
+    return columns
+
+
+def _texts(
+    items: Sequence[Item], people: Sequence[Person], answers: Sequence[Answer]
+) -> list[tuple[str, str, str]]:
+    free = {item.name for item in items if item.kind in FREE}
+    names = {person.id: person_name(person) for person in people}
+    return [
+        (names[answer.person_id], answer.item, str(answer.value))
+        for answer in answers
+        if answer.final and answer.phase == SURVEY and answer.item in free and answer.person_id in names
+    ]
+
+
+def _complete(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Rows with the columns of all, in order of first appearance."""
+    columns = dict.fromkeys(name for row in rows for name in row)
+    return [{name: row.get(name) for name in columns} for row in rows]

@@ -1,0 +1,158 @@
+"""Deleting a person from a study: copies and files first, then the rows that name them."""
+
+import asyncio
+import csv
+import datetime
+import io
+import shutil
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+
+from experiments.analysis.study.table import ANALYSIS, FILES
+from experiments.errors import StoreError
+from experiments.study.data.collect import person_name, person_number, visit_name
+from experiments.study.data.copies import DATABASES, Copy, copies, forget_copies
+from experiments.study.data.export import DATA, RUNS
+from experiments.trials.table import NAME, read_rows, write_tables
+from experiments.visit.folders import VISITS, VisitFolders
+from experiments.visit.store import Person, Store, change_database
+from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
+
+LEFTOVER_S = 3600.0  # for which unfinished work may be that of a command on another machine
+
+
+async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
+    """Delete a person whose runs lie in the study's `folder`, also from backups, tables and exports that it knows of.
+
+    Args:
+        store: The store.
+        folder: Folder of the study.
+        name: Name of the person in tables, such as `p00012`.
+        who: Name of the researcher, for the audit log.
+
+    Returns:
+        A line for each copy that held the person, or that is no longer where it was written.
+
+    Raises:
+        ConfigError: That is no name of a person.
+        StoreError: There is no such person, or the person is owed something, or a copy cannot be changed.
+        OSError: A file cannot be changed.
+    """
+    person = await store.person(person_number(name))
+    name = person_name(person)
+    owed = await store.ledger.owed(in_doubt_after=datetime.timedelta())
+    if mine := [payment.key for payment in owed if payment.person_id == person.id]:
+        raise StoreError(f"{name} is owed {', '.join(mine)}: pay first, then erase")
+    told = await _erase_from_copies(store, folder, person, who)
+    visits = VisitFolders(folder / VISITS)
+    played = any(row.person_id == person.id for row in await store.trials())
+    if played and not person.delete_wanted and not (visits.path / person.token_hash).exists():
+        told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
+    await asyncio.to_thread(visits.remove, person.token_hash)
+    if (visits.path / person.token_hash).exists():
+        raise StoreError(f"{visits.path / person.token_hash} cannot be deleted; delete it, then erase again")
+    await store.erase(person.id, who)
+    return told
+
+
+async def _erase_from_copies(store: Store, folder: Path, person: Person, who: str) -> list[str]:
+    """Delete a person from the copies that the study lists. Return a line for each that was changed or is missing."""
+
+    async def gone(other: Store) -> bool:
+        # After an older backup was restored, the same number may be that of another person.
+        same = {one.id for one in await other.people() if one.created == person.created} & {person.id}
+        for number in same:
+            await other.erase(number, who, unpaid=True)
+        return bool(same)
+
+    name, token = person_name(person), person.token_hash
+    told = await change_databases(store, folder, gone, name)
+    return told + await asyncio.to_thread(remove_from_files, folder, (name, token, visit_name(token)))
+
+
+async def change_databases(
+    store: Store, folder: Path, work: Callable[[Store], Awaitable[bool]], name: str
+) -> list[str]:
+    """Change the backups and restored databases of a study. Return a line for each that was changed or is missing."""
+    study, told = await store.study(), []
+    for copy in copies(folder):
+        path = Path(copy.path)
+        if copy.kind in DATABASES and not store.is_at(path):
+            if not path.exists():
+                told.append(_missing(copy, name))
+            elif await change_database(path, study.name, work):
+                told.append(f"{_shown(copy)} was written anew without {name}")
+    return told
+
+
+def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
+    """Take a person, by all of their names, out of the files that a folder lists. Return a line for each of them."""
+    told, deleted, listed = list[str](), set[str](), copies(folder)
+    if (usual := folder / ANALYSIS).is_dir():  # which earlier versions did not list
+        listed.append(Copy("analysis", str(usual), ""))
+    for place in {folder, *(Path(copy.path).parent for copy in listed)}:
+        for left in place.glob(f"{WORK}*"):
+            process = left.name.removeprefix(WORK).partition("-")[0]
+            if not Path("/proc", process).exists():
+                remove_leftovers(place, LEFTOVER_S, f"{WORK}{process}-")
+    for copy in listed:
+        path = Path(copy.path)
+        files = [path / name for name in FILES if (path / name).is_file()] if path.is_dir() else [path]
+        if copy.kind in DATABASES:
+            continue
+        if not path.exists():
+            told.append(_missing(copy, names[0]))
+        elif copy.kind in ("table", "export"):
+            told += remove_from_files(path, names) if path != folder.absolute() else []
+            if _remove_from_tables(path, names):
+                told.append(f"{_shown(copy)} was written anew without {names[0]}")
+        elif not set(names).isdisjoint(Path(copy.source).parts) or any(
+            name.encode() in file.read_bytes() for file in files for name in names
+        ):
+            for file in files:
+                file.unlink()
+            deleted.add(copy.path)
+            told.append(f"{_shown(copy)} was deleted, as {names[0]} was in it: make it again")
+    forget_copies(folder, deleted)
+    return told
+
+
+def _missing(copy: Copy, name: str) -> str:
+    return f"{_shown(copy)} is not there any more; where it was moved, delete {name} there, and in what was made of it"
+
+
+def _shown(copy: Copy) -> str:
+    return f"{copy.kind} {copy.path}" + f" of {copy.made[:10]}" * bool(copy.made)
+
+
+def _remove_from_tables(folder: Path, names: Sequence[str]) -> bool:
+    """Take a person out of the tables and runs of an export or a table; whether the person was in it."""
+    found = False
+    if (parquet := folder / f"{NAME}.parquet").is_file():
+        rows = read_rows(parquet)
+        others = [row for row in rows if row.get("participant") not in names]
+        found = len(others) < len(rows)
+        if found and others:
+            write_tables(folder, others)
+        elif found:
+            parquet.unlink()
+    for path in (*folder.glob("*.csv"), *(folder / DATA).glob("*.csv")):
+        found |= _remove_from_csv(path, names)
+    if (runs := folder / RUNS / names[0]).is_dir():
+        shutil.rmtree(runs)
+        found = True
+    return found
+
+
+def _remove_from_csv(path: Path, names: Sequence[str]) -> bool:
+    with path.open(newline="") as file:
+        header, *rows = csv.reader(file)
+    if "participant" not in header:
+        return False
+    column = header.index("participant")
+    others = [row for row in rows if row[column] not in names]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([header, *others])
+    if found := len(others) < len(rows):
+        write_text_atomically(path, text.getvalue())
+    return found

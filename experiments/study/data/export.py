@@ -1,0 +1,189 @@
+"""The export of a study: tidy tables, runs and a codebook in a folder that follows Psych-DS (psych-ds.github.io)."""
+
+import csv
+import io
+import re
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import RecordError
+from experiments.record.files import write_json
+from experiments.study.data.codebook import Variable, codebook
+from experiments.study.data.collect import FREE, Collected, collect, harmless, person_name
+from experiments.study.data.copies import INDEX, note_copy
+from experiments.study.file import Study
+from experiments.visit.store import Answer, Person, Store, TrialRow
+from mjsim.support.files import exchange, work_folder, write_text_atomically
+
+DESCRIPTION, README, IGNORED = "dataset_description.json", "README.md", ".psychds-ignore"
+DATA, RUNS, CODEBOOK = "data", "runs", Path("documentation", "codebook.csv")
+
+Table = Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What an export holds.
+
+    Attributes:
+        people: In its main table.
+        runs: Run directories.
+        collected: The main table, with what could not be used.
+    """
+
+    people: int
+    runs: int
+    collected: Collected
+
+
+async def export(study: Study, store: Store, folder: Path, out: Path, *, replace: bool = False) -> Exported:
+    """Write an export to `out`, whole or not at all.
+
+    People are numbers in it. Ids of platforms, links, their hashes and addresses are not in it, nor anybody who did
+    not agree or wanted the data deleted.
+
+    Args:
+        study: The study.
+        store: Its store.
+        folder: Of the study, with the runs.
+        out: Folder to make.
+        replace: Whether an earlier export may be replaced.
+
+    Raises:
+        RecordError: Something is in the way, or nobody has finished the task.
+    """
+    check_export(out, replace=replace)
+    found = await collect(study, store, folder)
+    if not found.rows:
+        raise RecordError(f"nobody in {folder} has finished the task yet; there is nothing to export")
+    people = {p.id: p for p in await store.people() if not p.delete_wanted and p.status != "no_consent"}
+    trials = [
+        row for row in await store.trials() if row.person_id in people and _name(row) not in found.unusable
+    ]
+    answers = [row for row in await store.answers() if row.final and row.person_id in people]
+    tables: dict[str, Table] = {
+        "": found.rows,
+        "phases": await _phases(store, people),
+        "answers": list(_answers(study, answers)),
+        "texts": [{"participant": p, "item": item, "text": words} for p, item, words in found.texts],
+    }
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with work_folder(out.parent) as work:
+        made = work / "export"
+        _write(made, study, {name: table for name, table in tables.items() if table})
+        for row in trials:
+            shutil.copytree(folder / row.folder, made / RUNS / _name(row) / row.phase)
+        made.chmod(0o755)
+        (made / INDEX).write_bytes((out / INDEX).read_bytes() if (out / INDEX).is_file() else b"")
+        note_copy(folder, "export", out)
+        if out.exists():
+            exchange(made, out)
+        else:
+            made.rename(out)
+    return Exported(len(found.rows), len(trials), found)
+
+
+def check_export(out: Path, *, replace: bool) -> None:
+    """Raise a RecordError if something is in the way of an export."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    if not (out / DESCRIPTION).is_file():
+        raise RecordError(f"{out} is there and is no export; name a folder that does not exist yet")
+    if not replace:
+        raise RecordError(f"{out} is an export already; --force replaces it")
+
+
+def _name(row: TrialRow) -> str:
+    return f"p{row.person_id:05d}"
+
+
+async def _phases(store: Store, people: Mapping[int, Person]) -> Table:
+    rows: list[dict[str, Any]] = []
+    order: dict[int, int] = {}
+    for phase in sorted(await store.phases(), key=lambda row: (row.person_id, row.shown)):
+        if phase.person_id not in people:
+            continue
+        order[phase.person_id] = number = order.get(phase.person_id, 0) + 1
+        rows.append(
+            {
+                "participant": person_name(people[phase.person_id]),
+                "phase": phase.name,
+                "order": number,
+                "duration_s": phase.duration_s,
+                "attempts": phase.attempts,
+                "reason": phase.reason,
+            }
+        )
+    return rows
+
+
+def _answers(study: Study, answers: Iterable[Answer]) -> Iterable[dict[str, Any]]:
+    """Answers to what was asked, without texts; what pages send besides is left out, but for numbers."""
+    kinds = {(name, item.name): item.kind for name, section in study.texts.items() for item in section.items}
+    for answer in answers:
+        kind, value = kinds.get((answer.phase, answer.item)), answer.value
+        if kind in FREE or (kind is None and not isinstance(value, int | float)):
+            continue
+        shown = "; ".join(value) if isinstance(value, list) else value
+        yield {
+            "participant": f"p{answer.person_id:05d}", "phase": answer.phase, "item": answer.item, "answer": shown,
+        }  # fmt: skip
+
+
+def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
+    short = re.sub("[^a-zA-Z0-9]", "", study.settings.name)
+    for name, table in tables.items():
+        described = f"_description-{name}" if name else ""
+        write_text_atomically(out / DATA / f"study-{short}{described}_data.csv", csv_text(table))
+    variables = codebook(study, (column for table in tables.values() for column in table[0]))
+    rows = [{"name": v.name, "description": v.description, "values": "; ".join(v.levels)} for v in variables]
+    write_text_atomically(out / CODEBOOK, csv_text(rows))
+    write_json(out / DESCRIPTION, _description(study, variables))
+    write_text_atomically(out / IGNORED, f"{RUNS}/\n{CODEBOOK.parent}/\n{INDEX}\n")
+    write_text_atomically(out / README, _readme(study, short))
+
+
+def csv_text(table: Table) -> str:
+    """A table as CSV that no spreadsheet computes anything of."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(
+        {key: harmless(v) if isinstance(v, str) else v for key, v in row.items()} for row in table
+    )
+    return text.getvalue()
+
+
+def _description(study: Study, variables: Sequence[Variable]) -> dict[str, Any]:
+    return {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": study.settings.title,
+        "description": f"What people did and answered in the study {study.settings.name}, recorded by mjsim "
+        f"{version('mjsim')}. Study file: SHA-256 {study.sha256}.",
+        "creator": {"@type": "Organization", "name": study.settings.institution},
+        "inLanguage": study.settings.language,
+        "variableMeasured": [variable.as_json() for variable in variables],
+    }
+
+
+def _readme(study: Study, short: str) -> str:
+    return f"""\
+# {study.settings.title}
+
+| what | where |
+|---|---|
+| a row for each person whose task is over | `data/study-{short}_data.csv` |
+| phases of everybody who agreed to take part | `data/study-{short}_description-phases_data.csv` |
+| answers, one a row | `data/study-{short}_description-answers_data.csv` |
+| what people wrote freely; read it before you publish it | `data/study-{short}_description-texts_data.csv` |
+| the meaning of each column | `documentation/codebook.csv`, and `dataset_description.json` |
+| journals of trials: `mjsim replay`, `mjsim view` | `runs/PERSON/PHASE/` |
+
+The folder follows Psych-DS. People are numbers; nothing in it comes from a recruiting platform.
+`{INDEX}` lists what was made of it on this computer; delete it before you publish the folder.
+"""

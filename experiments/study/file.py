@@ -1,0 +1,216 @@
+"""The file of a study with people: a design (docs/designs.md) with a table `[study]`."""
+
+import hashlib
+import itertools
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
+
+import msgspec
+
+from experiments.errors import ConfigError
+from experiments.record.origin import HUMAN
+from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.session.story import story_text
+from experiments.study.file_lines import at_line
+from experiments.trials.design import read_design
+from experiments.trials.exclusions import Exclusions
+from experiments.trials.trial_config import SEEDS, TrialConfig
+from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, Device, Limits, Seconds
+from experiments.visit.texts import Texts, read_texts, story_file
+from mjsim.support.files import read_bytes
+
+TEMPLATE = Path(__file__).with_name("template.toml")  # of `mjsim study init`
+PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
+
+Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
+Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
+Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]  # scheme, host, port
+
+HERE = ("localhost", "127.0.0.1", "::1")  # what is sent there stays on this machine
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    pass
+
+
+class Pay(_Table, frozen=True):
+    """What people receive; amounts in units of the currency."""
+
+    currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
+    reward: Money = 0.0  # for the whole study
+    screen_out: Money = 0.0  # for who is screened out
+    bonus_for_all: Money = 0.0  # for putting everything away
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # of the platform, a share of the pay
+    wage: Money = 0.0  # an hour, below which `mjsim study check` calls the pay too low
+    partial: bool = False  # whether who leaves, or never returns, once the task has begun receives a share
+
+
+class Recruitment(_Table, frozen=True):
+    """Where people come from, and what their platform expects back."""
+
+    platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
+    completed: Code = ""  # codes of the platform
+    screened_out: Code = ""
+    no_consent: Code = ""
+    study_id: Code = ""  # the platform's own; people of another one are refused
+    sites: tuple[Site, ...] = ()  # of the platform's pages; those of an ExternalQuestion embed it
+    api_url: str = ""  # of the platform's interface for programs
+
+    def __post_init__(self) -> None:
+        url = urlsplit(self.api_url)
+        if self.api_url and (not url.hostname or url.scheme not in ("http", "https")):
+            raise ValueError(f"api_url is {self.api_url!r}; write it as https://HOST or https://HOST/PATH")
+        if url.scheme == "http" and url.hostname not in HERE:
+            raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
+
+
+class Settings(_Table, frozen=True):
+    """The table `[study]`."""
+
+    name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
+    title: str
+    institution: str
+    contact: str
+    minutes: Count = 25
+    language: Annotated[str, msgspec.Meta(pattern="^[a-zA-Z]{2,3}(-[a-zA-Z0-9]{2,8})*$")] = "en"
+    texts: str | None = None
+    phases: tuple[str, ...] = PHASES
+    assignment: Literal["balanced", "uniform"] = "balanced"
+    minimum: dict[str, Seconds] = {}
+    optional: tuple[str, ...] = ()
+    pay: Pay = Pay()
+    device: Device = Device()
+    recruitment: Recruitment = Recruitment()
+    limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        usual = [name for name in self.phases if name in PHASES]
+        if usual != [name for name in PHASES if name in usual] or len(set(self.phases)) < len(self.phases):
+            raise ValueError(
+                f"phases are {', '.join(self.phases)}; each at most once, in the order {', '.join(PHASES)}"
+            )
+        for name in (TASK, COMPLETION):
+            if name not in self.phases:
+                raise ValueError(f"a study needs the phase {name}; add it to phases")
+        if unknown := [name for name in self.phases if name not in PHASES and ":" not in name]:
+            raise ValueError(
+                f"no phase {unknown[0]!r}; there are {', '.join(PHASES)}, or package.module:attribute"
+            )
+        if unknown := [name for name in (*self.minimum, *self.optional) if name not in self.phases]:
+            raise ValueError(f"minimum or optional names {unknown[0]!r}, which is not among the phases")
+        if ended := [name for name in self.minimum if name in (*PLAYED, COMPLETION)]:
+            raise ValueError(f"minimum names {ended[0]!r}, which no time ends; leave it out")
+        if played := [name for name in self.optional if name in (CONSENT, TASK, COMPLETION)]:
+            raise ValueError(f"{played[0]} cannot be optional")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of the design: the trial of each place in it."""
+
+    trials: Sequence[TrialConfig]
+
+    @property
+    def label(self) -> str:
+        """Its condition, such as `optimal, 6 objects`."""
+        return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
+
+    def trial(self, place: int) -> TrialConfig:
+        """The trial of a place, counted from 0; places beyond the last take the trials again."""
+        return self.trials[place % len(self.trials)]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study with people."""
+
+    path: Path
+    sha256: str  # of the file
+    settings: Settings
+    cells: Sequence[Cell]
+    texts: Texts
+    story: str
+    exclusions: Exclusions | None
+    rehearsal: bool = False  # whether all its people are simulated
+
+    @property
+    def people(self) -> int:
+        return sum(len(cell.trials) for cell in self.cells)
+
+
+def read_people_study(path: Path) -> Study:
+    """Read the file of a study with people.
+
+    Raises:
+        ConfigError: It cannot be read or used; the message names the file, the line and the value.
+    """
+    design = read_design(path)
+    content = read_bytes(path)
+    table = tomllib.loads(content.decode()).get("study")
+    if table is None:
+        raise ConfigError(
+            f"{path} has no table [study], which a study with people needs; `mjsim study init` writes one"
+        )
+    try:
+        settings = msgspec.convert({"study": table}, _File).study
+    except msgspec.ValidationError as error:
+        raise ConfigError(at_line(path, content.decode(), str(error))) from error
+    own_texts = path.parent / settings.texts if settings.texts else None
+    texts = read_texts(settings.language, own_texts, _values(settings))
+    own = design.trials[0].story
+    usual = None if own or STORY not in settings.phases else story_file(settings.language)
+    trials = [_of_a_person(trial, settings.phases, usual) for trial in design.trials]
+    if any(trial.trial_number > 1 for trial in trials):
+        raise ConfigError(
+            f"{path}: trials_per_person is for simulated people; a visit of a person has one task"
+        )
+    cells = [Cell(tuple(group)) for _, group in itertools.groupby(trials, _without_seeds)]
+    for name in ("house", "story", "training_assistance"):
+        if len(values := {getattr(cell.trials[0], name) for cell in cells}) > 1:
+            raise ConfigError(
+                f"{path}: cells differ in {name} ({', '.join(map(str, values))}); it is one for all"
+            )
+    story = trials[0].story
+    return Study(
+        path,
+        hashlib.sha256(content).hexdigest(),
+        settings,
+        cells,
+        texts,
+        story_text(None if story is None else Path(story)),
+        design.exclusions,
+    )
+
+
+class _File(msgspec.Struct):
+    study: Settings
+
+
+def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
+    """The trial of a real person in place of a simulated one; `story` is read where the file names none."""
+    before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
+    settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
+    if story is not None and trial.story is None:
+        settings["story"] = str(story)
+    return TrialConfig.of({**settings, "phases": ",".join([*before, TASK])})
+
+
+def _without_seeds(trial: TrialConfig) -> str:
+    return repr({name: value for name, value in trial.settings().items() if name not in SEEDS})
+
+
+def _values(settings: Settings) -> Mapping[str, str]:
+    pay = settings.pay
+    paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
+    return {
+        "title": settings.title,
+        "institution": settings.institution,
+        "contact": settings.contact,
+        "minutes": str(settings.minutes),
+        **paid,
+    }

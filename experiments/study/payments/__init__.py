@@ -1,0 +1,1 @@
+"""Payments of a study: rules, payouts and the platform's client."""

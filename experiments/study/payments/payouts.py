@@ -1,0 +1,127 @@
+"""Letting a platform pay what the ledger says is owed: never twice, whatever fails in between."""
+
+from collections.abc import AsyncIterator, Awaitable
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Literal, TypeVar
+
+from experiments.study.payments.platform import DeclinedError, Order, Payer, StoppedError, UnsureError
+from experiments.visit.store import PaymentEvent, Store
+from experiments.visit.store.ledger import IN_DOUBT_AFTER
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What became of a payment that was to be sent.
+
+    Attributes:
+        key: Names the payment in the ledger.
+        state: `paid`, `refused` (it can be sent again), or `in doubt`: the platform may have paid.
+        text: The platform's own name for it, or why it was not paid.
+        stops: Whether the platform can pay nobody at the moment.
+    """
+
+    key: str
+    state: Literal["paid", "refused", "in doubt"]
+    text: str
+    stops: bool = False
+
+
+class Sender:
+    """Sends what is owed.
+
+    That a payment is being sent is on the disk before the platform is asked. Where an attempt has no outcome, the
+    platform is asked what it knows, once it is sure to know, before anything is sent again.
+
+    Args:
+        study: Name of the study, which is part of the names of its payments on the platform.
+        store: Its store.
+        payer: The platform's client.
+    """
+
+    def __init__(self, study: str, store: Store, payer: Payer) -> None:
+        self._study, self._ledger, self._identity, self._payer = study, store.ledger, store.identity, payer
+
+    async def send(self) -> AsyncIterator[Sent]:
+        """Let the platform pay all that is owed, and tell what became of each payment."""
+        for last in await self._ledger.owed(in_doubt_after=timedelta()):
+            done = await self._settle(last) if last.in_doubt else None
+            if done is None:
+                attempt = await self._ledger.begin_sending(last.key)
+                if attempt is None:
+                    continue  # another process was faster
+                done = await self._send(last.key, await self._order(last, attempt))
+            yield done
+            if done.stops:
+                return
+
+    async def _settle(self, last: PaymentEvent) -> Sent | None:
+        """Ask about an attempt without an outcome; None if the platform did certainly not pay."""
+        later = last.at + max(IN_DOUBT_AFTER, self._payer.listed_after)
+        if later > await self._ledger.now():
+            again = f"{later:%Y-%m-%d %H:%M} UTC"
+            return Sent(last.key, "in doubt", f"sent without an answer; run this again after {again}")
+        order = await self._order(last, last.attempt)
+        try:
+            reference = await _understood(self._payer.find(order))
+        except (DeclinedError, UnsureError) as error:
+            text = _without_ids(f"the platform did not tell whether it has paid: {error}", order)
+            return Sent(last.key, "in doubt", text, isinstance(error, StoppedError))
+        if reference is not None:
+            await self._ledger.confirm(last.key, last.attempt, reference, "the platform knew of it")
+            return Sent(last.key, "paid", f"{reference}, as the platform says")
+        if await self._ledger.fail(last.key, last.attempt, "the platform does not know of it"):
+            return None
+        return Sent(last.key, "in doubt", "another process is sending it")
+
+    async def _send(self, key: str, order: Order) -> Sent:
+        """Send a payment that the ledger has as being sent."""
+        try:
+            reference = await _understood(self._payer.send(order))
+        except UnsureError as error:
+            return Sent(key, "in doubt", _without_ids(str(error), order))
+        except DeclinedError as error:
+            stops = isinstance(error, StoppedError)
+            before = None if stops else await self._made_before(order)
+            if before is None:
+                text = _without_ids(str(error), order)
+                await self._ledger.fail(key, order.attempt, text)
+                return Sent(key, "refused", text, stops)
+            reference = before
+        await self._ledger.confirm(key, order.attempt, reference)
+        return Sent(key, "paid", reference)
+
+    async def _made_before(self, order: Order) -> str | None:
+        """The platform's name for a payment that it refused because it was made before, such as by hand."""
+        try:
+            return await _understood(self._payer.find(order))
+        except (DeclinedError, UnsureError):
+            return None
+
+    async def _order(self, event: PaymentEvent, attempt: int) -> Order:
+        history = await self._ledger.history(event.person_id)
+        received = [
+            one.cents
+            for one in history
+            if one.event == "confirmed" and one.kind not in ("reward", "rejection")
+        ]
+        why = next(one.note for one in history if one.key == event.key)
+        name, identity = f"{self._study}/{event.key}", await self._identity(event.person_id)
+        return Order(name, attempt, event.kind, event.cents, why, identity, tuple(received))
+
+
+async def _understood(answer: Awaitable[T]) -> T:
+    """What a platform answered; an UnsureError where that has another form than is known."""
+    try:
+        return await answer
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UnsureError(f"the platform's answer is not understood: {error!r}") from error
+
+
+def _without_ids(text: str, order: Order) -> str:
+    """A text without the platform's ids of the person."""
+    for value in filter(None, order.identity.values()):
+        text = text.replace(value, "...")
+    return text

@@ -1,0 +1,110 @@
+"""Who of a study gets what, and why; the ledger of the store remembers it for ever."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+
+from experiments.errors import StoreError
+from experiments.record.phases import TASK
+from experiments.session.endings import ALL_DELIVERED
+from experiments.study.data.collect import person_name
+from experiments.study.file import Pay, Study
+from experiments.visit.plan import PLAYED
+from experiments.visit.store import PaymentEvent, Person, Store, TrialRow
+from experiments.visit.store.ledger import ONCE
+from experiments.visit.store.values import PaymentKind
+
+
+@dataclass(frozen=True)
+class Due:
+    """What somebody gets.
+
+    Attributes:
+        key: Names the payment in the ledger.
+        cents: Hundredths of the currency.
+        why: In words.
+    """
+
+    person_id: int
+    kind: PaymentKind
+    key: str
+    cents: int
+    currency: str
+    why: str
+
+
+def due(
+    study: Study, people: Sequence[Person], trials: Sequence[TrialRow], rejected: Collection[int] = ()
+) -> list[Due]:
+    """What people get by the rules of the study file, in order of arrival.
+
+    Those still under way and those who were rejected get nothing.
+    """
+    pay, phases = study.settings.pay, study.settings.phases
+    delivered = {row.person_id for row in trials if row.phase == TASK and row.ended == ALL_DELIVERED}
+    found: list[Due] = []
+    for person in people:
+        if person.id in rejected:
+            continue
+        if person.status == "finished":
+            found.append(_due(person, "reward", pay.reward, pay, "finished the study"))
+            if person.id in delivered:
+                found.append(_due(person, "bonus", pay.bonus_for_all, pay, "put everything away"))
+        elif person.status == "screened_out":
+            if person.phase not in PLAYED:
+                found.append(
+                    _due(person, "screen_out", pay.screen_out, pay, f"screened out by {person.phase}")
+                )
+                continue
+            found.append(_due(person, "screen_out", pay.screen_out, pay, "no place was left"))
+            done = phases.index(person.phase)
+            more = pay.reward * done / len(phases) - pay.screen_out
+            if pay.partial and more > 0.0:
+                why = f"no place was left after {done} of {len(phases)} phases"
+                found.append(_due(person, "bonus", more, pay, why))
+        elif person.status in ("withdrawn", "timed_out") and pay.partial and person.phase in phases:
+            done = phases.index(person.phase)
+            if done >= phases.index(TASK):
+                left = "left" if person.status == "withdrawn" else "did not return"
+                why = f"{left} after {done} of {len(phases)} phases"
+                found.append(_due(person, "partial", pay.reward * done / len(phases), pay, why))
+    return [payment for payment in found if payment.cents > 0]
+
+
+def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[Due]:
+    """Payments that the ledger does not have yet; what it has stays, whatever the rules say now."""
+    known = {event.key for event in history}
+    once = {event.person_id for event in history if event.kind in ONCE}
+    return [
+        one for one in payments if one.key not in known and not (one.kind in ONCE and one.person_id in once)
+    ]
+
+
+async def decide(store: Store, payments: Sequence[Due]) -> int:
+    """Note in the ledger what people get; how many payments are new. Doing it again changes nothing."""
+    new = 0
+    for payment in undecided(payments, await store.ledger.history()):
+        person, kind, cents = payment.person_id, payment.kind, payment.cents
+        new += await store.ledger.decide(person, kind, cents, payment.currency, payment.key, payment.why)
+    return new
+
+
+async def reject(store: Store, person: Person, currency: str, why: str) -> None:
+    """Note that somebody who finished is to be rejected, which the platform is told with the payments.
+
+    Raises:
+        StoreError: The person did not finish, or is to be paid already.
+    """
+    name = person_name(person)
+    if person.status != "finished":
+        raise StoreError(
+            f"{name} did not finish the study but is {person.status}; there is nothing to reject"
+        )
+    if decided := [event.key for event in await store.ledger.history(person.id) if event.kind != "rejection"]:
+        raise StoreError(f"{decided[0]} was decided, and stays so; reject before payments are decided")
+    await store.ledger.decide(person.id, "rejection", 0, currency, f"{name}-rejection", why)
+
+
+def _due(person: Person, kind: PaymentKind, amount: float, pay: Pay, why: str) -> Due:
+    cents = int((Decimal(str(amount)) * 100).to_integral_value(ROUND_HALF_UP))
+    return Due(person.id, kind, f"{person_name(person)}-{kind}", cents, pay.currency, why)

@@ -1,0 +1,58 @@
+"""The plan of the visits of a study."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from experiments.record.origin import REHEARSAL
+from experiments.study.file import Study
+from experiments.study.recruitment import recruiter
+from experiments.trials.training import trials_of
+from experiments.visit.plan import PLAYED, VisitPlan
+from experiments.visit.recruiter import Recruiter
+from experiments.visit.store import Assignment, CellQuota
+
+
+def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
+    """Return the plan of a study's visits, with its film and, by default, its own platform.
+
+    Raises:
+        ConfigError: A setting that the platform needs is missing.
+    """
+    settings = study.settings
+    platform = platform or recruiter(settings.recruitment)
+    if study.rehearsal:
+        platform.platform = REHEARSAL
+    endless = {name: math.inf for name in PLAYED if name not in settings.optional}
+
+    def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
+        task = msgspec.structs.replace(
+            study.cells[place.cell].trial(place.place),
+            house_seed=place.house_seed,
+            person_seed=place.person_seed,
+            order_seed=place.order_seed,
+        )
+        return trials_of(task)
+
+    return VisitPlan(
+        settings.name,
+        settings.title,
+        settings.language,
+        settings.phases,
+        study.texts,
+        study.story,
+        {**settings.minimum, **endless},
+        frozenset(settings.optional),
+        settings.limits,
+        settings.device,
+        settings.minutes,
+        [CellQuota(len(cell.trials), [trial.house_seed for trial in cell.trials]) for cell in study.cells],
+        settings.assignment,
+        trials,
+        platform,
+        film,
+        rehearsal=study.rehearsal,
+    )

@@ -1,0 +1,60 @@
+"""Recruitment: one module for each platform, behind one interface for arrival and one for paying."""
+
+from collections.abc import Mapping, Sequence
+
+from experiments.errors import ConfigError
+from experiments.study.file import Recruitment, Settings
+from experiments.study.payments.platform import Payer
+from experiments.study.recruitment.connect import Connect, ConnectPayer
+from experiments.study.recruitment.external_question import ExternalQuestion, ExternalQuestionPayer
+from experiments.study.recruitment.prolific import Prolific, ProlificPayer
+from experiments.visit.recruiter import OpenLink, Recruiter
+
+# Settings without which people of a platform cannot be served.
+NEEDED: Mapping[str, Sequence[str]] = {
+    "prolific": ("completed", "screened_out", "no_consent"),
+    "connect": ("completed",),
+    "external-question": ("sites",),
+}
+PAY_DOLLARS = ("connect", "external-question")
+
+
+def recruiter(settings: Recruitment) -> Recruiter:
+    """The platform of a study, from which people come and to which they return.
+
+    Raises:
+        ConfigError: A setting that the platform needs is missing.
+    """
+    for name in NEEDED.get(settings.platform, ()):
+        if not getattr(settings, name):
+            raise ConfigError(f"study.recruitment.{name} is empty; people of {settings.platform} need it")
+    match settings.platform:
+        case "link" | "lab":
+            return OpenLink(settings.platform, settings.completed)
+        case "prolific":
+            return Prolific(settings)
+        case "connect":
+            return Connect(settings)
+        case "external-question":
+            return ExternalQuestion(settings)
+
+
+def payer(settings: Settings) -> Payer:
+    """The client through which the platform of a study pays.
+
+    Raises:
+        ConfigError: The platform pays nobody, or not in the study's currency, or the environment lacks its secret.
+    """
+    recruitment, currency = settings.recruitment, settings.pay.currency
+    if recruitment.platform in PAY_DOLLARS and currency != "USD":
+        raise ConfigError(f"study.pay.currency is {currency!r}; {recruitment.platform} pays in USD")
+    match recruitment.platform:
+        case "prolific":
+            return ProlificPayer(recruitment)
+        case "connect":
+            return ConnectPayer(recruitment)
+        case "external-question":
+            return ExternalQuestionPayer(recruitment)
+    raise ConfigError(
+        f"study.recruitment.platform is {recruitment.platform!r}, which pays nobody; pay by hand, and note it (--paid)"
+    )

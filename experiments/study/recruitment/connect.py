@@ -1,0 +1,90 @@
+"""CloudResearch Connect: links with three parameters, the page of completion, and its API (v1).
+
+The platform's researchers' help documents links and completion. Its API is documented for customers alone; what is
+used here is what public clients of it use: an approval, a rejection and a bonus for an assignment, and the list of a
+project's assignments. Amounts are US dollars.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.study.file import Recruitment
+from experiments.study.payments.platform import LISTED_AFTER, Api, Order, secret
+from experiments.visit.recruiter import Arrival, Leaving, Refusal, WayBack
+
+PERSON, ASSIGNMENT, PROJECT = "participantId", "assignmentId", "projectId"
+SITE, API = "https://connect.cloudresearch.com", "https://connect-api.cloudresearch.com"
+KEY = "MJSIM_CONNECT_KEY"
+_ID = re.compile(r"[0-9A-Za-z-]{4,64}")
+
+
+class Connect:
+    """People of one project of the platform.
+
+    Args:
+        settings: With the code of the project, which is also part of the address of the page of completion.
+    """
+
+    platform = "connect"
+    parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)
+    has_time_limit = True
+    embedded_by: tuple[str, ...] = ()
+
+    def __init__(self, settings: Recruitment) -> None:
+        self._code, self._project = settings.completed, settings.study_id
+        self._site = (*settings.sites, SITE)[0]
+
+    def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
+        """Who comes, by the id of the person; another project's people are refused."""
+        ids = {name: query.get(name, "") for name in self.parameters}
+        if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
+            return Refusal(f"{bad[0]} is missing or is no id")
+        if self._project and ids[PROJECT] != self._project:
+            return Refusal(f"{PROJECT} is not that of this study")
+        return Arrival(ids[PERSON], ids)
+
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
+        """The page of completion; who leaves otherwise returns the project there."""
+        if how != "finished":
+            return WayBack(gives_back=True)
+        return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
+
+
+class ConnectPayer:
+    """Approves and rejects assignments, and pays bonuses; the platform pays the reward that its project promises."""
+
+    listed_after = LISTED_AFTER
+    shortest_reason = 1
+
+    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+        headers = {"X-API-KEY": secret(KEY)}
+        url = f"{settings.api_url or API}/api/v1"
+        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+
+    async def find(self, order: Order) -> str | None:
+        """By the status of the assignment, or the sum of its bonuses."""
+        listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
+        mine: Mapping[str, Any] = next(
+            (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}
+        )
+        done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
+        if done is not None:
+            return done.lower() if mine.get("status") == done else None
+        paid = round(100 * mine.get("bonus", 0.0))
+        return "listed with the assignment" if paid >= sum(order.others) + order.cents else None
+
+    async def send(self, order: Order) -> str:
+        """Approve, reject or pay a bonus; the platform refuses a second request with the same token."""
+        action = {"reward": "approve", "rejection": "reject"}.get(order.kind, "bonus")
+        row = {"id": order.id(ASSIGNMENT), "message": order.why}
+        body: Mapping[str, Any] = {"participants": [row]}
+        if action == "bonus":
+            body = {"bonusPayment": [{**row, "amount": order.cents / 100}]}
+        token = {"IDEMPOTENCY-TOKEN": f"{order.key}-{order.attempt}"}
+        path = f"/assignments/{order.id(PROJECT)}/{action}"
+        await self._api.ask("POST", path, json=body, headers=token)
+        return action
+
+    async def close(self) -> None:
+        await self._api.close()

@@ -1,0 +1,114 @@
+"""ExternalQuestion, as Mechanical Turk had it: the study in a frame of the platform's page, and a form at the end.
+
+Mechanical Turk closed on 2026-09-30. A platform that does the same is named in the study file: `sites`, whose pages
+embed the study and take its form, and `api_url`, where the operations of Mechanical Turk's API (2017-01-17) are
+asked for as JSON, with a secret in `Authorization` in place of a signature.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from experiments.errors import ConfigError
+from experiments.study.file import Recruitment
+from experiments.study.payments.platform import LISTED_AFTER, Api, Order, UnsureError, secret
+from experiments.visit.recruiter import Arrival, Leaving, Preview, Refusal, WayBack
+
+ASSIGNMENT, TASK, PERSON, SITE = "assignmentId", "hitId", "workerId", "turkSubmitTo"
+PREVIEW = "ASSIGNMENT_ID_NOT_AVAILABLE"
+SUBMIT = "/mturk/externalSubmit"
+TOKEN = "MJSIM_EXTERNAL_QUESTION_TOKEN"
+OPERATIONS = "MTurkRequesterServiceV20170117"
+_ID = re.compile(r"[0-9A-Za-z]{4,64}")
+
+
+class ExternalQuestion:
+    """People of one task (HIT) of a platform that embeds the study.
+
+    Args:
+        settings: With the sites of the platform.
+    """
+
+    platform = "external-question"
+    parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)
+    has_time_limit = True
+
+    def __init__(self, settings: Recruitment) -> None:
+        self.embedded_by, self._task = settings.sites, settings.study_id
+
+    def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
+        """Who comes; before the task is accepted, somebody who looks. A form is sent to no site but the platform's."""
+        if query.get(ASSIGNMENT) == PREVIEW:
+            return Preview()
+        ids = {name: query.get(name, "") for name in self.parameters}
+        ids[SITE] = ids[SITE].rstrip("/")
+        if bad := [name for name in (ASSIGNMENT, TASK, PERSON) if not _ID.fullmatch(ids[name])]:
+            return Refusal(f"{bad[0]} is missing or is no id")
+        if ids[SITE] not in self.embedded_by:
+            return Refusal(f"{SITE} is not among study.recruitment.sites")
+        if self._task and ids[TASK] != self._task:
+            return Refusal(f"{TASK} is not that of this study")
+        return Arrival(ids[PERSON], ids)
+
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
+        """The form that ends the task; who leaves otherwise returns the task on the platform's page."""
+        site = identity.get(SITE, "")
+        if how != "finished" or site not in self.embedded_by:
+            return WayBack(gives_back=True)
+        return WayBack(url=f"{site}{SUBMIT}", fields={ASSIGNMENT: identity[ASSIGNMENT], "study": "finished"})
+
+
+class ExternalQuestionPayer:
+    """Approves and rejects assignments, and pays bonuses; the platform pays the reward that its task promises."""
+
+    listed_after = LISTED_AFTER
+    shortest_reason = 1
+
+    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+        if not settings.api_url:
+            raise ConfigError("study.recruitment.api_url is empty; set it to where the platform's API is")
+        headers = {
+            "Authorization": f"Bearer {secret(TOKEN)}",
+            "Content-Type": "application/x-amz-json-1.1",
+        }
+        url = settings.api_url
+        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+
+    async def find(self, order: Order) -> str | None:
+        """By the status of the assignment, or the key in the reason of one of its bonuses."""
+        mine = {"AssignmentId": order.id(ASSIGNMENT)}
+        done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
+        if done is not None:
+            found = await self._ask("GetAssignment", mine)
+            return done.lower() if found["Assignment"]["AssignmentStatus"] == done else None
+        found = await self._ask("ListBonusPayments", {**mine, "MaxResults": 100})
+        named = any(f"({order.key})" in bonus["Reason"] for bonus in found["BonusPayments"])
+        return "bonus" if named else None
+
+    async def send(self, order: Order) -> str:
+        """Approve, reject or pay a bonus; the platform refuses a second bonus with the same token."""
+        mine = {"AssignmentId": order.id(ASSIGNMENT)}
+        if order.kind in ("reward", "rejection"):
+            operation = "ApproveAssignment" if order.kind == "reward" else "RejectAssignment"
+            await self._ask(operation, {**mine, "RequesterFeedback": order.why})
+            return "approved" if order.kind == "reward" else "rejected"
+        bonus = {
+            **mine,
+            "WorkerId": order.id(PERSON),
+            "BonusAmount": order.amount,
+            "Reason": f"{order.why} ({order.key})",
+            "UniqueRequestToken": order.key,
+        }
+        await self._ask("SendBonus", bonus)
+        return "bonus"
+
+    async def close(self) -> None:
+        await self._api.close()
+
+    async def _ask(self, operation: str, body: Mapping[str, Any]) -> Any:
+        target = {"X-Amz-Target": f"{OPERATIONS}.{operation}"}
+        answer = await self._api.ask("POST", "/", content=json.dumps(body), headers=target)
+        if not isinstance(answer, dict):
+            raise UnsureError("the platform's answer is no JSON")
+        return answer

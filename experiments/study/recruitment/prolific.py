@@ -1,0 +1,111 @@
+"""Prolific: links with three parameters, completion codes in the address to which people return, and its API (v1)."""
+
+import re
+from collections.abc import Mapping
+from datetime import timedelta
+from typing import Any
+from urllib.parse import urlencode
+
+from experiments.study.file import Recruitment
+from experiments.study.payments.platform import Api, DeclinedError, Order, UnsureError, secret
+from experiments.visit.recruiter import Arrival, Leaving, Refusal, WayBack
+
+PERSON, STUDY, SUBMISSION = "PROLIFIC_PID", "STUDY_ID", "SESSION_ID"
+SITE, API = "https://app.prolific.com", "https://api.prolific.com"
+TOKEN = "MJSIM_PROLIFIC_TOKEN"
+_ID = re.compile(r"[0-9A-Za-z]{8,64}")
+
+
+class Prolific:
+    """People of one study of the platform.
+
+    Args:
+        settings: With the codes of the platform's study.
+    """
+
+    platform = "prolific"
+    parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)
+    has_time_limit = True
+    embedded_by: tuple[str, ...] = ()
+
+    def __init__(self, settings: Recruitment) -> None:
+        self._codes: Mapping[Leaving, str] = {
+            "finished": settings.completed,
+            "screened_out": settings.screened_out,
+            "no_consent": settings.no_consent,
+        }
+        self._study = settings.study_id
+        self._site = (*settings.sites, SITE)[0]
+
+    def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
+        """Who comes, by the id of the person; another study's people are refused."""
+        ids = {name: query.get(name, "") for name in self.parameters}
+        if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
+            return Refusal(f"{bad[0]} is missing or is no id")
+        if self._study and ids[STUDY] != self._study:
+            return Refusal(f"{STUDY} is not that of this study")
+        return Arrival(ids[PERSON], ids)
+
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
+        """The platform's page with the code; who leaves otherwise returns the submission there."""
+        code = self._codes.get(how, "")
+        if not code:
+            return WayBack(gives_back=True)
+        return WayBack(code, f"{self._site}/submissions/complete?{urlencode({'cc': code})}")
+
+
+class ProlificPayer:
+    """Approves and rejects submissions, and pays bonuses; the platform pays the reward that its study promises.
+
+    Who is screened out gets what the platform's study promises for it. A share is paid as a bonus, which people who
+    returned their submission can get, too. Paying a prepared bonus twice pays twice, and a payment takes minutes to be
+    listed, so the list of a submission is what tells whether one was made.
+    """
+
+    listed_after = timedelta(hours=1)
+    shortest_reason = 100
+
+    def __init__(self, settings: Recruitment, timeout: float | None = None) -> None:
+        headers = {"Authorization": f"Token {secret(TOKEN)}"}
+        url = f"{settings.api_url or API}/api/v1"
+        self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
+        self._screened_out = settings.screened_out
+
+    async def find(self, order: Order) -> str | None:
+        """By the status of the submission, or the amounts of its bonuses."""
+        submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
+        done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
+        if done is not None:
+            return done.lower() if submission["status"] == done else None
+        listed = [round(cents) for cents in submission.get("bonus_payments") or ()]
+        paid = listed.count(order.cents) > order.others.count(order.cents)
+        return "listed with the submission" if paid else None
+
+    async def send(self, order: Order) -> str:
+        """Change the status of the submission, or prepare and pay a bonus."""
+        changes: Mapping[str, Mapping[str, str]] = {
+            "reward": {"action": "APPROVE"},
+            "screen_out": {"action": "COMPLETE", "completion_code": self._screened_out},
+            "rejection": {"action": "REJECT", "message": order.why, "rejection_category": "OTHER"},
+        }
+        submission = order.id(SUBMISSION)
+        if change := changes.get(order.kind):
+            answer = await self._api.ask("POST", f"/submissions/{submission}/transition/", json=change)
+            return str(answer["status"]).lower()
+        bonus = await self._prepare(order)
+        await self._api.ask("POST", f"/bulk-bonus-payments/{bonus}/pay/")
+        return f"bonus {bonus}"
+
+    async def close(self) -> None:
+        await self._api.close()
+
+    async def _prepare(self, order: Order) -> str:
+        """Set a bonus up, which pays nothing yet; its number."""
+        row: Mapping[str, Any] = {
+            "study_id": order.id(STUDY),
+            "csv_bonuses": f"{order.id(SUBMISSION)},{order.amount}",
+        }
+        try:
+            return str((await self._api.ask("POST", "/submissions/bonus-payments/", json=row))["id"])
+        except UnsureError as error:
+            raise DeclinedError(f"the bonus could not be prepared: {error}") from error

@@ -1,0 +1,137 @@
+"""What a study costs, how long it takes, and which effects it can find."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+import msgspec
+
+from experiments.analysis.statistics.power import POWER, detectable_eta_squared
+from experiments.house import House
+from experiments.record.origin import HUMAN
+from experiments.record.phases import FLYTHROUGH, TASK, TRAINING
+from experiments.session.camera_path import camera_path
+from experiments.session.story import READING_SPEED
+from experiments.study.file import Cell, Study
+from experiments.trials.design import read_design
+from experiments.trials.training import training_config
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from experiments.visit.phases.base import Phase
+
+CHOOSING = 2.65  # s to answer an item: think, point, click (Card, Moran and Newell, CACM 23, 1980)
+WRITING = 20.0  # s to answer an item freely, a guess
+PEOPLE = 2  # simulated in each cell
+GUEST = "guest"  # takes part where the file simulates nobody
+
+
+@dataclass(frozen=True)
+class Played:
+    """How long simulated people play, s."""
+
+    training: float
+    tasks: Mapping[str, float]  # means of cells
+
+
+def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Played:
+    """Run trials of simulated people, whose runs are left in `folder`.
+
+    Args:
+        study: The study.
+        folder: An empty one.
+        on_trial: Called before each trial with its name.
+    """
+    trials = [_simulated(cell, study.path) for cell in study.cells]
+    house = House.load(trials[0][0].house)
+
+    def seconds(name: str, config: TrialConfig) -> float:
+        on_trial(name)
+        path = folder / f"{name}".replace(" ", "-").replace(",", "")
+        return float(run_trial(config, path, topdown=False, house=house)["simulated_s"])
+
+    tasks = {}
+    for cell, own in zip(study.cells, trials, strict=True):
+        times = [seconds(f"{cell.label} {k}", trial) for k, trial in enumerate(own)]
+        tasks[cell.label] = mean(times)
+    trained = TRAINING in study.settings.phases
+    return Played(seconds(TRAINING, training_config(trials[0][0])) if trained else 0.0, tasks)
+
+
+def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
+    """The first people of a cell as the file simulates them, quickly."""
+    wanted = {(trial.house_seed, trial.person_seed, trial.order_seed) for trial in cell.trials[:PEOPLE]}
+    usual: dict[str, Any] = {"fidelity": "event", "regret": False, "phases": TASK}
+    first = cell.trials[0]
+    found = [
+        msgspec.structs.replace(trial, **usual, live=False)
+        for trial in read_design(path).trials
+        if (trial.assistance, trial.objects) == (first.assistance, first.objects)
+        and (trial.house_seed, trial.person_seed, trial.order_seed) in wanted
+    ]
+    return [t if t.user != HUMAN else msgspec.structs.replace(t, user=GUEST) for t in found]
+
+
+def durations(
+    study: Study, phases: Sequence[Phase], words: Mapping[str, int], played: Played
+) -> dict[str, float]:
+    """How long each phase takes, s: reading and answering, the film, trials; not less than its minimum time.
+
+    The task is the mean of all cells.
+    """
+    found = {}
+    for phase in phases:
+        items = getattr(phase, "items", ())
+        answering = sum(
+            (WRITING if item.kind in ("line", "text") else CHOOSING) for item in items if item.required
+        )
+        seconds = 60.0 * words.get(phase.name, 0) / READING_SPEED + answering
+        if phase.name == FLYTHROUGH:
+            seconds += camera_path(House.load(study.cells[0].trial(0).house)).duration
+        seconds += {TRAINING: played.training, TASK: mean(played.tasks.values())}.get(phase.name, 0.0)
+        found[phase.name] = max(seconds, study.settings.minimum.get(phase.name, 0.0))
+    return found
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a study costs, in units of its currency.
+
+    Attributes:
+        rewards: Of everybody who is wanted.
+        bonuses: If everybody gets one.
+        fee: Of the platform, on both; None where the file does not say it.
+        hourly: Reward for the minutes that people are told, per hour.
+    """
+
+    rewards: float
+    bonuses: float
+    fee: float | None
+    hourly: float
+
+    @property
+    def total(self) -> float:
+        """All together, at most; nobody who is screened out is in it."""
+        return self.rewards + self.bonuses + (self.fee or 0.0)
+
+
+def cost(study: Study) -> Cost:
+    pay = study.settings.pay
+    rewards, bonuses = study.people * pay.reward, study.people * pay.bonus_for_all
+    fee = None if pay.fee is None else pay.fee * (rewards + bonuses)
+    return Cost(rewards, bonuses, fee, 60.0 * pay.reward / study.settings.minutes)
+
+
+def detectable(study: Study) -> dict[str, float]:
+    """The smallest partial eta squared of each effect that the study finds with a chance of 80 %, at a level of 5 %."""
+    conditions = {cell.trials[0].assistance for cell in study.cells}
+    levels = {cell.trials[0].objects for cell in study.cells}
+    if len(conditions) * len(levels) != len(study.cells) or study.people <= len(study.cells):
+        return {}
+    freedom = {"assistance": len(conditions) - 1, "objects": len(levels) - 1}
+    freedom["interaction"] = freedom["assistance"] * freedom["objects"]
+    rest = study.people - len(study.cells)
+    return {
+        name: detectable_eta_squared(df, rest, study.people, POWER) for name, df in freedom.items() if df > 0
+    }

@@ -1,0 +1,234 @@
+"""A simulated person, who goes through the pages of a study by HTTP and plays its trials by WebSocket."""
+
+import asyncio
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import httpx
+import numpy as np
+from websockets.exceptions import WebSocketException
+
+from experiments.house import House
+from experiments.record.phases import FLYTHROUGH
+from experiments.study.rehearsal.answers import form_of, wrong_form
+from experiments.study.rehearsal.link import Link, LostError, connected
+from experiments.study.rehearsal.plan import Planned, moment
+from experiments.study.rehearsal.player import Player
+from experiments.visit.phases.base import FormPhase, Phase
+
+SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
+READING = 15.0  # s of the study's time that a page takes, on average
+AWAY = 600.0  # s of the study's time that somebody who returns is away, at most
+DELAY = 0.2  # s that the first messages of a bad connection take
+CUTS = 3  # of a bad connection in a trial
+TRIES = 20  # connections to a trial, or sendings of a form, before somebody gives up
+QUEUED = 'http-equiv="refresh"'  # of the page of somebody who waits for a place
+QUEUE_PAUSE = 3.0  # s between two looks at it
+PAUSE = 0.5  # s before the next connection to a trial
+
+
+@dataclass
+class Rehearsed:
+    """What came of a person.
+
+    Attributes:
+        number: Of the plan.
+        link: Path of the person's pages; empty before there are any.
+        outcome: `finished`, how the person left, or `stuck`; empty while the person is under way.
+        answers: Forms that were accepted, by phase.
+        faults: What went wrong, in words.
+        refused: How many messages were refused in trials.
+    """
+
+    number: int
+    link: str = ""
+    outcome: str = ""
+    answers: dict[str, Any] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+    refused: int = 0
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What all people of a rehearsal share: the server, the study's phases, house and platform, and how time runs."""
+
+    base: str
+    client: httpx.AsyncClient
+    phases: Mapping[str, Phase]
+    house: House
+    parameters: Mapping[str, str]  # of the platform's links; an empty value is an id of the person
+    minimum: Mapping[str, float]
+    factor: float  # by which waiting is shorter
+
+
+class Person:
+    """Goes through the study as planned."""
+
+    def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
+        self._planned, self._around, self.rehearsed = planned, around, rehearsed
+        self._rng = np.random.default_rng(planned.seed)
+        self._reloaded = self._returned = False
+        number = planned.number
+        self._headers = {"Origin": around.base, "X-Forwarded-For": f"10.0.{number // 250}.{number % 250 + 1}"}
+
+    async def begin(self) -> None:
+        """Come to the study, perhaps twice; the link is known then."""
+        number = self._planned.number
+        ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
+        await self._get("/", ids)
+        for _ in range(2 if ids and self._planned.twice else 1):
+            answer = await self._post("/begin", ids)
+            if not (link := answer.headers.get("location", "")).startswith("/play/"):
+                self._fault(f"no link at the beginning: {answer.status_code}")
+            elif self.rehearsed.link not in ("", link):
+                self._fault("the same person got two links")
+            self.rehearsed.link = link
+
+    async def go(self) -> None:
+        """Go on from the page that is shown to the end, as planned."""
+        self.rehearsed.outcome = await self._go()
+
+    async def _go(self) -> str:
+        planned, tries, before = self._planned, 0, ""
+        while tries < TRIES:
+            page = await self._get(self.rehearsed.link)
+            if QUEUED in page.text:
+                await asyncio.sleep(QUEUE_PAUSE)
+                continue
+            found = SHOWN.search(page.text)
+            if found is None:
+                return self._ended(page)
+            name = found[1] or found[2]
+            tries, before = (tries + 1 if name == before else 0), name
+            leaves = planned.leaves if planned.leaves_in == name else None
+            phase = self._around.phases[name]
+            if found[2]:
+                if not await self._play(name, bool(leaves)):
+                    return await self._leave(str(leaves))
+                continue
+            if planned.returns_in == name and not self._returned:
+                self._returned = True
+                await self._away()
+                continue
+            if planned.reloads_in == name and not self._reloaded:
+                self._reloaded = True
+                continue
+            if leaves in ("vanishes", "withdraws", "withdraws and deletes"):
+                return await self._leave(leaves)
+            await self._fill(phase, leaves, tries)
+        self._fault(f"gets no further than {before}")
+        return "stuck"
+
+    def _ended(self, page: httpx.Response) -> str:
+        if page.status_code != httpx.codes.OK:
+            self._fault(f"the page says {page.status_code}")
+            return "stuck"
+        how = self._planned.leaves
+        return (
+            how if how in ("refuses", "fails") else "finished"
+        )  # a trial may be over before somebody leaves it
+
+    async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
+        """Read, answer, send; some send wrong answers first, or all of it twice."""
+        rng, link, factor = self._rng, self.rehearsed.link, self._around.factor
+        await asyncio.sleep(float(rng.exponential(READING)) / factor)
+        form = form_of(phase, rng)
+        if phase.name == FLYTHROUGH:
+            await self._get(f"{link}/film")
+        if isinstance(phase, FormPhase) and phase.items:
+            await self._post(f"{link}/answers", form)
+            wrong = wrong_form(phase, form)
+            if wrong is not None and (leaves == "fails" or (self._planned.wrong and not tries)):
+                await self._post(link, wrong)
+                return
+        if leaves == "refuses":
+            form = {"phase": phase.name, "agree": "no"}
+        await asyncio.sleep(self._around.minimum.get(phase.name, 0.0) / factor)
+        sent = [self._post(link, form) for _ in range(2 if self._planned.twice else 1)]
+        statuses = [answer.status_code for answer in await asyncio.gather(*sent)]
+        if httpx.codes.SEE_OTHER in statuses:
+            self.rehearsed.answers[phase.name] = form
+        elif tries:
+            self._fault(f"the form of {phase.name} was not taken")
+
+    async def _leave(self, how: str) -> str:
+        if how != "vanishes":
+            link = f"{self.rehearsed.link}/withdrawal"
+            await self._get(link)
+            data = "delete" if how == "withdraws and deletes" else "keep"
+            answer = await self._post(link, {"data": data})
+            if answer.status_code != httpx.codes.SEE_OTHER:
+                self._fault(f"withdrawing was answered with {answer.status_code}")
+        return how
+
+    async def _play(self, trial: str, leaves: bool) -> bool:
+        """Play a trial to its end, over several connections if need be; False for somebody who leaves in it."""
+        planned, rng = self._planned, self._rng
+        breaks = [(moment(trial, rng), "cut") for _ in range(CUTS * planned.bad)]
+        breaks += [(moment(trial, rng), "second page")] * planned.twice
+        breaks += [(moment(trial, rng), "reload")] * (planned.reloads_in == trial and not self._reloaded)
+        breaks += [(moment(trial, rng), "return")] * (planned.returns_in == trial and not self._returned)
+        breaks += [(moment(trial, rng), "leave")] * leaves
+        self._reloaded |= planned.reloads_in == trial
+        self._returned |= planned.returns_in == trial
+        player, tab, done = Player(self._around.house, rng), f"rehearsal-{rng.integers(10**9)}", 0
+        for _ in range(TRIES + len(breaks)):
+            player.state = None
+            at, what = min(breaks, default=(10**9, ""))
+            try:
+                async with connected(self._around.base, self.rehearsed.link, trial, tab, player) as link:
+                    saved = await link.play(at - done, DELAY * planned.bad)
+                    done += link.decisions
+                    self.rehearsed.refused += len(link.refused)
+                    if saved:
+                        return True
+                    breaks.remove((at, what))
+                    if what == "leave":
+                        return False
+                    tab = await self._break(link, what, trial, tab)
+            except (LostError, OSError, WebSocketException, TimeoutError):
+                await asyncio.sleep(PAUSE)
+            if what == "return" and (at, what) not in breaks:
+                await self._away()
+            page = await self._get(self.rehearsed.link)
+            found = SHOWN.search(page.text)
+            if found is None or found[2] != trial:
+                return True
+        self._fault(f"the {trial} does not go on")
+        return True
+
+    async def _break(self, link: Link, what: str, trial: str, tab: str) -> str:
+        """Interrupt a trial; the name of the page in which it goes on."""
+        if what == "cut":
+            link.cut()
+            return tab
+        if what == "second page":
+            idle, page = Player(self._around.house, self._rng), f"second-{tab}"
+            async with connected(self._around.base, self.rehearsed.link, trial, page, idle) as second:
+                await second.occupied()
+            return tab
+        return f"rehearsal-{self._rng.integers(10**9)}"
+
+    async def _away(self) -> None:
+        await asyncio.sleep(float(self._rng.uniform(0.0, AWAY)) / self._around.factor)
+
+    async def _get(self, path: str, query: Mapping[str, str] | None = None) -> httpx.Response:
+        return await self._answered("GET", path, params=query)
+
+    async def _post(self, path: str, data: Mapping[str, Any]) -> httpx.Response:
+        return await self._answered("POST", path, data=data)
+
+    async def _answered(self, method: str, path: str, **more: Any) -> httpx.Response:
+        try:
+            answer = await self._around.client.request(method, path, headers=self._headers, **more)
+        except httpx.TransportError as error:  # people load the page again
+            self._fault(f"{method} of a page was not answered: {type(error).__name__}")
+            answer = await self._around.client.request(method, path, headers=self._headers, **more)
+        if answer.is_server_error:
+            self._fault(f"{method} of a page was answered with {answer.status_code}")
+        return answer
+
+    def _fault(self, what: str) -> None:
+        self.rehearsed.faults.append(what)

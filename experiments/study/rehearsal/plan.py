@@ -1,0 +1,109 @@
+"""Plan of a rehearsal: its study, its simulated people, and when they leave, return, reload or lose the connection."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from experiments.record.origin import REHEARSAL
+from experiments.study.file import Cell, Study
+from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
+
+Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails"]
+RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of people
+HOW = (0.6, 0.2, 0.2)  # shares of those who leave: they vanish, withdraw, withdraw and have all deleted
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A person of a rehearsal.
+
+    Attributes:
+        number: From 0.
+        seed: Of what the person answers and does.
+        arrives: After the beginning, s of the study's time.
+        leaves: How the person leaves the study, or None.
+        leaves_in: The phase in which that happens.
+        returns_in: The phase in which the person closes the page and comes back later to the same link, or None.
+        reloads_in: The phase in which the page is loaded again, or None.
+        bad: Whether the connection is cut and delayed.
+        twice: Whether forms are sent twice at once, links opened twice, and trials opened in a second page.
+        wrong: Whether a question about the task is answered wrongly at first.
+    """
+
+    number: int
+    seed: int
+    arrives: float
+    leaves: Leaving | None
+    leaves_in: str
+    returns_in: str | None
+    reloads_in: str | None
+    bad: bool
+    twice: bool
+    wrong: bool
+
+
+def plan_people(
+    phases: Sequence[str], people: int, seed: int, *, per_minute: float, dropouts: float
+) -> list[Planned]:
+    """The people of a rehearsal, in order of arrival; the same seed gives the same people.
+
+    Args:
+        phases: Of the study.
+        people: How many arrive, as a Poisson process.
+        seed: Source of all that they do.
+        per_minute: How many arrive in a minute of the study's time, on average.
+        dropouts: Share of those who do not finish.
+    """
+    found, arrives = [], 0.0
+    for number in range(people):
+        rng = np.random.default_rng([seed, number])
+        arrives += float(rng.exponential(60.0 / per_minute))
+        leaves, leaves_in = _leaving(phases, rng) if rng.random() < dropouts else (None, "")
+        returns, reloads = (str(rng.choice(phases[:-1])) for _ in range(2))
+        found.append(
+            Planned(
+                number,
+                int(rng.integers(2**53)),
+                arrives,
+                leaves,
+                leaves_in,
+                returns if rng.random() < RETURNS else None,
+                reloads if rng.random() < RELOADS else None,
+                bool(rng.random() < BAD),
+                bool(rng.random() < TWICE),
+                bool(rng.random() < WRONG),
+            )
+        )
+    return found
+
+
+def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, str]:
+    phase = str(rng.choice(phases[:-1]))
+    if phase == CONSENT and rng.random() < 0.5:
+        return "refuses", phase
+    if phase == COMPREHENSION and rng.random() < 0.5:
+        return "fails", phase
+    how: tuple[Leaving, ...] = ("vanishes", "withdraws", "withdraws and deletes")
+    return how[int(rng.choice(len(how), p=HOW))], phase
+
+
+def moment(phase: str, rng: np.random.Generator) -> int:
+    """After how many decisions something happens in a trial."""
+    return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
+
+
+def rehearsed(study: Study, factor: float) -> Study:
+    """Mark the people of a study as simulated, and divide all its waiting times by `factor`."""
+    settings = study.settings
+    away = ("abandoned_after", "timed_out_after")
+    shorter = {name: getattr(settings.limits, name) / factor for name in away}
+    limits = msgspec.structs.replace(settings.limits, **shorter)
+    minimum = {name: seconds / factor for name, seconds in settings.minimum.items()}
+    cells = [
+        Cell([msgspec.structs.replace(trial, user=REHEARSAL) for trial in c.trials]) for c in study.cells
+    ]
+    settings = msgspec.structs.replace(settings, limits=limits, minimum=minimum)
+    return replace(study, cells=cells, settings=settings, rehearsal=True)

@@ -1,0 +1,75 @@
+"""What in a study file is not ready for people, by line."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from experiments.errors import ConfigError
+from experiments.study.file import Study
+from experiments.study.file_lines import line_of
+from experiments.study.recruitment import recruiter
+from experiments.visit.plan import COMPREHENSION, CONSENT
+from mjsim.support.files import read_text
+
+PAID = ("prolific", "connect", "external-question")  # platforms on which nobody works for nothing
+EXAMPLES = ("your institution", "example.org", "example.com")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What has to change before people come.
+
+    Attributes:
+        key: Of the file, such as `study.contact`.
+        text: What is wrong, and what to do.
+    """
+
+    key: str
+    text: str
+
+
+def problems_of_file(study: Study) -> list[Problem]:
+    """What can be told from the file alone."""
+    return [Problem(f"study.{key}", text) for key, text in _found(study)]
+
+
+def _found(study: Study) -> Iterator[tuple[str, str]]:
+    settings, pay = study.settings, study.settings.pay
+    if "@" not in settings.contact or any(word in settings.contact for word in EXAMPLES):
+        yield "contact", f"contact is {settings.contact!r}; people need an address at which somebody answers"
+    if any(word in settings.institution for word in EXAMPLES):
+        yield "institution", f"institution is {settings.institution!r}; name yours"
+    if CONSENT not in settings.phases:
+        yield "phases", "nobody is asked for consent; add the phase consent"
+    try:
+        recruiter(settings.recruitment)
+    except ConfigError as error:
+        yield "recruitment", str(error)
+    if not pay.reward and settings.recruitment.platform in PAID:
+        yield "pay", f"reward is 0; people of {settings.recruitment.platform} are paid"
+    hourly = 60.0 * pay.reward / settings.minutes
+    if hourly < pay.wage:
+        yield (
+            "pay.reward",
+            f"{pay.reward:.2f} {pay.currency} for {settings.minutes} minutes are {hourly:.2f} an hour, below the wage "
+            f"of {pay.wage:.2f}",
+        )
+    if COMPREHENSION in settings.phases and all(i.right is None for i in study.texts[COMPREHENSION].items):
+        yield "phases", "no question of the comprehension check has a right answer; give one of them `right`"
+    if few := next((cell for cell in study.cells if len(cell.trials) < 2), None):
+        yield "name", f"the cell {few.label} has one person; a cell needs two or more to be compared"
+
+
+def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:
+    """Whether the minutes that people are told fit the expected length of the shortest and the longest cell, s."""
+    told, low, high = study.settings.minutes, shortest / 60, longest / 60
+    if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
+        return []
+    span = f"{low:.0f}" if round(low) == round(high) else f"{low:.0f} to {high:.0f}"
+    text = f"minutes is {told}, but the study is expected to take {span} with simulated people"
+    return [Problem("study.minutes", text)]
+
+
+def located(study: Study, problems: Sequence[Problem]) -> list[str]:
+    text = read_text(study.path)
+    lines = [(line_of(text, problem.key) or 1, problem.text) for problem in problems]
+    return [f"{study.path}, line {line}: {words}" for line, words in sorted(lines)]

@@ -1,0 +1,87 @@
+"""What a rehearsal found: whether the database agrees with what people did, and what went wrong."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+
+from experiments.study.data.collect import collect, write_collected
+from experiments.study.data.copies import note_copy
+from experiments.study.data.export import export
+from experiments.study.file import Study
+from experiments.study.payments.rules import decide, due
+from experiments.study.rehearsal.person import Rehearsed
+from experiments.study.rehearsal.run import SERVED, Settings
+from experiments.visit.store import Store
+from experiments.visit.tokens import token_hash
+from mjsim.support.files import write_text_atomically
+
+REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
+STATUS = {  # of people by what they did
+    "finished": "finished",
+    "withdraws": "withdrawn",
+    "withdraws and deletes": "withdrawn",
+    "refuses": "no_consent",
+    "fails": "screened_out",
+}
+
+
+@dataclass(frozen=True)
+class Report:
+    """What came of a rehearsal.
+
+    Attributes:
+        settings: Of the rehearsal.
+        passed: Whether nothing went wrong.
+        outcomes: People by what they did.
+        cells: People who finished, by cell.
+        owed: What they would be paid, cents.
+        faults: What went wrong, a line each.
+    """
+
+    settings: Settings
+    passed: bool
+    outcomes: dict[str, int]
+    cells: dict[int, int]
+    owed: int
+    faults: list[str]
+
+
+async def report(
+    study: Study, settings: Settings, store: Store, people: Sequence[Rehearsed], out: Path
+) -> Report:
+    """Decide payments, collect, export, compare with what people did; the report is written to the folder as well."""
+    study, served = replace(study, rehearsal=True), out / SERVED
+    known = {person.token_hash: person for person in await store.people()}
+    faults = [f"person {one.number}: {fault}" for one in people for fault in one.faults]
+    for one in people:
+        person = known.pop(token_hash(one.link.rpartition("/")[2]), None)
+        wanted = STATUS.get(one.outcome)
+        if person is None:
+            faults.append(f"person {one.number} is not in the database")
+        elif wanted is not None and person.status != wanted:
+            faults.append(f"person {one.number} {one.outcome}, and is {person.status} in the database")
+    faults += [f"{name} is in the database, and nobody's of the plan" for name in known]
+    payments = due(study, await store.people(), await store.trials())
+    await decide(store, payments)
+    if await decide(store, payments):
+        faults.append("payments were decided twice")
+    found = await collect(study, store, served)
+    faults += [f"{person}: {fault}" for person, fault in found.unusable.items()]
+    if found.rows:
+        note_copy(served, "table", out / TABLE)
+        write_collected(found, out / TABLE)
+        await export(study, store, served, out / EXPORT, replace=True)
+    counts = (await store.counts()).cells
+    made = Report(
+        settings,
+        not faults,
+        dict(Counter(one.outcome for one in people)),
+        {cell: count.finished for cell, count in counts.items()},
+        sum(payment.cents for payment in payments),
+        faults,
+    )
+    write_text_atomically(out / REPORT, msgspec.json.format(msgspec.json.encode(made)).decode() + "\n")
+    return made

@@ -1,0 +1,166 @@
+"""A rehearsal: starts the study's server, sends simulated people to it, and keeps what came of them."""
+
+import asyncio
+import contextlib
+import sys
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Annotated
+
+import httpx
+import msgspec
+
+from experiments.errors import ConfigError, RecordError
+from experiments.house import House
+from experiments.study.file import Study
+from experiments.study.plan import plan_of
+from experiments.study.recruitment import recruiter
+from experiments.study.rehearsal.person import Person, Rehearsed, Surroundings
+from experiments.study.rehearsal.plan import Planned, plan_people
+from experiments.visit.phases import phases_of
+from mjsim.support.files import write_text_atomically
+
+SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
+WORKERS = "20"  # trials at a time; in a hurry, they need not be on time
+END_TIMEOUT = 60.0  # s that the server has to end
+HTTP_TIMEOUT = 120.0  # s
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a rehearsal does; kept in its folder, so that it goes on with the same people."""
+
+    study: str  # SHA-256 of the study file
+    people: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
+    seed: int
+    per_minute: float  # people who arrive in a minute of the study's time
+    dropouts: float  # share of those who leave
+    factor: float  # by which all waiting is shorter
+
+
+async def rehearse(
+    study: Study, settings: Settings, out: Path, film: Path | None, on_person: Callable[[Rehearsed], None]
+) -> list[Rehearsed]:
+    """Send everybody who has not been through it yet; what came of all, in order.
+
+    Args:
+        study: The study.
+        settings: Of the rehearsal.
+        out: Folder of the rehearsal.
+        film: Of the house; None lets the server make it.
+        on_person: Called for each person who has ended, those of an earlier run included.
+
+    Raises:
+        ConfigError: The folder holds another rehearsal.
+        RecordError: The server cannot be started, or has ended.
+    """
+    _keep(settings, out)
+    known = read_people(out / PEOPLE)
+    names = [phase.name for phase in phases_of(plan_of(study))]
+    planned = plan_people(
+        names, settings.people, settings.seed, per_minute=settings.per_minute, dropouts=settings.dropouts
+    )
+    done = [rehearsed for rehearsed in known.values() if rehearsed.outcome not in ("", "stuck")]
+    for rehearsed in done:
+        on_person(rehearsed)
+    left = [one for one in planned if one.number not in {rehearsed.number for rehearsed in done}]
+    if left:
+        async with _server(study, settings, out, film) as base:
+            await _send(study, settings, out, base, left, known, on_person)
+    return [known[one.number] for one in planned]
+
+
+def read_people(path: Path) -> dict[int, Rehearsed]:
+    """What is known of the people of a rehearsal by number; the last line of each counts."""
+    lines = path.read_bytes().splitlines() if path.is_file() else []
+    found = {}
+    for line in lines:
+        with contextlib.suppress(msgspec.DecodeError):  # the last one may have been cut off
+            rehearsed = msgspec.json.decode(line, type=Rehearsed)
+            found[rehearsed.number] = rehearsed
+    return found
+
+
+def _keep(settings: Settings, out: Path) -> None:
+    path = out / PLAN
+    text = msgspec.json.format(msgspec.json.encode(settings)).decode() + "\n"
+    if path.is_file() and path.read_text() != text:
+        raise ConfigError(f"{path} is that of another rehearsal; choose another --out, or the same settings")
+    out.mkdir(parents=True, exist_ok=True)
+    write_text_atomically(path, text)
+
+
+@asynccontextmanager
+async def _server(study: Study, settings: Settings, out: Path, film: Path | None) -> AsyncIterator[str]:
+    """The study's server as a process of its own; its URL."""
+    command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
+    command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
+    command += [
+        "--trusted-proxy",
+        "127.0.0.1",
+        "--workers",
+        WORKERS,
+        *(["--film", str(film)] if film else []),
+    ]
+    with (out / SERVER_LOG).open("ab") as log:
+        process = await asyncio.create_subprocess_exec(
+            *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
+        )  # Ctrl-C is for this process alone
+        try:
+            url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
+            if not url:
+                raise RecordError(f"the server did not start; see {out / SERVER_LOG}")
+            yield url.rstrip("/")
+            if process.returncode is not None:
+                raise RecordError(f"the server ended by itself; see {out / SERVER_LOG}")
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                process.terminate()
+            try:
+                await asyncio.wait_for(process.wait(), END_TIMEOUT)
+            except TimeoutError:
+                process.kill()
+
+
+async def _send(
+    study: Study,
+    settings: Settings,
+    out: Path,
+    base: str,
+    people: Sequence[Planned],
+    known: dict[int, Rehearsed],
+    on_person: Callable[[Rehearsed], None],
+) -> None:
+    platform = recruiter(study.settings.recruitment)
+    own = {"STUDY_ID": study.settings.recruitment.study_id}
+    parameters = {name: own.get(name, "") for name in platform.parameters}
+    phases = {phase.name: phase for phase in phases_of(plan_of(study))}
+    house = House.load(study.cells[0].trial(0).house)
+    # Each request on a connection of its own: a pool looks at all that it keeps before each one.
+    limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
+    async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
+        around = Surroundings(
+            base, client, phases, house, parameters, study.settings.minimum, settings.factor
+        )
+        with (out / PEOPLE).open("ab", buffering=0) as kept:
+
+            async def live(planned: Planned, wait: float) -> None:
+                await asyncio.sleep(wait)
+                rehearsed = known.setdefault(planned.number, Rehearsed(planned.number))
+                person = Person(planned, around, rehearsed)
+                try:
+                    if not rehearsed.link:
+                        await person.begin()
+                        kept.write(msgspec.json.encode(rehearsed) + b"\n")
+                    await person.go()
+                except (httpx.HTTPError, TimeoutError) as error:
+                    rehearsed.faults.append(f"no answer: {type(error).__name__}: {error}")
+                    rehearsed.outcome = "stuck"
+                kept.write(msgspec.json.encode(rehearsed) + b"\n")
+                on_person(rehearsed)
+
+            new = [one.arrives for one in people if one.number not in known]
+            async with asyncio.TaskGroup() as group:
+                for one in people:
+                    wait = one.arrives - new[0] if one.number not in known else 0.0
+                    group.create_task(live(one, wait / settings.factor))

@@ -1,0 +1,137 @@
+"""What Prometheus reads, and what went wrong lately. Numbers alone: nothing here names a person."""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from experiments.visit.store import Counts
+from experiments.web.server.meter import Meter
+from experiments.web.server.sessions import Sessions
+
+LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # s
+KEPT = 50  # warnings and errors
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A line of the log: a warning or an error."""
+
+    at: datetime
+    level: str
+    text: str
+
+
+class Metrics(Meter):
+    """Counts and times of one server, since it started."""
+
+    def __init__(self) -> None:
+        registry = self._registry = CollectorRegistry()
+        ProcessCollector(registry=registry)
+        self._people = Gauge("mjsim_people", "People by status.", ["status"], registry=registry)
+        self._places = Gauge(
+            "mjsim_places", "Places of cells by state.", ["cell", "state"], registry=registry
+        )
+        self._sessions = Gauge(
+            "mjsim_sessions", "Sessions under way here, by phase.", ["phase"], registry=registry
+        )
+        self._capacity = Gauge("mjsim_sessions_capacity", "Sessions that may run here.", registry=registry)
+        self._held = Gauge("mjsim_sessions_held", "Sessions that have a place here.", registry=registry)
+        self._waiting = Gauge(
+            "mjsim_sessions_waiting", "Sessions that wait for a place here.", registry=registry
+        )
+        self._lost = Counter("mjsim_workers_lost", "Workers that died in a session.", registry=registry)
+        self._faults = Counter("mjsim_log", "Warnings and errors in the log.", ["level"], registry=registry)
+        self._inputs = Histogram(
+            "mjsim_input_acknowledged_seconds",
+            "From an input to its being safe.",
+            buckets=LATENCIES,
+            registry=registry,
+        )
+        self._writes = Histogram(
+            "mjsim_database_write_seconds",
+            "Of transactions that write.",
+            buckets=LATENCIES,
+            registry=registry,
+        )
+        self._answers = Histogram(
+            "mjsim_http_answer_seconds",
+            "Of participants' requests.",
+            ["status"],
+            buckets=LATENCIES,
+            registry=registry,
+        )
+        self.log = FaultLog(self._faults)
+
+    def acknowledged(self, seconds: float) -> None:
+        """The inputs of a message are safe, so long after they came."""
+        self._inputs.observe(seconds)
+
+    def worker_lost(self) -> None:
+        """The worker of a session has died."""
+        self._lost.inc()
+
+    def wrote(self, seconds: float) -> None:
+        self._writes.observe(seconds)
+
+    def answered(self, status: int, seconds: float) -> None:
+        self._answers.labels(f"{status // 100}xx").observe(seconds)
+
+    def text(self, counts: Counts, sessions: Sessions) -> bytes:
+        """All of it, as Prometheus reads it."""
+        for gauge in (self._people, self._places, self._sessions):
+            gauge.clear()
+        for status, number in counts.statuses.items():
+            self._people.labels(status).set(number)
+        for cell, count in counts.cells.items():
+            for state in ("held", "finished", "released"):
+                self._places.labels(str(cell), state).set(getattr(count, state))
+        for session in sessions.under_way.values():
+            self._sessions.labels(session.state.phase).inc()
+        self._capacity.set(sessions.limit.count)
+        self._held.set(len(sessions.limit.held))
+        self._waiting.set(sessions.limit.waiting)
+        return generate_latest(self._registry)
+
+
+class FaultLog(logging.Handler):
+    """Keeps and counts warnings and errors."""
+
+    def __init__(self, counter: Counter) -> None:
+        super().__init__(logging.WARNING)
+        self._counter = counter
+        self._kept: deque[Fault] = deque(maxlen=KEPT)
+
+    @property
+    def latest(self) -> Sequence[Fault]:
+        return list(self._kept)[::-1]
+
+    def emit(self, record: logging.LogRecord) -> None:
+        level = record.levelname.lower()
+        self._counter.labels(level).inc()
+        self._kept.append(Fault(datetime.fromtimestamp(record.created, UTC), level, record.getMessage()))
+
+
+class Timed:
+    """ASGI middleware: measures how long answers take."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self._app, self._metrics = app, metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        began = time.monotonic()
+
+        async def timed_send(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._metrics.answered(message["status"], time.monotonic() - began)
+            await send(message)
+
+        await self._app(scope, receive, timed_send)

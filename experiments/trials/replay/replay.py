@@ -1,0 +1,233 @@
+"""Replays a run: simulates it again, compares every control step with the record, and films it in any view."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.errors import ConfigError, RecordError, ReplayError
+from experiments.house import House
+from experiments.record import records
+from experiments.record.files import read_json
+from experiments.record.reader import Record, read_run
+from experiments.record.verify import Mismatch, checksum_mismatches, damage, derived_mismatches
+from experiments.session.film_config import CAMERAS, FIRST_PERSON, FREE, FilmConfig
+from experiments.session.first_person import Filming, FirstPersonRenderer
+from experiments.session.video import VideoWriter
+from experiments.session.viewer import Viewer
+from experiments.trials.replay.comparison import simulated_mismatches
+from experiments.trials.replay.external_view import ExternalViewer, camera_path
+from experiments.trials.replay.phases import phase_mismatches
+from experiments.trials.replay.replayer import Replayer, mismatch_error
+from experiments.trials.replay.verdicts import Verdict, verdicts
+from mjsim.support.files import replacing
+from mjsim.values.errors import AssetError
+from mjsim.values.person_parameters import PersonParameters
+
+MAX_WIDTH = 1280  # px of the picture in a film of what a page showed
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ReplayFilm:
+    """How to film a replay.
+
+    Attributes:
+        path: Video file to write.
+        config: Frame size and render profile; None for what the person's page showed, or else the usual one, with
+            `profile`.
+        camera: `first-person` (with the HUD), `top-down`, or `free`.
+        eye: Position of a free camera, m; None for one that circles the house.
+        target: Point that a free camera looks at, m; None for the middle of the floor.
+
+    Raises:
+        ConfigError: There is no such camera, or it cannot be moved.
+    """
+
+    path: Path
+    config: FilmConfig | None
+    camera: str = FIRST_PERSON
+    eye: Point | None = None
+    target: Point | None = None
+    profile: str = "fast"
+
+    def __post_init__(self) -> None:
+        if self.camera not in CAMERAS:
+            raise ConfigError(f"no camera {self.camera!r}; there are {', '.join(CAMERAS)}")
+        if self.camera != FREE and (self.eye is not None or self.target is not None):
+            raise ConfigError(f"only --camera {FREE} takes --eye and --target; this is {self.camera}")
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """Result of a replay without mismatches.
+
+    Attributes:
+        first: Control step at which it started.
+        steps: Number of verified control steps.
+        ended: Why the run ended.
+        failure: Error of the physics that ended run and replay, or None.
+        person: Who took part.
+        differences: Versions and models that differ from those of the recording, without effect.
+        verdicts: What was checked of each file.
+        frames_sha256: Hash of the filmed frames, or None.
+        as_filmed: Whether they equal the frames of the run's video bit for bit; None if one of the two has no film.
+    """
+
+    first: int
+    steps: int
+    ended: str
+    failure: str | None
+    person: PersonParameters
+    differences: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
+    frames_sha256: str | None
+    as_filmed: bool | None
+
+
+def replay(
+    directory: Path,
+    *,
+    start: float = 0.0,
+    film: ReplayFilm | None = None,
+    watch: Callable[[Replayer], Viewer] | None = None,
+    assistance: str | None = None,
+    house: House | None = None,
+    catalogue: str | None = None,
+    language: str = "en",
+    on_progress: Callable[[int, int], None] = lambda *_: None,
+) -> ReplayReport:
+    """Simulate a run again and compare every control step with the record.
+
+    Args:
+        directory: Directory of a run, or of a failed run.
+        start: Simulated time, s; the replay starts at the last checkpoint at or before it.
+        film: How to film it, or None.
+        watch: Gives a viewer of the replay, instead of a film, or None.
+        assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are the
+            recorded ones in any case.
+        house: The house of the run, if it is loaded already.
+        catalogue: Where its catalogue lies now, if not where it was; its content must be the recorded one.
+        language: Language of the words in the film.
+        on_progress: Called with the numbers of replayed and of recorded control steps.
+
+    Raises:
+        RecordError: `directory` is not a run directory.
+        ReplayError: It cannot be replayed, or differs from the record; `step` and the message name the first
+            bad control step.
+        ConfigError, MjsimError, HudError: The house, the condition or the film is unusable.
+    """
+    record = read_run(directory)
+    if faults := damage(record):
+        faults += checksum_mismatches(directory, record)
+        raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
+    duration = float(record.trajectory["time"][-1])
+    if start > round(duration, 6):  # the log is rounded like that
+        raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
+    house = (house or _house_of(directory, record, catalogue)).in_language(language)
+    shown = assistance or str(record.start["assistance"])
+    replayer = Replayer(directory, record, house, start=start, assistance=shown)
+    with ExitStack() as stack:
+        viewer, video = _open_film(replayer, film, stack) if film else (watch and watch(replayer), None)
+        replayer.run(viewer, on_progress)
+        mismatches = _mismatches(replayer)
+        end = replayer.first + replayer.replayed().steps
+        found = verdicts(directory, record, mismatches, replayer.first, end)
+        if mismatches:
+            raise mismatch_error(directory, record, mismatches[0], replayer.differences, found)
+    if (directory / records.TRAINING).is_dir():
+        training = replay(directory / records.TRAINING, house=house)
+        found = (*found, Verdict(records.TRAINING, True, f"{training.steps} steps of a run of its own"))
+    frames = video.frames_sha256 if video else None
+    return ReplayReport(
+        first=replayer.first,
+        steps=record.steps - replayer.first,
+        ended=record.reason or "",
+        failure=replayer.failure,
+        person=record.person,
+        differences=replayer.differences,
+        verdicts=found,
+        frames_sha256=frames,
+        as_filmed=_as_filmed(directory, frames),
+    )
+
+
+def _mismatches(replayer: Replayer) -> list[Mismatch]:
+    """Everything in which a finished replay or the files on disk differ from the record.
+
+    The earliest step comes first; that a file has another checksum comes last, as it is the least specific.
+    """
+    directory, record = replayer.directory, replayer.record
+    simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
+    found = sorted(simulated, key=lambda mismatch: mismatch.step)
+    if not found:
+        found += derived_mismatches(directory, record)
+    return [*found, *checksum_mismatches(directory, record)]
+
+
+def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
+    """The house of a run, from where it was or from where it lies now."""
+    name = catalogue or str(record.start["house"])
+    try:
+        house = House.load(name)
+    except AssetError as error:
+        raise ConfigError(
+            f"the house of {directory} cannot be loaded: {error}; if it lies elsewhere now, name its catalogue "
+            "with --house"
+        ) from error
+    recorded = record.start["inputs"].get("house")
+    if catalogue is not None and house.catalogue.content != recorded:
+        raise ReplayError(
+            f"{catalogue} is not the house of {directory}: its content has the hash {house.catalogue.content}, "
+            f"recorded was {recorded}; name the catalogue as it was",
+            0,
+        )
+    return house
+
+
+def as_seen(record: Record, profile: str) -> FilmConfig:
+    """A film like the page on which the browser drew last: its shape, its field of view, and the lists beside it.
+
+    Where no browser drew, the usual film.
+    """
+    views = [
+        event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
+    ]
+    if not views:
+        return FilmConfig(profile=profile)
+    width, height = views[-1]["width"], views[-1]["height"]
+    scale = min(1.0, MAX_WIDTH / width)
+    return FilmConfig(
+        max(320, round(scale * width)),
+        max(240, round(scale * height)),
+        profile,
+        beside=True,
+        field_of_view=views[-1].get("field_of_view"),
+    )
+
+
+def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:
+    """A viewer that films to a file, which appears if the replay succeeds."""
+    path = stack.enter_context(replacing(film.path))
+    config, scene, house = (
+        film.config or as_seen(replayer.record, film.profile),
+        replayer.scene,
+        replayer.house,
+    )
+    if film.camera == FIRST_PERSON:
+        renderer = stack.enter_context(FirstPersonRenderer(scene, house, config))
+        width, height = config.frame_size
+        video = stack.enter_context(VideoWriter(path, width=width, height=height))
+        return Filming(renderer, video), video
+    camera = camera_path(film.camera, house.bounds, config.width / config.height, film.eye, film.target)
+    video = stack.enter_context(VideoWriter(path, width=config.width, height=config.height))
+    return stack.enter_context(ExternalViewer(scene, config, camera, video)), video
+
+
+def _as_filmed(directory: Path, frames: str | None) -> bool | None:
+    try:
+        then = read_json(directory / records.METRICS).get("frames_sha256")
+    except RecordError:  # a failed run has no metrics
+        return None
+    return None if frames is None or then is None else bool(frames == then)

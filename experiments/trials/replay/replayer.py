@@ -1,0 +1,175 @@
+"""Simulates the session of a recorded run again."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Never
+
+from experiments.errors import RecordError, ReplayError
+from experiments.house import House
+from experiments.participants.base import Percept
+from experiments.record.reader import Record
+from experiments.record.records import RECORDING, Event, EventLog
+from experiments.record.verify import Mismatch
+from experiments.record.writer import RecordWriter, provenance
+from experiments.session.assistant import Assistant
+from experiments.session.endings import COMPLETE, PHYSICS_ERROR
+from experiments.session.session import Session
+from experiments.session.task_board import TaskBoard
+from experiments.session.viewer import Viewer
+from experiments.trials.replay.log_source import LogSource
+from mjsim.house.scene.scene import compose
+from mjsim.values.errors import ActionError, PhysicsError, StateError
+from mjsim.values.options import WorldOptions
+from mjsim.values.steps import Steps
+from mjsim.world.world import World
+from planner.regret import RegretEvaluator
+from planner.service import Planner
+
+
+class Replayer:
+    """One replay.
+
+    Args:
+        directory: The run directory.
+        record: The undamaged record in it.
+        house: The house of the run.
+        start: Simulated time, s; the replay starts at the last checkpoint at or before it.
+        assistance: Assistance condition whose HUD is shown.
+
+    Attributes:
+        scene: The composed episode.
+        first: Control step at which the replay starts.
+        mismatch: Why the replay stopped before the end of the record, or None.
+        differences: Versions and models that differ from those of the recording.
+        failure: Error of the physics in the replay, or None.
+
+    Raises:
+        ReplayError: The record cannot be replayed by this version.
+    """
+
+    def __init__(
+        self, directory: Path, record: Record, house: House, *, start: float, assistance: str
+    ) -> None:
+        house = house.for_person(record.person)
+        self.directory, self.record, self.house = directory, record, house
+        self.scene = compose(record.episode, house.catalogue, person=record.person)
+        try:
+            self._world = World(self.scene, WorldOptions(**record.start["world"]))
+        except (TypeError, ActionError) as error:
+            raise ReplayError(
+                f"the options of the recorded world are not those of this version: {error}; the first bad step is 0",
+                0,
+            ) from error
+        self._assistance = assistance
+        self._checkpoint = record.checkpoint_before(start)
+        self._log = EventLog()
+        self._written = RecordWriter(record.episode, self._log, checkpoints=record.checkpoint_steps)
+        self.first = self._checkpoint or 0
+        self.mismatch: Mismatch | None = None
+        self.failure: str | None = None
+        self.differences = tuple(_differences(record.start, provenance(self._world)))
+
+    def run(self, viewer: Viewer | None, on_progress: Callable[[int, int], None]) -> None:
+        """Replay to the end or to the first mismatch."""
+        session, steps = self._restored_session(viewer), self.record.steps
+        try:
+            for step in range(self.first, steps):
+                session.repeat_events(self.record, step)
+                if not self._repeat(session, step):
+                    return
+                on_progress(step + 1, steps)
+        except PhysicsError as error:
+            session.fail(error)
+            self.failure = str(error)
+
+    def replayed(self) -> Record:
+        """The record of the replay from `first` on; its log also has the events before."""
+        return self._written.record()
+
+    @property
+    def logged_before(self) -> int:
+        """Number of events in the log of the replay that were not simulated."""
+        return self.record.events_before(self.first) if self.first else 0
+
+    def _restored_session(self, viewer: Viewer | None) -> Session:
+        """The session at the start of the run, or at the checkpoint."""
+        record = self.record
+        evaluator = RegretEvaluator(self.house.geodesics, capacity=self._world.options.capacity)
+        assistant = Assistant(
+            TaskBoard(self.house, record.episode, record.start["order"], record.person.eye_height),
+            assistance=self._assistance,
+            planner=Planner(LogSource(record.plans, lambda: session.time), evaluator),
+            log=self._log,
+            options=self._world.options,
+        )
+        limit = float(record.start["time_limit"])
+        session = Session(
+            self._world, assistant, _NoParticipant(), self._written, time_limit=limit, viewer=viewer
+        )
+        try:
+            session.restore(record, self._checkpoint)
+        except StateError as error:
+            mismatch = Mismatch(self.first, str(error), RECORDING)
+            raise mismatch_error(self.directory, record, mismatch, self.differences) from error
+        return session
+
+    def _repeat(self, session: Session, step: int) -> bool:
+        """Repeat a control step, or the end of the session; whether there is more to repeat."""
+        record, is_last = self.record, step == self.record.steps - 1
+        if (reason := session.end_reason) is not None:
+            session.end(reason)
+            return False
+        if is_last and record.reason in COMPLETE:
+            return self._stop(step, f"the run ended here ({record.reason}), the replay continues")
+        try:
+            action = record.action(step)
+        except RecordError as error:
+            return self._stop(step, str(error))
+        if is_last and record.reason != PHYSICS_ERROR:  # it broke off in this step: only the state is known
+            seen = self._written.pass_checkpoint(self._world, self._world.observation())
+            self._written.append(seen, self._world.health_sample, self._world.state_hash(), Steps(action))
+        else:
+            session.repeat(action)
+        if self._written.last_state_hash != int(record.recording["state_hash"][step]):
+            return self._stop(step, "the state differs from the recorded one")
+        return True
+
+    def _stop(self, step: int, message: str) -> bool:
+        self.mismatch = Mismatch(step, message, RECORDING)
+        return False
+
+
+class _NoParticipant:
+    """Takes the place of the participant in a replay, which repeats recorded actions."""
+
+    needs: frozenset[str] = frozenset()
+
+    def act(self, percept: Percept) -> Never:
+        raise NotImplementedError
+
+
+def mismatch_error(
+    directory: Path,
+    record: Record,
+    mismatch: Mismatch,
+    differences: tuple[str, ...] = (),
+    verdicts: tuple[object, ...] = (),
+) -> ReplayError:
+    """The error of a mismatch: one line with the first bad step, the fault and possible reasons."""
+    timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
+    where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
+    reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
+    line = f"{directory}: {where}: {mismatch.message}{reasons}"
+    return ReplayError(line, mismatch.step, [str(verdict) for verdict in verdicts])
+
+
+def _differences(then: Event, now: Mapping[str, Any]) -> list[str]:
+    labels = {"mujoco": "MuJoCo", "physics_code": "mjsim's physics code"}
+    found = []
+    for name, value in now["versions"].items():
+        before = then.get("versions", {}).get(name)
+        if before != value:
+            found.append(f"{labels.get(name, name)} was {before}, is {value}")
+    if then.get("model") != now["model"]:
+        found.append(f"the compiled house was {then.get('model')}, is {now['model']}")
+    return found

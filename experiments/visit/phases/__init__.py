@@ -1,0 +1,50 @@
+"""Phases of a visit, which a participant goes through one after the other."""
+
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+
+from experiments.errors import ConfigError
+from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.visit import plan as names
+from experiments.visit.phases.base import FormPhase, Phase, Result, Story
+from experiments.visit.phases.comprehension import Comprehension
+from experiments.visit.phases.consent import Consent
+from experiments.visit.phases.device import DeviceCheck
+from experiments.visit.phases.played import Played
+from experiments.visit.phases.survey import Survey
+from experiments.visit.plan import VisitPlan
+
+KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
+    names.CONSENT: lambda plan: Consent(plan, names.CONSENT, "consent"),
+    names.DEVICE: lambda plan: DeviceCheck(plan, names.DEVICE, "device"),
+    STORY: lambda plan: Story(plan, STORY),
+    FLYTHROUGH: lambda plan: FormPhase(plan, FLYTHROUGH, "study_film"),
+    names.COMPREHENSION: lambda plan: Comprehension(plan, names.COMPREHENSION, "comprehension"),
+    TRAINING: lambda plan: Played(plan, TRAINING),
+    TASK: lambda plan: Played(plan, TASK),
+    names.SURVEY: lambda plan: Survey(plan, names.SURVEY),
+    names.DEBRIEFING: lambda plan: FormPhase(plan, names.DEBRIEFING),
+    names.RESULT: lambda plan: Result(plan, names.RESULT, "result"),
+    names.COMPLETION: lambda plan: FormPhase(plan, names.COMPLETION, "completion"),
+}
+
+
+def phases_of(plan: VisitPlan) -> Sequence[Phase]:
+    """Make the phases of a plan, in order. A custom one is named by its factory, `package.module:attribute`.
+
+    Raises:
+        ConfigError: One cannot be loaded or made.
+    """
+    return [_phase(name, plan) for name in plan.phases]
+
+
+def _phase(name: str, plan: VisitPlan) -> Phase:
+    if name in KINDS:
+        return KINDS[name](plan)
+    try:
+        phase = pkgutil.resolve_name(name)(plan)
+    except Exception as error:  # user code may raise anything
+        raise ConfigError(f"cannot make phase {name!r}: {type(error).__name__}: {error}") from error
+    if not isinstance(phase, Phase):
+        raise ConfigError(f"phase {name!r} is {phase!r}, which has not all of name, page and read")
+    return phase

@@ -1,0 +1,74 @@
+"""Whether a person's computer can show the house: WebGL 2, frame rate, connection, keyboard, size of the window."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from experiments.visit.phases.base import Again, Done, FormData, FormPhase, Visitor
+from experiments.visit.plan import Device
+
+MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
+MAX_RENDERER = 200  # characters
+
+
+@dataclass(frozen=True)
+class _Measured:
+    values: Mapping[str, float]
+    keyboard: bool
+    webgl: bool
+    renderer: str
+
+    def faults(self, needed: Device, draws: bool) -> list[str]:
+        """Names of the texts that say what does not fit; pictures that the server draws need no WebGL."""
+        values = self.values
+        found = [
+            ("bad_frames", draws and values["frames_per_s"] < needed.frames_per_s),
+            ("bad_latency", values["latency_ms"] > needed.latency_ms),
+            ("bad_keyboard", needed.keyboard and not self.keyboard),
+            ("bad_screen", values["width"] < needed.width or values["height"] < needed.height),
+        ]
+        return [name for name, bad in found if bad]
+
+
+class DeviceCheck(FormPhase):
+    """A page that measures and sends what it found."""
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+        return {"keyboard": self._plan.device.keyboard}
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
+        """What was measured, if it suffices; who gives up is screened out."""
+        measured = _measured(sent)
+        if measured is None:
+            return Again(self._plan.texts["common"]["needs_script"])
+        answers = {
+            **measured.values,
+            "keyboard": measured.keyboard,
+            "webgl": measured.webgl,
+            "renderer": measured.renderer,
+        }
+        faults = measured.faults(self._plan.device, measured.webgl)
+        if sent.get("give_up"):
+            return Done({**answers, "faults": faults}, "screened_out" if faults else "next")
+        if faults:
+            return Again(" ".join(self.texts[name] for name in faults), {"failed": True})
+        return Done(answers)
+
+    def example(self) -> dict[str, str]:
+        needed = self._plan.device
+        fits = {"frames_per_s": max(needed.frames_per_s, 1.0), "latency_ms": needed.latency_ms}
+        fits |= {"width": needed.width, "height": needed.height, "pixel_ratio": 1.0}
+        return {**{name: str(value) for name, value in fits.items()}, "keyboard": "yes", "webgl": "yes"}
+
+
+def _measured(sent: FormData) -> _Measured | None:
+    """What the page measured; None where that is no measurement."""
+    try:
+        values = {name: float(sent.get(name, "")) for name in MEASURES}
+    except ValueError:
+        return None
+    if not all(math.isfinite(value) and 0.0 <= value < 1e6 for value in values.values()):
+        return None
+    webgl = sent.get("webgl") == "yes"
+    return _Measured(values, sent.get("keyboard") == "yes", webgl, sent.get("renderer", "")[:MAX_RENDERER])

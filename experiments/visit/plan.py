@@ -1,0 +1,96 @@
+"""Plan of a visit: what a server has to know to take participants from the first phase to the last."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
+from experiments.visit.recruiter import Recruiter
+from experiments.visit.store import Assignment, CellQuota, Rule
+from experiments.visit.texts import Texts
+
+CONSENT, DEVICE, COMPREHENSION, SURVEY = "consent", "device", "comprehension", "survey"
+DEBRIEFING, COMPLETION, RESULT = "debriefing", "completion", "result"
+PHASES = (CONSENT, DEVICE, STORY, FLYTHROUGH, COMPREHENSION, TRAINING, TASK, SURVEY, DEBRIEFING, COMPLETION)
+PLAYED = (TRAINING, TASK)
+
+Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=86400.0)]
+Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
+
+
+class Device(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a participant's computer has to have."""
+
+    frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
+    latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
+    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # px of the window
+    height: Annotated[int, msgspec.Meta(ge=0)] = 500
+    keyboard: bool = True
+
+
+class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What ends a participation."""
+
+    idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
+    abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
+    timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends
+    attempts: Count = 3  # at the comprehension check
+    # how many items of the survey with a right answer may be answered wrongly; None screens nobody out
+    inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
+    keep_days: Count | None = None  # after which personal data are deleted
+
+    def __post_init__(self) -> None:
+        if self.timed_out_after < self.abandoned_after:
+            raise ValueError(
+                f"timed_out_after is {self.timed_out_after:g} s; it cannot be less than abandoned_after, "
+                f"{self.abandoned_after:g} s"
+            )
+
+
+@dataclass(frozen=True)
+class VisitPlan:
+    """Plan of all visits of a study, or of `mjsim play`.
+
+    Attributes:
+        name: Name of the study in the database.
+        language: Language tag of the pages.
+        phases: Names of the phases, in order; the last one is reached, not completed.
+        story: Text of the story, with blank lines between paragraphs.
+        minimum: Seconds before which a phase cannot be ended; infinite for a trial that only its own end ends.
+        optional: Phases that may be skipped.
+        minutes: Expected duration of a visit.
+        cells: Cells of the design. An assignment names one, and a place in it.
+        rule: How a cell is chosen for a participant.
+        trials: Returns the settings of the trials of an assignment, by phase.
+        film: Film of the house, or None.
+        headset: True if the page of a trial offers a headset.
+        floor_plan: True if the run of the task gets a picture of its paths.
+        rehearsal: True if all participants are simulated.
+    """
+
+    name: str
+    title: str
+    language: str
+    phases: tuple[str, ...]
+    texts: Texts
+    story: str
+    minimum: Mapping[str, float]
+    optional: frozenset[str]
+    limits: Limits
+    device: Device
+    minutes: float
+    cells: Sequence[CellQuota]
+    rule: Rule
+    trials: Callable[[Assignment], Mapping[str, dict[str, Any]]]
+    recruiter: Recruiter
+    film: Path | None = None
+    headset: bool = False
+    floor_plan: bool = False
+    rehearsal: bool = False
+
+    @property
+    def story_paragraphs(self) -> list[str]:
+        return [part for part in self.story.split("\n\n") if part.strip()]

@@ -1,0 +1,229 @@
+"""The way of participants through the phases of a visit."""
+
+import asyncio
+import dataclasses
+import datetime
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.record.phases import FLYTHROUGH, STORY, TASK
+from experiments.visit.folders import Ended, VisitFolder, VisitFolders
+from experiments.visit.phases import phases_of
+from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, Visitor
+from experiments.visit.phases.played import Played
+from experiments.visit.plan import PLAYED, RESULT, VisitPlan
+from experiments.visit.recruiter import AFTER
+from experiments.visit.store import Assignment, Person, Status, Store
+from experiments.visit.store.values import utc_now
+from experiments.web.server.player import LiveTrial
+
+FULL = "full"  # reason of a phase that ended because no place was left
+ATTEMPTS = "attempts"  # answer in which the attempts at a phase are counted
+
+
+@dataclass(frozen=True)
+class Now:
+    """Where a participant is.
+
+    Attributes:
+        phase: Phase under way; None if the participation has ended.
+        number: Number of the phase, from 1.
+        wait: Seconds before the phase may be ended.
+    """
+
+    person: Person
+    phase: Phase | None
+    number: int
+    visitor: Visitor
+    wait: float
+
+
+class Procedure:
+    """The phases of a plan, with the store and the folders that record how participants go through them.
+
+    Args:
+        plan: Plan of the visits.
+        store: Records participants, their phases and answers.
+        folders: Hold what is played.
+        rng: Source of assignments.
+    """
+
+    def __init__(
+        self, plan: VisitPlan, store: Store, folders: VisitFolders, rng: np.random.Generator
+    ) -> None:
+        self.plan, self.store, self.folders = plan, store, folders
+        self.phases = phases_of(plan)
+        self.names = [phase.name for phase in self.phases]
+        self._rng = rng
+
+    async def now(self, person: Person, path: str) -> Now:
+        """Return where a participant is, and record when the phase was first shown."""
+        if not person.active and person.status != "finished":
+            return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
+        number = self.names.index(person.phase)
+        passed, wait = await self.times(person)
+        rows = await self.store.answers(person.id)
+        answers = {row.item: row.value for row in rows if row.phase == person.phase}
+        visitor = Visitor(answers, passed, answers.get(ATTEMPTS, 0), path, self._metrics(person))
+        return Now(person, self.phases[number], number + 1, visitor, wait)
+
+    async def times(self, person: Person) -> tuple[float, float]:
+        """Return the seconds since the participant's phase was first shown, and those until it may be ended."""
+        shown = await self.store.show_phase(person.id, person.phase)
+        passed = (utc_now() - shown.shown).total_seconds()
+        minimum = self.plan.minimum.get(person.phase, 0.0)
+        # A negative time has passed if the clock was set back.
+        return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
+
+    async def submit(self, now: Now, phase: str, sent: FormData) -> Again | None:
+        """Handle a submitted form. Return an error message, or None if it was accepted or came from an earlier page."""
+        current = now.phase
+        if current is None or phase != current.name or isinstance(current, Played):
+            return None
+        if phase == self.names[-1]:
+            return None
+        skipped = bool(sent.get("skip")) and phase in self.plan.optional
+        if now.wait > 0.0 and not skipped:
+            return Again(self.plan.texts["common"]["too_early"])
+        read = Done({"skipped": True}) if skipped else current.read(now.visitor, sent)
+        attempts = {ATTEMPTS: now.visitor.attempts + 1}
+        if isinstance(read, Again):
+            await self.store.save_answers(now.person.id, phase, attempts)
+            return read
+        answers = {**read.answers, **(attempts if now.visitor.attempts else {})}
+        if read.outcome == "next":
+            await self._move_on(now.person, phase, answers)
+        else:
+            await self.store.finish_phase(now.person.id, phase, phase, answers, status=read.outcome)
+        return None
+
+    async def save(self, now: Now, phase: str, sent: FormData) -> None:
+        """Store the answers of a form that has not been submitted yet."""
+        current = now.phase
+        if current is None or phase != current.name or not hasattr(current, "drafts"):
+            return
+        if drafts := current.drafts(sent):
+            await self.store.save_answers(now.person.id, phase, drafts)
+
+    async def assign(self, person: Person) -> Assignment | None:
+        """Return the place of a participant who has not begun to play. None if all cells are full."""
+        plan = self.plan
+        return await self.store.assign(
+            person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
+        )
+
+    async def begin_playing(self, person: Person, place: Assignment) -> VisitFolder:
+        """Make the folder of a visit, with the settings of its trials."""
+        played = [name for name in self.names if name in PLAYED]
+        ended = await self._before_playing(person)
+        trials = self.plan.trials(await self._after_earlier_visit(person, place))
+        return await asyncio.to_thread(self.folders.create, person.token_hash, played, trials, ended)
+
+    async def withdraw(self, person: Person, *, delete: bool) -> None:
+        await self.store.withdraw(person.id, delete=delete)
+        if delete:
+            await asyncio.to_thread(self.folders.remove, person.token_hash)
+
+    async def room(self) -> int:
+        """Return the number of free places that are not yet claimed by participants in earlier phases."""
+        wanted = [cell.wanted for cell in self.plan.cells]
+        return await self.store.room(wanted, self.names[0], self._away)
+
+    async def turn_away(self, person: Person) -> Person:
+        """End the participation of a participant for whom there is no place."""
+        here = person.phase
+        await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
+        return await self.store.person(person.id)
+
+    async def record_trials(self, person: Person) -> Person:
+        """Record the participant's trials whose runs have been written, and return the participant afterwards."""
+        while person.active and person.phase in PLAYED:
+            folder = self.folders.find(person.token_hash)
+            if folder is None or not folder.is_over(person.phase):
+                break
+            ended = (await asyncio.to_thread(folder.metrics, person.phase))["ended"]
+            run = folder.run(person.phase).relative_to(self.folders.path.parent)
+            await self.store.finish_trial(person.id, person.phase, run.as_posix(), ended)
+            await self._move_on(person, person.phase, {}, ended)
+            person = await self.store.person(person.id)
+        return person
+
+    async def recover(self) -> None:
+        """Record the trials that ended while no server ran."""
+        for person in await self.store.people():
+            await self.record_trials(person)
+
+    async def adopt(self) -> None:
+        """Add participants for folders of visits that were made before `mjsim play` had a database."""
+        for folder in await asyncio.to_thread(self.folders.all):
+            if await self.store.find(folder.path.name) is None:
+                here = folder.stored.phase
+                if here != FLYTHROUGH or here not in self.names:
+                    here = next(name for name in self.names if name in folder.stored.trials)
+                await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
+
+    @property
+    def _away(self) -> datetime.timedelta:
+        return datetime.timedelta(seconds=self.plan.limits.abandoned_after)
+
+    def _metrics(self, person: Person) -> Mapping[str, Any] | None:
+        """Metrics of the task, for the page of the result."""
+        folder = self.folders.find(person.token_hash) if person.phase == RESULT else None
+        return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
+
+    async def _after_earlier_visit(self, person: Person, place: Assignment) -> Assignment:
+        """Give the next house seed to a participant who has seen the best way through the episode of this one."""
+        earlier = (await self.store.identity(person.id)).get(AFTER)
+        folder = self.folders.find(earlier) if earlier else None
+        if folder is None or not folder.is_over(TASK):
+            return place
+        return dataclasses.replace(place, house_seed=folder.settings(TASK)["house_seed"] + 1)
+
+    async def _before_playing(self, person: Person) -> list[Ended]:
+        """The phases that the record of the task mentions."""
+        wanted = [name for name in (STORY, FLYTHROUGH) if name in self.names]
+        found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
+        shown = [found[name] for name in wanted if name in found]
+        return [Ended(phase.name, phase.duration_s or 0.0) for phase in shown]
+
+    async def _move_on(self, person: Person, phase: str, answers: Answers, reason: str | None = None) -> None:
+        """End a phase. A participant who reaches the last one has finished."""
+        names = self.names
+        following = names[names.index(phase) + 1]
+        status: Status | None = "finished" if following == names[-1] else None
+        await self.store.finish_phase(person.id, phase, following, answers, reason, status=status)
+
+
+class BrowserPlayer:
+    """A participant of a procedure who plays in a browser."""
+
+    def __init__(self, procedure: Procedure, person: Person) -> None:
+        self.key = person.token_hash
+        self._procedure, self._id = procedure, person.id
+
+    async def trial(self) -> LiveTrial | None:
+        procedure = self._procedure
+        person = await procedure.record_trials(await procedure.store.person(self._id))
+        folder = procedure.folders.find(person.token_hash)
+        if folder is None or not person.active or person.phase not in PLAYED:
+            return None
+        _, wait = await procedure.times(person)
+        phase = person.phase
+        return LiveTrial(
+            phase,
+            folder.journal(phase),
+            folder.run(phase),
+            folder.settings(phase),
+            await asyncio.to_thread(folder.before, phase),
+            time.monotonic() + wait,
+            floor_plan=procedure.plan.floor_plan and phase == TASK,
+            language=procedure.plan.language,
+            texts=procedure.plan.texts["hud"].words,
+        )
+
+    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002 - the folder tells which are over
+        await self._procedure.record_trials(await self._procedure.store.person(self._id))

@@ -1,0 +1,1 @@
+"""The server of visits: pages and WebSockets for participants."""

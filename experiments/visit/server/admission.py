@@ -1,0 +1,123 @@
+"""Who comes: the first page, who may begin, and who is recognised."""
+
+import asyncio
+import hmac
+import logging
+import time
+
+from starlette.requests import Request
+from starlette.responses import RedirectResponse, Response
+
+from experiments.visit.procedure import Procedure
+from experiments.visit.recruiter import Arrival, Preview, Refusal
+from experiments.visit.server.pages import VisitPages
+from experiments.visit.store import Person
+from experiments.visit.tokens import Keys, new_token, token_hash
+from experiments.web.server.form import sent_form
+from experiments.web.server.guards import Rate
+
+LOG = logging.getLogger("mjsim.study")
+NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
+COUNTED = (
+    10.0  # s for which a count of free places is good; whoever comes to one too many is told at the training
+)
+COUNTED_FULL = 1.0  # s for which none is free
+TOKEN = "token"  # field of a form by which a browser shows that the person began in it
+
+
+class Arrivals:
+    """The door of a study.
+
+    Args:
+        procedure: Of the study.
+        pages: What they see.
+        keys: Of the study.
+    """
+
+    def __init__(self, procedure: Procedure, pages: VisitPages, keys: Keys) -> None:
+        self._procedure, self._pages, self._keys = procedure, pages, keys
+        self._plan, self._store = procedure.plan, procedure.store
+        self._recruiter = self._plan.recruiter
+        self._new = Rate(*NEW_PEOPLE)
+        self._counting = asyncio.Lock()
+        self._room, self._counted = 0, 0.0  # free places, and until when that count is good
+
+    async def welcome(self, request: Request) -> Response:
+        """The first page; who comes again goes on."""
+        came = self._recruiter.arrive(request.query_params)
+        if isinstance(came, Refusal):
+            LOG.warning("a link was refused: %s", came.reason)
+            return self._pages.message(request, "unknown", 400)
+        if isinstance(came, Arrival) and (person := await self._known(came)) is not None:
+            return await self._again(request, came, person)
+        if (closed := await self._closed()) is not None:
+            return self._pages.closed(request, closed)
+        return self._pages.show(
+            request,
+            "welcome",
+            section=self._plan.texts["welcome"],
+            parameters={name: request.query_params.get(name, "") for name in self._recruiter.parameters},
+            remembers=self._recruiter.platform == "link",
+            forgets=self._recruiter.platform == "lab",
+            preview=isinstance(came, Preview),
+        )
+
+    async def begin(self, request: Request) -> Response:
+        if not self._new.allows(request.client.host if request.client else ""):
+            return self._pages.message(request, "paused", 429)
+        form = {name: str(value) for name, value in (await sent_form(request)).items()}
+        came = self._recruiter.arrive(form)
+        if not isinstance(came, Arrival):
+            return self._pages.message(request, "unknown", 400)
+        if (person := await self._known(came)) is not None:
+            return await self._again(request, came, person, form.get(TOKEN, ""))
+        if (closed := await self._closed()) is not None:
+            return self._pages.closed(request, closed)
+        return await self._arrive(came)
+
+    async def _known(self, came: Arrival) -> Person | None:
+        """The person who came before with the platform's id of this one."""
+        return None if came.key is None else await self._store.find(token_hash(self._keys.token(came.key)))
+
+    async def _again(self, request: Request, came: Arrival, person: Person, token: str = "") -> Response:
+        """Let somebody who came before go on, if all ids are those of then, or the browser has the person's link.
+
+        A platform's id of a person is known to others; that of the submission to the person alone.
+        """
+        same = came.identity == await self._store.identity(person.id)
+        if came.key is not None and (
+            same
+            or person.status == "no_consent"  # nothing is known of them
+            or hmac.compare_digest(token.encode(), self._keys.token(came.key).encode())
+        ):
+            return await self._arrive(came)
+        LOG.warning("person %d comes with other ids than before, from another browser", person.id)
+        section = self._plan.texts["returning"]
+        ids = {name: came.identity.get(name, "") for name in self._recruiter.parameters}
+        return self._pages.show(request, "returning", 403, section=section, parameters=ids)
+
+    async def _arrive(self, came: Arrival) -> Response:
+        token, key = new_token(), None
+        if came.key is not None:
+            token, key = self._keys.token(came.key), self._keys.person(came.key)
+        first = self._procedure.names[0]
+        person = await self._store.arrive(
+            self._recruiter.platform, key, came.identity, token_hash(token), first
+        )
+        if not person.returning:
+            self._room -= 1
+            if self._room < 1:
+                self._counted = 0.0
+            LOG.info("person %d arrives", person.id)
+        return RedirectResponse(f"/play/{token}", 303)
+
+    async def _closed(self) -> str | None:
+        """Why nobody new may come: the name of a text; None if people may."""
+        state = (await self._store.study()).state
+        if state != "open":
+            return "paused" if state == "paused" else "full"
+        async with self._counting:  # once for all who come at once
+            if time.monotonic() > self._counted:
+                self._room = await self._procedure.room()
+                self._counted = time.monotonic() + (COUNTED if self._room > 0 else COUNTED_FULL)
+        return None if self._room > 0 else "full"

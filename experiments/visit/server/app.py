@@ -1,0 +1,269 @@
+"""The server of visits: a welcome, the phases one after the other, the end."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from experiments.errors import RecordError, StoreError
+from experiments.visit.phases.base import Again
+from experiments.visit.phases.played import Played
+from experiments.visit.plan import RESULT
+from experiments.visit.procedure import Now, Procedure
+from experiments.visit.server.admission import Arrivals
+from experiments.visit.server.host import HostOfVisits
+from experiments.visit.server.pages import VisitPages
+from experiments.visit.server.timeouts import end_absent
+from experiments.visit.server.trials import Trials
+from experiments.visit.store import Assignment, Person
+from experiments.visit.tokens import TOKEN, Keys, token_hash
+from experiments.web.server.form import sent_form
+from experiments.web.server.guards import Guards, Network, allowed_hosts
+from experiments.web.server.meter import Meter
+from experiments.web.server.pool import WorkerPool
+from experiments.web.server.scene_files import scene_route
+from experiments.web.server.static_files import static_routes
+from mjsim.formats.gltf.store import scenes_folder
+
+LOG = logging.getLogger("mjsim.study")
+FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
+MAX_FORM = 64 * 1024  # bytes
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Options of a server that are not part of the plan.
+
+    Attributes:
+        secret: Key from which tokens of participants with a platform's id are made.
+        proxies: Proxies whose X-Forwarded-For header is trusted.
+        meter: Receives session metrics.
+        host: Name of this host if several share a database; None for the only one.
+        workers: Trials at a time; None for as many as the machine holds.
+        background: Tasks that run as long as the server.
+    """
+
+    secret: bytes = b""
+    proxies: tuple[Network, ...] = ()
+    meter: Meter | None = None
+    host: str | None = None
+    workers: int | None = None
+    background: Sequence[Callable[[], Coroutine[Any, Any, None]]] = ()
+
+
+class _ElsewhereError(Exception):
+    """Another host has a person."""
+
+
+class VisitServer:
+    """Pages and sockets of all visits.
+
+    Attributes:
+        sessions: Sessions under way.
+    """
+
+    def __init__(self, procedure: Procedure, pool: WorkerPool, options: ServerOptions) -> None:
+        self._procedure, self._options, self._pool = procedure, options, pool
+        self._plan, self._store = procedure.plan, procedure.store
+        self._trials = Trials(procedure, pool, options.workers, options.meter)
+        self.sessions = self._trials.sessions
+        self._pages = VisitPages(self._plan)
+        self._arrivals = Arrivals(procedure, self._pages, Keys(options.secret, self._plan.name))
+        self._host = (
+            None if options.host is None else HostOfVisits(options.host, self._store, procedure.folders)
+        )
+        self._locks: dict[str, asyncio.Lock] = {}
+
+    def app(self, host: str, public: str | None = None) -> Starlette:
+        """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
+        return Starlette(
+            routes=[
+                Route("/", self._arrivals.welcome),
+                Route("/begin", self._arrivals.begin, methods=["POST"]),
+                Route("/play/{token}", self._show),
+                Route("/play/{token}", self._submit, methods=["POST"]),
+                Route("/play/{token}/answers", self._save, methods=["POST"]),
+                Route("/play/{token}/withdrawal", self._ask_to_leave),
+                Route("/play/{token}/withdrawal", self._leave, methods=["POST"]),
+                Route("/play/{token}/film", self._film),
+                Route("/play/{token}/floor-plan.png", self._floor_plan),
+                Route("/play/{token}/ping", self._ping),
+                WebSocketRoute("/play/{token}", self._play),
+                scene_route(scenes_folder()),
+                *static_routes(),
+            ],
+            middleware=[
+                Middleware(
+                    TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
+                ),
+                Middleware(
+                    Guards,
+                    public=public,
+                    proxies=self._options.proxies,
+                    max_body=MAX_FORM,
+                    embedded_by=self._plan.recruiter.embedded_by,
+                ),
+            ],
+            exception_handlers={
+                404: self._unknown,
+                _ElsewhereError: self._elsewhere,
+                StoreError: self._out_of_order,
+                RecordError: self._out_of_order,
+                OSError: self._out_of_order,
+                Exception: self._failed,
+            },
+            lifespan=self._lifespan,
+        )
+
+    @asynccontextmanager
+    async def _lifespan(self, _: Starlette) -> AsyncIterator[None]:
+        await self._procedure.recover()
+        works: list[Coroutine[Any, Any, None]] = [self.sessions.watch(), end_absent(self._procedure)]
+        if self._host is not None:
+            works.append(self._host.keep(self.sessions))
+        tasks = [asyncio.create_task(work) for work in (*works, *(one() for one in self._options.background))]
+        try:
+            yield
+        finally:
+            for task in tasks:
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
+            await self.sessions.release()
+            await self._pool.close()
+            if self._host is not None:
+                with suppress(StoreError):  # it is silent soon
+                    await self._host.leave()
+            await self._store.close()
+
+    async def _show(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return self._pages.message(request, "unknown", 404)
+        return await self._show_phase(request, person)
+
+    async def _submit(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return self._pages.message(request, "unknown", 404)
+        form = await sent_form(request)
+        async with self._lock(person):
+            now = await self._procedure.now(person, request.url.path)
+            refused = await self._procedure.submit(now, str(form.get("phase", "")), form)
+        if refused is not None:
+            return await self._show_phase(request, person, refused)
+        return RedirectResponse(request.url.path, 303)
+
+    async def _save(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None:
+            return Response(status_code=404)
+        form = await sent_form(request)
+        async with self._lock(person):  # so that an answer does not replace a later one
+            now = await self._procedure.now(person, request.url.path)
+            await self._procedure.save(now, str(form.get("phase", "")), form)
+        return Response(status_code=204)
+
+    async def _ask_to_leave(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None or not person.active:
+            return self._pages.message(request, "unknown", 404)
+        path = f"/play/{request.path_params['token']}"
+        return self._pages.show(request, "withdrawal", section=self._plan.texts["withdrawal"], path=path)
+
+    async def _leave(self, request: Request) -> Response:
+        person = await self._person(request)
+        if person is None or not person.active:
+            return self._pages.message(request, "unknown", 404)
+        form = await sent_form(request)
+        async with self._lock(person):
+            await self.sessions.release(lambda session: session.player.key == person.token_hash)
+            self.sessions.limit.release(person.token_hash)  # also where its page had just been let in
+            await self._procedure.withdraw(person, delete=form.get("data") == "delete")
+        return RedirectResponse(f"/play/{request.path_params['token']}", 303)
+
+    async def _film(self, request: Request) -> Response:
+        if await self._person(request) is None or self._plan.film is None:
+            return PlainTextResponse("not found\n", 404)
+        return FileResponse(self._plan.film, headers=FILM_HEADERS, media_type="video/mp4")
+
+    async def _floor_plan(self, request: Request) -> Response:
+        person = await self._person(request)
+        folder = None if person is None else self._procedure.folders.find(person.token_hash)
+        if person is None or folder is None or person.phase != RESULT or not folder.floor_plan.is_file():
+            return PlainTextResponse("not found\n", 404)
+        return FileResponse(folder.floor_plan, media_type="image/png")
+
+    async def _ping(self, request: Request) -> Response:  # noqa: ARG002 - only the time counts
+        return Response(status_code=204)
+
+    async def _play(self, socket: WebSocket) -> None:
+        token = socket.path_params["token"]
+        person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+        if person is not None and self._host is not None and not await self._host.has(person):
+            await socket.send_denial_response(Response(status_code=404))  # the proxy asks the next host
+            return
+        if person is None:
+            await socket.close(1008)
+            return
+        await self._trials.play(socket, person)
+
+    async def _show_phase(self, request: Request, person: Person, refused: Again | None = None) -> Response:
+        async with self._lock(person):
+            now = await self._procedure.now(person, request.url.path)
+            if isinstance(now.phase, Played):
+                return await self._played(request, now)
+        finished = now.number == len(self._procedure.phases)
+        identity = await self._store.identity(person.id) if finished else {}
+        return self._pages.phase(request, now, identity, refused)
+
+    async def _played(self, request: Request, now: Now) -> Response:
+        person = now.person
+        begun = self._procedure.folders.find(person.token_hash)  # a small file: a thread would take longer
+        here = begun or await self._procedure.assign(person)
+        if here is None:
+            return self._pages.left(request, await self._procedure.turn_away(person))
+        if (queued := self._trials.queued(person.token_hash)) is not None:
+            if begun:
+                await self._store.beat(
+                    person.id
+                )  # who waits is there; to be assigned a place says so as well
+            return self._pages.queue(request, now, queued)
+        if isinstance(here, Assignment):
+            here = await self._procedure.begin_playing(person, here)
+        return self._trials.page(request, now, here)
+
+    async def _out_of_order(self, request: Request, error: Exception) -> Response:
+        LOG.error("%s", error)
+        return self._pages.message(request, "paused", 503)
+
+    async def _failed(self, request: Request, _: Exception) -> Response:
+        return self._pages.message(request, "paused", 500)
+
+    async def _unknown(self, request: Request, _: Exception) -> Response:
+        return self._pages.message(request, "unknown", 404)
+
+    async def _elsewhere(self, request: Request, _: Exception) -> Response:
+        """With 404 a proxy asks the next host; where there is none, the person reads this."""
+        return self._pages.message(request, "paused", 404)
+
+    async def _person(self, request: Request) -> Person | None:
+        token = request.path_params["token"]
+        person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
+        if person is not None and self._host is not None and not await self._host.has(person):
+            raise _ElsewhereError
+        return person
+
+    def _lock(self, person: Person) -> asyncio.Lock:
+        """Held while a person's phase is read or changed, so that two pages of one person take turns."""
+        return self._locks.setdefault(person.token_hash, asyncio.Lock())

@@ -1,0 +1,120 @@
+"""The pages that people see: those of phases, the last one, and messages."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from experiments.visit.phases.base import Again
+from experiments.visit.plan import CONSENT, PLAYED, VisitPlan
+from experiments.visit.procedure import Now
+from experiments.visit.recruiter import Leaving
+from experiments.visit.server.trials import Queued
+from experiments.visit.store import Person
+from experiments.web.server.pages import page
+
+
+class VisitPages:
+    """Pages of a plan, in its texts."""
+
+    def __init__(self, plan: VisitPlan) -> None:
+        self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
+
+    def show(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
+        """A page from a template, with the texts that all pages have."""
+        section: Any = values.get("section")
+        if "paragraphs" not in values:
+            values["paragraphs"] = section.paragraphs()
+        common, lang = self._plan.texts["common"], self._plan.language
+        return page(request, template, status, common=common, lang=lang, **values)
+
+    def message(self, request: Request, name: str, status: int = 200) -> Response:
+        """A message, by the name of its text."""
+        words = self._plan.texts["welcome"]
+        heading = {"title": words[f"{name}_title"]}
+        return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
+
+    def closed(self, request: Request, name: str) -> Response:
+        """The page of somebody who may not begin, by the name of its text."""
+        words, platform = self._plan.texts["welcome"], self._recruiter.platform
+        return self.show(
+            request,
+            "closed",
+            section={"title": words[f"{name}_title"]},
+            paragraphs=[words[name]],
+            completion=self._plan.texts["completion"],
+            back=self._recruiter.way_back("withdrawn", {}),
+            remembers=platform == "link",
+        )
+
+    def phase(
+        self, request: Request, now: Now, identity: Mapping[str, str], refused: Again | None = None
+    ) -> Response:
+        """The page of the phase in which a person is; trials have pages of their own.
+
+        Args:
+            request: Asks for it.
+            now: Where the person is.
+            identity: The platform's ids of the person.
+            refused: What was wrong with what was sent.
+        """
+        if now.phase is None:
+            return self.left(request, now.person)
+        shown = now.phase.page(now.visitor, refused)
+        if now.number < self._steps:
+            return self.show(request, shown.template, **{**self._around(now), **shown.values})
+        paragraphs = self._plan.texts[now.phase.name].paragraphs()
+        values = {**shown.values, "paragraphs": paragraphs, "completion": self._plan.texts["completion"]}
+        back = self._recruiter.way_back("finished", identity)
+        return self.show(request, shown.template, **values, back=back, finished=True)
+
+    def queue(self, request: Request, now: Now, queued: Queued) -> Response:
+        """The page of somebody who waits for a place; it asks again by itself."""
+        section = self._plan.texts["queue"]
+        values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
+        texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
+        filled = [re.sub(r"\{(place|wait)\}", lambda found: values[found[1]], text) for text in texts]
+        around = {**self._around(now), "section": section, "paragraphs": []}
+        return self.show(request, "queue", **around, texts=filled, refresh=round(queued.refresh))
+
+    def _around(self, now: Now) -> dict[str, Any]:
+        """What the pages of all phases have."""
+        common, name = self._plan.texts["common"], now.phase.name if now.phase else ""
+        step = common["step"].replace("{step}", str(now.number))
+        section = self._plan.texts.get(name)
+        return {
+            "step": step.replace("{steps}", str(self._steps)),
+            "path": now.visitor.path,
+            "phase": name,
+            "wait": now.wait,
+            "optional": name in self._plan.optional,
+            "leave": name != CONSENT,
+            "paragraphs": section.paragraphs() if section else [],
+            "story_title": self._plan.texts["story"]["title"],
+        }
+
+    def left(self, request: Request, person: Person) -> Response:
+        """The last page of somebody who did not finish."""
+        names: Mapping[str, tuple[str, str, Leaving]] = {
+            "no_consent": ("consent", "declined", "no_consent"),
+            "withdrawn": ("withdrawal", "left", "withdrawn"),
+            "screened_out": (person.phase, "failed", "screened_out"),
+        }
+        if person.status == "screened_out" and person.phase in PLAYED:
+            return self._last(request, "welcome", "no_place", "screened_out")
+        section, text, how = names.get(person.status, ("welcome", "timed_out", "timed_out"))
+        return self._last(request, section, text, how)
+
+    def _last(self, request: Request, section: str, text: str, how: Leaving) -> Response:
+        """A last page, by the section and the name of its text."""
+        words = self._plan.texts[section]
+        return self.show(
+            request,
+            "completion",
+            section={"title": words[f"{text}_title"]},
+            paragraphs=[words[text]],
+            completion=self._plan.texts["completion"],
+            back=self._recruiter.way_back(how, {}),
+        )

@@ -1,0 +1,288 @@
+"""Cells and places: who gets which, in one transaction with a lock on the study."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Select, bindparam, func, insert, or_, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.part import Part, lock_study, note
+from experiments.visit.store.tables import assignment, person, study
+from experiments.visit.store.values import (
+    ACTIVE,
+    Assignment,
+    CellCount,
+    CellQuota,
+    Counts,
+    PlaceState,
+    Rule,
+    utc_now,
+)
+
+SEEDS = 2**53  # exact as numbers of JavaScript as well
+FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
+_PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
+
+# Made once, as that takes as long as running them.
+_ACTIVE = update(person).where(
+    person.c.id == bindparam("person"),
+    person.c.study_id == bindparam("study"),
+    person.c.status.in_(ACTIVE),
+)
+_FRESH = or_(assignment.c.state == "finished", person.c.seen >= bindparam("since"))
+_TAKEN = (
+    select(assignment.c.cell, func.count())
+    .join(person, person.c.id == assignment.c.person_id)
+    .where(assignment.c.study_id == bindparam("study"), assignment.c.active == 1, _FRESH)
+    .group_by(assignment.c.cell)
+)
+_HOLDERS = (
+    select(assignment.c.place, assignment.c.person_id, _FRESH.label("fresh"))
+    .join(person, person.c.id == assignment.c.person_id)
+    .where(
+        assignment.c.study_id == bindparam("study"),
+        assignment.c.active == 1,
+        assignment.c.cell == bindparam("of"),
+    )
+    .order_by(person.c.seen)
+)
+
+
+class Assignments(Part):
+    """Rows of `assignment`."""
+
+    async def assign(
+        self,
+        person_id: int,
+        cells: Sequence[CellQuota],
+        rule: Rule,
+        rng: np.random.Generator,
+        now: datetime | None = None,
+        abandoned_after: timedelta = timedelta(minutes=30),
+    ) -> Assignment | None:
+        """The place of a person: the one they have, or a new one; None if the cells are full.
+
+        A place is held as long as its person gives signs of life. After `abandoned_after` without one it no longer
+        counts, and the next person of its cell gets it once no other is free. Whoever comes back after that gets it
+        again if it is free by then, else a new place in any cell, so ask for the place with :meth:`assignment`
+        instead where the trial has begun.
+
+        Args:
+            person_id: The person, whose participation must be under way.
+            cells: What the study file wants of each cell; :meth:`set_quota` may have changed the numbers.
+            rule: How a cell is chosen, see :func:`choose`.
+            rng: Source of the choice and of the person's own seeds.
+            now: The time, with its zone.
+            abandoned_after: How long a place is held without a sign of life.
+
+        Raises:
+            StoreError: The participation is over.
+        """
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> Assignment | None:
+            quotas = await lock_study(connection, self._study_id)
+            await self._check_active(connection, person_id, now)
+            before = await place_of(connection, person_id)
+            if before is not None:
+                if before.state != "released":
+                    return before
+                if await take_back(connection, self._study_id, before, "held"):
+                    return await place_of(connection, person_id)
+            wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
+            here = {"study": self._study_id, "since": now - abandoned_after}
+            while True:  # again if a sign of life came between the two queries
+                taken = await _tally(connection, _TAKEN, here)
+                cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
+                if cell is None:
+                    return None
+                holders = (await connection.execute(_HOLDERS, {**here, "of": cell})).all()
+                if (place := await _free_place(connection, holders, wanted[cell])) is not None:
+                    break
+            await self._give(connection, person_id, (cell, place), cells, rng, now, new=before is None)
+            return await place_of(connection, person_id)
+
+        return await self._database.write(work)
+
+    async def room(
+        self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
+    ) -> int:
+        """How many places are free, less the people who are on their way to one; below 0 if they are too many.
+
+        Args:
+            wanted: What the study file wants of each cell.
+            first: The first phase; who is still in it is not yet on the way.
+            abandoned_after: Time without a sign of life after which nobody counts, as in :meth:`assign`.
+            now: The time, with its zone.
+        """
+        since = (now or utc_now()) - abandoned_after
+        mine, there = person.c.study_id == self._study_id, person.c.seen >= since
+        coming = select(func.count()).where(
+            mine, there, person.c.status == "arrived", person.c.phase != first
+        )
+        taken = (
+            select(assignment.c.cell, func.count())
+            .join(person, person.c.id == assignment.c.person_id)
+            .where(mine, assignment.c.active == 1, or_(assignment.c.state == "finished", there))
+            .group_by(assignment.c.cell)
+        )
+        async with self._database.reading() as connection:
+            changed = select(study.c.quotas).where(study.c.id == self._study_id)
+            quotas = dict((await connection.execute(changed)).scalar_one())
+            counts = await _tally(connection, taken)
+            on_the_way = (await connection.execute(coming)).scalar_one()
+        free = (quotas.get(str(cell), count) - counts.get(cell, 0) for cell, count in enumerate(wanted))
+        return int(sum(max(0, number) for number in free) - on_the_way)
+
+    async def assignment(self, person_id: int) -> Assignment | None:
+        """The place that a person has or had."""
+        async with self._database.reading() as connection:
+            return await place_of(connection, person_id)
+
+    async def assignments(self) -> tuple[Assignment, ...]:
+        """Places of everybody, in the order in which they were given first."""
+        query = select(*FIELDS).where(assignment.c.study_id == self._study_id).order_by(assignment.c.id)
+        async with self._database.reading() as connection:
+            return tuple(Assignment(*row) for row in await connection.execute(query))
+
+    async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
+        """Change how many people a cell shall have, in place of what the study file wants; nobody loses a place."""
+        if cell < 0 or wanted < 0:
+            raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            quotas = {**await lock_study(connection, self._study_id), str(cell): wanted}
+            await connection.execute(update(study).where(study.c.id == self._study_id).values(quotas=quotas))
+            await note(
+                connection, self._study_id, who, "quota changed", {"cell": cell, "wanted": wanted}, now
+            )
+
+        await self._database.write(work)
+
+    async def counts(self) -> Counts:
+        """How many people there are by status, by phase (of those who are under way) and by cell."""
+        mine = person.c.study_id == self._study_id
+        by_status = select(person.c.status, func.count()).where(mine).group_by(person.c.status)
+        by_phase = select(person.c.phase, func.count()).where(mine, person.c.status.in_(ACTIVE))
+        by_place = (
+            select(assignment.c.cell, assignment.c.state, func.count())
+            .where(assignment.c.study_id == self._study_id)
+            .group_by(assignment.c.cell, assignment.c.state)
+        )
+        async with self._database.snapshot() as connection:
+            statuses = await _tally(connection, by_status)
+            phases = await _tally(connection, by_phase.group_by(person.c.phase))
+            cells: dict[int, dict[str, int]] = {}
+            for cell, state, number in await connection.execute(by_place):
+                cells.setdefault(cell, {})[state] = number
+        return Counts(statuses, phases, {cell: CellCount(**states) for cell, states in sorted(cells.items())})
+
+    async def _check_active(self, connection: AsyncConnection, person_id: int, now: datetime) -> None:
+        mine = {"person": person_id, "study": self._study_id}
+        active = await connection.execute(_ACTIVE, {**mine, "seen": now})
+        if not active.rowcount:
+            raise StoreError(
+                f"Person {person_id} has ended the participation, or does not exist: no place is given."
+            )
+
+    async def _give(
+        self,
+        connection: AsyncConnection,
+        person_id: int,
+        place: tuple[int, int],
+        cells: Sequence[CellQuota],
+        rng: np.random.Generator,
+        now: datetime,
+        *,
+        new: bool,
+    ) -> None:
+        values = {
+            "cell": place[0],
+            "place": place[1],
+            "active": 1,
+            "state": "held",
+            "house_seed": cells[place[0]].house_seed(place[1]),
+        }
+        if new:
+            own = {name: int(rng.integers(SEEDS)) for name in ("person_seed", "order_seed")}
+            mine = {"person_id": person_id, "study_id": self._study_id, "created": now}
+            await connection.execute(insert(assignment), {**mine, **own, **values})
+        else:
+            await connection.execute(
+                update(assignment).where(assignment.c.person_id == person_id).values(**values)
+            )
+        await connection.execute(update(person).where(person.c.id == person_id).values(status="assigned"))
+
+
+async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
+    """Return the first place of a cell that nobody has, else release and return an abandoned one, if any."""
+    free = sorted(set(range(wanted)) - {holder.place for holder in holders})
+    if free:
+        return free[0]
+    abandoned = next((one for one in holders if not one.fresh and one.place < wanted), None)
+    if abandoned is None:
+        return None
+    await set_place(connection, abandoned.person_id, "released")
+    return int(abandoned.place)
+
+
+async def _tally(
+    connection: AsyncConnection, query: Select[Any], values: Mapping[str, Any] | None = None
+) -> dict[Any, int]:
+    """Count the rows that have each value."""
+    return {row[0]: row[1] for row in await connection.execute(query, values)}
+
+
+def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
+    """The cell of the next person: `balanced` takes the one that is filled least, `uniform` any that has room.
+
+    Args:
+        counts: People in each cell.
+        quotas: Wanted people of each cell.
+        rule: The rule; ties are broken at random.
+        rng: Source of chance.
+
+    Returns:
+        Index of the cell; None if all are full.
+    """
+    room = [cell for cell, (count, quota) in enumerate(zip(counts, quotas, strict=True)) if count < quota]
+    if not room:
+        return None
+    if rule == "balanced":
+        filled = {cell: counts[cell] / quotas[cell] for cell in room}
+        least = min(filled.values())
+        room = [cell for cell in room if filled[cell] == least]
+    return room[int(rng.integers(len(room)))]
+
+
+async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
+    """The place that a person has or had."""
+    row = (await connection.execute(_PLACE, {"person": person_id})).first()
+    return None if row is None else Assignment(*row)
+
+
+async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
+    """Give a person a released place again; False if somebody else has it."""
+    query = select(assignment.c.id).where(
+        assignment.c.study_id == study_id,
+        assignment.c.cell == place.cell,
+        assignment.c.place == place.place,
+        assignment.c.active == 1,
+    )
+    if (await connection.execute(query)).first() is not None:
+        return False
+    await set_place(connection, place.person_id, state)
+    return True
+
+
+async def set_place(connection: AsyncConnection, person_id: int, state: PlaceState) -> None:
+    """Hold, finish or release the place of a person."""
+    await connection.execute(
+        update(assignment)
+        .where(assignment.c.person_id == person_id)
+        .values(state=state, active=None if state == "released" else 1)
+    )

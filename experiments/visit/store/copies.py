@@ -1,0 +1,109 @@
+"""Backups: one SQLite file whatever the database is, so that restoring may move a study to another kind."""
+
+import os
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from sqlalchemy import func, insert, select, text
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.engine import Database
+from experiments.visit.store.tables import metadata
+from experiments.visit.store.upgrade import upgrade
+
+ROWS = 1000  # at a time
+
+
+def check_new(path: Path) -> None:
+    """Raise StoreError if a backup has another file in its way."""
+    if path.exists():
+        raise StoreError(f"{path} is there already: name a new file for the backup.")
+
+
+async def back_up(source: Database, path: Path) -> None:
+    """Write every row, as of one moment, to a new SQLite file, which is there whole or not at all.
+
+    Raises StoreError if the file exists or cannot be written.
+    """
+    check_new(path)
+    part = path.with_name(f"{path.name}.part")
+    part.unlink(missing_ok=True)
+    target = Database(f"sqlite:///{part}")
+    try:
+        await upgrade(target)
+        await _copy(source, target)
+    finally:
+        await target.close()
+    one_file(part)
+    part.rename(path)
+
+
+def one_file(path: Path) -> None:
+    """Let a SQLite database have no log beside it, be on the disk, and be read by nobody else."""
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode = DELETE")
+    path.chmod(0o600)  # it holds ids of platforms
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+async def restore(path: Path, url: str) -> None:
+    """Fill an empty database with a backup.
+
+    Args:
+        path: A file that :meth:`Store.backup` wrote.
+        url: The database, see :meth:`Store.open`.
+
+    Raises:
+        StoreError: The backup is missing or damaged, or the database holds a study already.
+    """
+    if not path.is_file():
+        raise StoreError(f"There is no backup {path}.")
+    with TemporaryDirectory() as folder:  # a backup of an older version is upgraded, and stays as it is
+        copy = shutil.copyfile(path, Path(folder, "backup.db"))
+        source, target = Database(f"sqlite:///{copy}"), Database(url)
+        try:
+            await source.check()
+            await upgrade(source)
+            await upgrade(target)
+            if await _rows(target):
+                raise StoreError(f"The database {target.name} is not empty: restore into a new one.")
+            await _copy(source, target)
+        finally:
+            await source.close()
+            await target.close()
+
+
+async def _rows(database: Database) -> int:
+    async with database.reading() as connection:
+        counts = [
+            (await connection.execute(select(func.count()).select_from(table))).scalar_one()
+            for table in metadata.sorted_tables
+        ]
+    return sum(counts)
+
+
+async def _copy(source: Database, target: Database) -> None:
+    async with source.snapshot() as reading:
+
+        async def work(writing: AsyncConnection) -> None:
+            for table in metadata.sorted_tables:
+                rows: list[dict[str, Any]] = []
+                async for row in await reading.stream(select(table).order_by(table.c.id)):
+                    rows.append(dict(row._mapping))
+                    if len(rows) == ROWS:
+                        await writing.execute(insert(table), rows)
+                        rows = []
+                if rows:
+                    await writing.execute(insert(table), rows)
+                if target.kind == "postgresql":  # it counts ids apart from the rows
+                    last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
+                    after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
+                    await writing.execute(text(f"SELECT setval({after})"))
+
+        await target.write(work)

@@ -1,0 +1,104 @@
+"""Deletes all of a person but the fact that somebody was paid, or who the person is on a platform."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import delete, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store import tables
+from experiments.visit.store.ledger import by_key, events_of, paid
+from experiments.visit.store.part import Part, lock_study, note
+from experiments.visit.store.values import utc_now
+
+# Those first that refer to others.
+OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.identity, tables.payment)
+
+
+class Erasure(Part):
+    """Deletes rows of a person."""
+
+    async def erase(
+        self, person_id: int, who: str, now: datetime | None = None, *, unpaid: bool = False
+    ) -> None:
+        """Delete every row of a person. The audit log keeps the number, and kinds and amounts of what was paid.
+
+        The person's folder, backups and exports are the caller's. SQLite overwrites what is deleted; MariaDB and
+        PostgreSQL do so when they clean up. With `unpaid`, also somebody who is owed something, as in a backup that
+        is older than the payment.
+
+        Raises:
+            StoreError: There is no such person, or the person is owed something.
+        """
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await lock_study(connection, self._study_id)
+            mine = (tables.person.c.id == person_id, tables.person.c.study_id == self._study_id)
+            if (await connection.execute(select(tables.person.c.id).where(*mine))).first() is None:
+                raise StoreError(f"There is no person {person_id} in this study; nothing was deleted.")
+            payments = by_key(await events_of(connection, tables.payment.c.person_id == person_id))
+            owed = [key for key, events in payments.items() if not paid(events)]
+            if owed and not unpaid:
+                raise StoreError(f"Person {person_id} is owed {', '.join(owed)}: pay first, then erase.")
+            settled: list[dict[str, Any]] = [
+                {"kind": events[0].kind, "cents": events[0].cents, "currency": events[0].currency}
+                for events in payments.values()
+            ]
+            for table in OWN:
+                await connection.execute(delete(table).where(table.c.person_id == person_id))
+            await connection.execute(delete(tables.person).where(*mine))
+            details = {"person": person_id, "paid": settled}
+            await note(connection, self._study_id, who, "person erased", details, now)
+
+        await self._database.write(work)
+        await self._database.scrub()
+
+    async def known(self, before: datetime) -> tuple[int, ...]:
+        """Numbers of people who can still be recognised, and who gave their last sign before a time."""
+        mine = (tables.person.c.study_id == self._study_id, tables.person.c.seen < before)
+        recognised = tables.identity.c.id.is_not(None) | tables.person.c.platform_key.is_not(None)
+        query = select(tables.person.c.id).outerjoin(tables.identity).where(*mine, recognised)
+        query = query.order_by(tables.person.c.id)
+        async with self._database.reading() as connection:
+            return tuple((await connection.execute(query)).scalars())
+
+    async def forget(self, person_ids: Sequence[int], names: Sequence[str], who: str) -> None:
+        """Delete who people are on their platform, and by what they would be recognised.
+
+        What they did and answered stays, and what they were paid, without the platform's receipts. Their links end,
+        and they could take part again.
+
+        Args:
+            person_ids: Numbers of the people.
+            names: Of each the name that replaces the hash of the link, also in the paths of runs.
+            who: Deletes, for the audit log.
+        """
+        now = utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            for number, name in zip(person_ids, names, strict=True):
+                mine = (tables.person.c.id == number, tables.person.c.study_id == self._study_id)
+                before = (await connection.execute(select(tables.person.c.token_hash).where(*mine))).scalar()
+                if before is None:
+                    continue
+                runs = select(tables.trial.c.id, tables.trial.c.folder).where(
+                    tables.trial.c.person_id == number
+                )
+                for run, folder in (await connection.execute(runs)).all():
+                    moved = {"folder": folder.replace(before, name)}
+                    await connection.execute(
+                        update(tables.trial).where(tables.trial.c.id == run).values(**moved)
+                    )
+                gone = {"platform_key": None, "token_hash": name}
+                await connection.execute(update(tables.person).where(*mine).values(**gone))
+                await connection.execute(delete(tables.identity).where(tables.identity.c.person_id == number))
+                told = (tables.payment.c.person_id == number, tables.payment.c.event != "decided")
+                await connection.execute(update(tables.payment).where(*told).values(reference="", note=""))
+            details = {"people": list(person_ids)}
+            await note(connection, self._study_id, who, "people forgotten", details, now)
+
+        await self._database.write(work)
+        await self._database.scrub()

@@ -1,0 +1,101 @@
+"""Several hosts with one database: which of them are there, and which one keeps what a person plays.
+
+When a host was heard of is told by the database's clock, as those of hosts may be wrong.
+"""
+
+from datetime import datetime, timedelta
+
+from sqlalchemy import delete, exists, insert, or_, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.part import Part, database_now, note
+from experiments.visit.store.tables import assignment, host, person
+from experiments.visit.store.values import Host
+
+LEASE = timedelta(seconds=60)  # without a word from it, a host ends its sessions
+SILENT = timedelta(seconds=90)  # and some time later, others may have them
+HANDED_OVER = "-"  # in place of a host: whoever has the journal
+
+
+class Hosts(Part):
+    """Rows of `host`, and `person.host`."""
+
+    async def greet(self, name: str, *, leaves: bool = False) -> bool:
+        """Note that a host is there, or that it leaves; whether it takes new visits."""
+        mine = (host.c.study_id == self._study_id, host.c.name == name)
+
+        async def work(connection: AsyncConnection) -> bool:
+            seen = await database_now(connection) - SILENT * leaves
+            if not (await connection.execute(update(host).where(*mine).values(seen=seen))).rowcount:
+                values = {"study_id": self._study_id, "name": name, "seen": seen, "draining": False}
+                await connection.execute(insert(host).values(**values))
+            return not (await connection.execute(select(host.c.draining).where(*mine))).scalar_one()
+
+        return await self._database.write(work)
+
+    async def hosts(self) -> tuple[Host, ...]:
+        query = select(host.c.name, host.c.seen, host.c.draining).where(host.c.study_id == self._study_id)
+        async with self._database.reading() as connection:
+            return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
+
+    async def claim(self, person_id: int, name: str, *, new: bool, journal: bool) -> bool:
+        """Let a host keep what a person plays, for good; whether it does.
+
+        Args:
+            person_id: The person.
+            name: Of the host.
+            new: Whether the host takes new visits.
+            journal: Whether it has the journal of the person.
+        """
+        may = [person.c.host == name]
+        if journal:
+            may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
+        elif new:  # who has a place has a journal elsewhere
+            may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
+
+        async def work(connection: AsyncConnection) -> bool:
+            claimed = update(person).where(person.c.id == person_id, or_(*may)).values(host=name)
+            return bool((await connection.execute(claimed)).rowcount)
+
+        return await self._database.write(work)
+
+    async def drain(self, name: str, draining: bool, who: str) -> None:
+        """Let a host take no new visits, or take them again; those it has go on."""
+
+        async def work(connection: AsyncConnection) -> None:
+            mine = (host.c.study_id == self._study_id, host.c.name == name)
+            if not (await connection.execute(update(host).where(*mine).values(draining=draining))).rowcount:
+                raise StoreError(f"There is no host {name!r}; `mjsim study hosts` lists them.")
+            action = "host drained" if draining else "host opened"
+            await note(
+                connection, self._study_id, who, action, {"host": name}, await database_now(connection)
+            )
+
+        await self._database.write(work)
+
+    async def hand_over(self, name: str, who: str, now: datetime | None = None) -> int:
+        """Let whoever has their journals have the visits of a host that is gone; how many visits.
+
+        Raises StoreError while the host may still run them.
+        """
+
+        async def work(connection: AsyncConnection) -> int:
+            at = now or await database_now(connection)
+            mine = (host.c.study_id == self._study_id, host.c.name == name)
+            seen = (await connection.execute(select(host.c.seen).where(*mine).with_for_update())).scalar()
+            if seen is None:
+                raise StoreError(f"There is no host {name!r}; `mjsim study hosts` lists them.")
+            if at - seen < SILENT:
+                raise StoreError(
+                    f"Host {name!r} may be running: stop its server, or wait until nothing was heard of it for "
+                    f"{SILENT.total_seconds():.0f} s."
+                )
+            theirs = (person.c.study_id == self._study_id, person.c.host == name)
+            moved = await connection.execute(update(person).where(*theirs).values(host=HANDED_OVER))
+            await connection.execute(delete(host).where(*mine))
+            details = {"host": name, "visits": moved.rowcount}
+            await note(connection, self._study_id, who, "host handed over", details, at)
+            return moved.rowcount
+
+        return await self._database.write(work)

@@ -1,0 +1,56 @@
+"""What every part of the store has: the database and the study."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import CursorResult, func, insert, select
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.visit.store import tables
+from experiments.visit.store.engine import Database
+
+_NOW = {
+    "sqlite": func.current_timestamp(type_=tables.Utc),
+    "mysql": func.utc_timestamp(6, type_=tables.Utc),
+    "postgresql": func.timezone("UTC", func.now(), type_=tables.Utc),
+}
+
+
+class Part:
+    """Rows of one study in a database."""
+
+    def __init__(self, database: Database, study_id: int) -> None:
+        self._database, self._study_id = database, study_id
+
+
+def new_id(inserted: CursorResult[Any]) -> int:
+    """The id of a row that was inserted."""
+    key = inserted.inserted_primary_key
+    return int(key[0]) if key else 0
+
+
+async def database_now(connection: AsyncConnection) -> datetime:
+    """The time by the clock of the database, which all hosts share; those of hosts may be wrong."""
+    return (await connection.execute(select(_NOW[connection.dialect.name]))).scalar_one()
+
+
+async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
+    """Let others who lock the study wait until this transaction ends; its changed quotas, by cell.
+
+    SQLite has locked the whole database.
+    """
+    query = select(tables.study.c.quotas).where(tables.study.c.id == study_id).with_for_update()
+    return dict((await connection.execute(query)).scalar_one())
+
+
+async def note(
+    connection: AsyncConnection,
+    study_id: int,
+    who: str,
+    action: str,
+    details: Mapping[str, Any],
+    now: datetime,
+) -> None:
+    values = {"study_id": study_id, "at": now, "who": who, "action": action, "details": dict(details)}
+    await connection.execute(insert(tables.audit).values(**values))

@@ -1,0 +1,131 @@
+"""Who takes part: arrivals, signs of life, and who somebody is on their platform."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, bindparam, insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.part import Part, new_id
+from experiments.visit.store.tables import identity as ids
+from experiments.visit.store.tables import person
+from experiments.visit.store.values import Person, Status, utc_now
+
+_FIELDS = (
+    person.c.id,
+    person.c.token_hash,
+    person.c.platform,
+    person.c.status,
+    person.c.phase,
+    person.c.created,
+    person.c.seen,
+    person.c.delete_wanted,
+    person.c.host,
+)
+# Made once, as that takes as long as running it.
+_FIND = select(*_FIELDS).where(
+    person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
+)
+
+
+class People(Part):
+    """Rows of `person` and `identity`."""
+
+    async def arrive(
+        self,
+        platform: str,
+        key: str | None,
+        identity: Mapping[str, str],
+        token_hash: str,
+        phase: str,
+        now: datetime | None = None,
+    ) -> Person:
+        """The person who comes with a link: a new one, or the one who came before.
+
+        A person who comes back keeps the token hash of the first arrival, so make the token from what makes the key.
+
+        Args:
+            platform: Where the person comes from, such as `prolific`; at most 20 characters.
+            key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal; None for links without an id.
+            identity: The platform's own ids. They are kept apart, and never exported. Those of the last arrival before
+                the end of the participation stay.
+            token_hash: SHA-256 of the link's token, hexadecimal.
+            phase: The first phase of the study.
+            now: The time, with its zone.
+        """
+        now = now or utc_now()
+        same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
+
+        async def work(connection: AsyncConnection) -> Person:
+            known = (await connection.execute(self._select(same))).first()
+            if known is not None:
+                found = replace(_person(known), returning=True)
+                if found.active:  # who gave a task back and accepted it again is paid for the new one
+                    mine = ids.c.person_id == found.id
+                    await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
+                return found
+            values = {
+                "study_id": self._study_id,
+                "token_hash": token_hash,
+                "platform": platform,
+                "platform_key": key,
+                "status": "arrived",
+                "phase": phase,
+                "created": now,
+                "seen": now,
+                "delete_wanted": False,
+            }
+            number = new_id(await connection.execute(insert(person), values))
+            await connection.execute(insert(ids), {"person_id": number, "ids": dict(identity)})
+            return Person(number, token_hash, platform, "arrived", phase, now, now, False)
+
+        return await self._database.write(work)
+
+    async def find(self, token_hash: str) -> Person | None:
+        """The person whom a link belongs to."""
+        async with self._database.reading() as connection:
+            found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
+            row = found.first()
+            return None if row is None else _person(row)
+
+    async def person(self, person_id: int) -> Person:
+        """A person by number; a StoreError if there is none."""
+        async with self._database.reading() as connection:
+            row = (await connection.execute(self._select(person.c.id == person_id))).first()
+        if row is None:
+            raise StoreError(
+                f"There is no person {person_id} in this study; `mjsim study` shows the numbers."
+            )
+        return _person(row)
+
+    async def people(self, status: Status | None = None) -> tuple[Person, ...]:
+        """Everybody, or those of one status, in order of arrival."""
+        query = self._select() if status is None else self._select(person.c.status == status)
+        async with self._database.reading() as connection:
+            return tuple(_person(row) for row in await connection.execute(query.order_by(person.c.id)))
+
+    async def identity(self, person_id: int) -> dict[str, str]:
+        """The platform's own ids of a person, for paying alone; empty if they are erased."""
+        query = select(ids.c.ids).where(ids.c.person_id == person_id)
+        async with self._database.reading() as connection:
+            return dict((await connection.execute(query)).scalar() or {})
+
+    async def beat(self, person_id: int, now: datetime | None = None) -> None:
+        """Note a sign of life, which keeps the person's place."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            late = person.c.seen < now
+            await connection.execute(update(person).where(person.c.id == person_id, late).values(seen=now))
+
+        await self._database.write(work)
+
+    def _select(self, *which: ColumnElement[bool]) -> Any:
+        return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)
+
+
+def _person(row: Any) -> Person:
+    return Person(*row)

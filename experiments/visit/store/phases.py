@@ -1,0 +1,209 @@
+"""How far a person is: phases, answers and trials."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import ColumnElement, Select, Table, bindparam, insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.visit.store.endings import end
+from experiments.visit.store.part import Part, lock_study
+from experiments.visit.store.tables import answer, person, trial
+from experiments.visit.store.tables import phase as phases
+from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
+
+# Made once, as that takes as long as running them.
+_PHASE = select(*[column for column in phases.c if column.name != "id"]).where(
+    phases.c.person_id == bindparam("person"), phases.c.name == bindparam("phase")
+)
+_IN_PHASE = update(person).where(
+    person.c.id == bindparam("person"), person.c.phase == bindparam("from"), person.c.status.in_(ACTIVE)
+)
+_END = update(phases).where(phases.c.person_id == bindparam("person"), phases.c.name == bindparam("which"))
+_ITEMS = select(answer.c.item).where(
+    answer.c.person_id == bindparam("person"), answer.c.phase == bindparam("which")
+)
+
+
+def _rows_of(table: Table) -> Select[Any]:
+    return (
+        select(*[column for column in table.c if column.name != "id"])
+        .join(person, person.c.id == table.c.person_id)
+        .where(person.c.study_id == bindparam("study"))
+        .order_by(table.c.person_id, table.c.id)
+    )
+
+
+_ROWS = {table: _rows_of(table) for table in (phases, answer, trial)}
+_ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for table, rows in _ROWS.items()}
+
+
+class Phases(Part):
+    """Rows of `phase`, `answer` and `trial`."""
+
+    async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
+        """Note when a phase was shown first; the phase, as it was shown first."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> PhaseRow:
+            row = await _phase(connection, person_id, name)
+            if row is None:
+                new = {"person_id": person_id, "name": name, "shown": now}
+                await connection.execute(insert(phases), new)
+                return PhaseRow(person_id, name, now, None, None, None, None)
+            return row
+
+        return await self._database.write(work)
+
+    async def finish_phase(
+        self,
+        person_id: int,
+        name: str,
+        next_name: str,
+        answers: Mapping[str, Any] | None = None,
+        reason: str | None = None,
+        *,
+        duration_s: float | None = None,
+        attempts: int | None = None,
+        status: Status | None = None,
+        now: datetime | None = None,
+    ) -> bool:
+        """Move a person to the next phase and make the answers of this one final, in one transaction.
+
+        Returns whether this call did. It does nothing if another phase is under way (a form that was sent twice, the
+        back button, a second tab) or if the participation is over.
+
+        Args:
+            person_id: The person.
+            name: The phase that ends.
+            next_name: The phase that follows.
+            answers: Answers by item; they replace those that were saved before.
+            reason: Why the phase ended, where it can end in several ways.
+            duration_s: How long it took, s; by default since it was shown first.
+            attempts: How many attempts it took.
+            status: Ends the participation as well, such as `finished` after the last phase.
+            now: The time, with its zone.
+        """
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> bool:
+            if status is not None:
+                await lock_study(connection, self._study_id)
+            moved = await connection.execute(
+                _IN_PHASE, {"person": person_id, "from": name, "phase": next_name, "seen": now}
+            )
+            if not moved.rowcount:
+                return False
+            await _save(connection, person_id, name, answers or {}, now, final=True)
+            how = {"duration_s": duration_s, "attempts": attempts, "reason": reason}
+            await _end_phase(connection, person_id, name, now, how)
+            if status is not None:
+                await end(connection, self._study_id, person_id, status)
+            return True
+
+        return await self._database.write(work)
+
+    async def save_answers(
+        self, person_id: int, phase: str, values: Mapping[str, Any], now: datetime | None = None
+    ) -> bool:
+        """Keep answers as they are given; saving again replaces them. Whether they are kept.
+
+        They are not if another phase is under way: answers of a phase that has ended never change.
+        """
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> bool:
+            current = await connection.execute(_IN_PHASE, {"person": person_id, "from": phase, "seen": now})
+            if not current.rowcount:
+                return False
+            await _save(connection, person_id, phase, values, now)
+            return True
+
+        return await self._database.write(work)
+
+    async def finish_trial(
+        self, person_id: int, phase: str, folder: str, ended: str, now: datetime | None = None
+    ) -> None:
+        """Note a trial that is over, its run directory relative to the study's folder, and how it ended.
+
+        Doing it again replaces what was noted.
+        """
+        values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
+
+        async def work(connection: AsyncConnection) -> None:
+            same = (trial.c.person_id == person_id, trial.c.phase == phase)
+            if not (await connection.execute(update(trial).where(*same).values(**values))).rowcount:
+                await connection.execute(insert(trial).values(person_id=person_id, phase=phase, **values))
+
+        await self._database.write(work)
+
+    async def phases(self, person_id: int | None = None) -> tuple[PhaseRow, ...]:
+        """Phases of a person, or of everybody, in the order in which they were shown."""
+        return tuple(PhaseRow(*row) for row in await self._rows(phases, person_id))
+
+    async def answers(self, person_id: int | None = None) -> tuple[Answer, ...]:
+        """Answers of a person, or of everybody, in the order in which they were given first."""
+        return tuple(Answer(*row) for row in await self._rows(answer, person_id))
+
+    async def answers_to(self, phase: str, item: str) -> tuple[Answer, ...]:
+        """Final answers of everybody to one item."""
+        asked = (answer.c.phase == phase, answer.c.item == item, answer.c.final.is_(True))
+        return tuple(Answer(*row) for row in await self._rows(answer, None, *asked))
+
+    async def trials(self, person_id: int | None = None) -> tuple[TrialRow, ...]:
+        """Trials of a person, or of everybody."""
+        return tuple(TrialRow(*row) for row in await self._rows(trial, person_id))
+
+    async def _rows(self, table: Table, person_id: int | None, *which: ColumnElement[bool]) -> Any:
+        query = _ROWS[table] if person_id is None else _ROWS_OF_ONE[table]
+        values = {"study": self._study_id} | ({} if person_id is None else {"person": person_id})
+        async with self._database.reading() as connection:
+            return (await connection.execute(query.where(*which) if which else query, values)).all()
+
+
+async def _phase(connection: AsyncConnection, person_id: int, name: str) -> PhaseRow | None:
+    row = (await connection.execute(_PHASE, {"person": person_id, "phase": name})).first()
+    return None if row is None else PhaseRow(*row)
+
+
+async def _end_phase(
+    connection: AsyncConnection, person_id: int, name: str, now: datetime, how: dict[str, Any]
+) -> None:
+    row = await _phase(connection, person_id, name)
+    if how["duration_s"] is None:
+        how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
+    if row is None:  # it was never shown, such as a phase that is skipped
+        new = {"person_id": person_id, "name": name, "shown": now, "ended": now, **how}
+        await connection.execute(insert(phases), new)
+        return
+    await connection.execute(_END, {"person": person_id, "which": name, "ended": now, **how})
+
+
+async def _save(
+    connection: AsyncConnection,
+    person_id: int,
+    phase: str,
+    values: Mapping[str, Any],
+    now: datetime,
+    *,
+    final: bool = False,
+) -> None:
+    """Insert or replace; with `final`, make all answers of the phase final. The person's row must be locked."""
+    mine = (answer.c.person_id == person_id, answer.c.phase == phase)
+    known = set((await connection.execute(_ITEMS, {"person": person_id, "which": phase})).scalars())
+    for item in known & set(values):
+        await connection.execute(
+            update(answer)
+            .where(*mine, answer.c.item == item, answer.c.final.is_(False))
+            .values(value=values[item], given=now)
+        )
+    if final and known:
+        await connection.execute(update(answer).where(*mine).values(final=True))
+    new = [
+        {"person_id": person_id, "phase": phase, "item": item, "value": value, "given": now, "final": final}
+        for item, value in values.items()
+        if item not in known
+    ]
+    if new:
+        await connection.execute(insert(answer), new)

@@ -1,0 +1,157 @@
+"""Who may see the researcher's page: passwords, roles and logins that can be revoked."""
+
+import asyncio
+import re
+from datetime import datetime
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, get_args
+
+from sqlalchemy import insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.engine import Database
+from experiments.visit.store.tables import login, researcher
+from experiments.visit.store.values import Researcher, Role, utc_now
+
+if TYPE_CHECKING:
+    from argon2 import PasswordHasher
+
+PASSWORD_MEMORY_KIB = 65_536  # what hashing a password takes, by RFC 9106
+NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
+_FIELDS = (
+    researcher.c.id,
+    researcher.c.name,
+    researcher.c.role,
+    researcher.c.created,
+    researcher.c.disabled,
+)
+
+
+class Researchers:
+    """Rows of `researcher` and `login`, which hold for every study of a database."""
+
+    def __init__(self, database: Database, memory_kib: int) -> None:
+        self._database = database
+        self._memory_kib = memory_kib
+
+    @cached_property
+    def _hasher(self) -> "PasswordHasher":
+        from argon2 import PasswordHasher  # `mjsim play` works without the extra `people`
+
+        return PasswordHasher(memory_cost=self._memory_kib)
+
+    async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
+        """Let somebody in. Raises StoreError if the name is taken or unusable, or the role unknown."""
+        if not NAME.fullmatch(name):
+            raise StoreError(f"{name!r} cannot be a name: use up to 60 of a-z, 0-9 and the signs . _ @ -")
+        values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
+        values["password"] = await self._hash(password)
+
+        async def work(connection: AsyncConnection) -> Researcher:
+            same = select(researcher.c.id).where(researcher.c.name == name)
+            if (await connection.execute(same)).first() is not None:
+                raise StoreError(f"There is a researcher {name!r} already: use another name.")
+            await connection.execute(insert(researcher).values(**values))
+            row = (await connection.execute(select(*_FIELDS).where(researcher.c.name == name))).one()
+            return Researcher(*row)
+
+        return await self._database.write(work)
+
+    async def all(self) -> tuple[Researcher, ...]:
+        async with self._database.reading() as connection:
+            return tuple(Researcher(*row) for row in await connection.execute(select(*_FIELDS)))
+
+    async def check(self, name: str, password: str) -> Researcher | None:
+        """Who has this name and password; None for a wrong one, and for who is disabled.
+
+        It takes as long for a name that nobody has. How often it may be tried is the caller's to limit.
+        """
+        row = await self._row(name) if NAME.fullmatch(name) else None
+        if row is None:
+            await self._hash(password)
+            return None
+        from argon2.exceptions import VerifyMismatchError
+
+        try:
+            await asyncio.to_thread(self._hasher.verify, row.password, password)
+        except VerifyMismatchError:
+            return None
+        return None if row.disabled else Researcher(*row[:-1])
+
+    async def change(
+        self,
+        name: str,
+        *,
+        password: str | None = None,
+        role: Role | None = None,
+        disabled: bool | None = None,
+        now: datetime | None = None,
+    ) -> None:
+        """Change what is given, and end the logins of the researcher."""
+        values: dict[str, object] = {}
+        if password is not None:
+            values["password"] = await self._hash(password)
+        if role is not None:
+            values["role"] = _known(role)
+        if disabled is not None:
+            values["disabled"] = disabled
+
+        async def work(connection: AsyncConnection) -> None:
+            who = (
+                await connection.execute(select(researcher.c.id).where(researcher.c.name == name))
+            ).scalar()
+            if who is None:
+                raise StoreError(f"There is no researcher {name!r}.")
+            if values:
+                await connection.execute(update(researcher).where(researcher.c.id == who).values(**values))
+            mine = (login.c.researcher_id == who, login.c.revoked.is_(None))
+            await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
+
+        await self._database.write(work)
+
+    async def log_in(
+        self, researcher_id: int, token_hash: str, expires: datetime, now: datetime | None = None
+    ) -> None:
+        """Begin a login; only the SHA-256 of its token is kept."""
+        values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
+
+        async def work(connection: AsyncConnection) -> None:
+            await connection.execute(insert(login).values(**values, created=now or utc_now()))
+
+        await self._database.write(work)
+
+    async def who(self, token_hash: str, now: datetime | None = None) -> Researcher | None:
+        """Whose login this is, unless it has expired or was revoked, or the researcher is disabled."""
+        query = (
+            select(*_FIELDS)
+            .join(login, login.c.researcher_id == researcher.c.id)
+            .where(login.c.token_hash == token_hash, login.c.revoked.is_(None))
+            .where(login.c.expires > (now or utc_now()), researcher.c.disabled.is_(False))
+        )
+        async with self._database.reading() as connection:
+            row = (await connection.execute(query)).first()
+        return None if row is None else Researcher(*row)
+
+    async def log_out(self, token_hash: str, now: datetime | None = None) -> None:
+
+        async def work(connection: AsyncConnection) -> None:
+            mine = (login.c.token_hash == token_hash, login.c.revoked.is_(None))
+            await connection.execute(update(login).where(*mine).values(revoked=now or utc_now()))
+
+        await self._database.write(work)
+
+    async def _row(self, name: str) -> Any:
+        async with self._database.reading() as connection:
+            query = select(*_FIELDS, researcher.c.password).where(researcher.c.name == name)
+            return (await connection.execute(query)).first()
+
+    async def _hash(self, password: str) -> str:
+        """Hash in a thread, since the default memory makes it take a tenth of a second on purpose."""
+        return await asyncio.to_thread(self._hasher.hash, password)
+
+
+def _known(role: str) -> str:
+    if role not in get_args(Role):
+        raise StoreError(f"No role {role!r}; there are {', '.join(get_args(Role))}.")
+    return role

@@ -1,0 +1,159 @@
+"""The store of a study: who takes part, how far they are, what they answered, what they are paid."""
+
+import sqlite3
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import closing, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Self
+
+from sqlalchemy import insert, select, update
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.assignments import Assignments
+from experiments.visit.store.copies import back_up, one_file
+from experiments.visit.store.endings import Endings
+from experiments.visit.store.engine import Database
+from experiments.visit.store.erasure import Erasure
+from experiments.visit.store.hosts import Hosts
+from experiments.visit.store.ledger import Ledger
+from experiments.visit.store.part import new_id, note
+from experiments.visit.store.people import People
+from experiments.visit.store.phases import Phases
+from experiments.visit.store.researchers import PASSWORD_MEMORY_KIB, Researchers
+from experiments.visit.store.tables import audit, study
+from experiments.visit.store.upgrade import upgrade
+from experiments.visit.store.values import AuditRow, StudyRow, StudyState, utc_now
+
+
+class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
+    """The database of one study. What a method has returned from is on the disk.
+
+    Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
+
+    Attributes:
+        ledger: What people are paid.
+        researchers: Who may see the researcher's page; the same for all studies of a database.
+    """
+
+    def __init__(self, database: Database, study_id: int, password_memory_kib: int) -> None:
+        """See :meth:`open`."""
+        super().__init__(database, study_id)
+        self.ledger = Ledger(database, study_id)
+        self.researchers = Researchers(database, password_memory_kib)
+
+    @classmethod
+    async def open(
+        cls, url: str, study_name: str, file_hash: str, *, password_memory_kib: int = PASSWORD_MEMORY_KIB
+    ) -> Self:
+        """Open a database, make or upgrade its tables, and find or add the study.
+
+        Args:
+            url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
+            study_name: Name of the study; one database may hold several.
+            file_hash: SHA-256 of the study file, hexadecimal. Another one than before is noted in the audit log.
+            password_memory_kib: Memory that hashing a researcher's password takes. Tests use little.
+        """
+        database = Database(url)
+        try:
+            await database.check_durable()
+            await upgrade(database)
+            return cls(database, await _study_id(database, study_name, file_hash), password_memory_kib)
+        except BaseException:
+            await database.close()
+            raise
+
+    async def close(self) -> None:
+        await self._database.close()
+
+    def on_write(self, tell: Callable[[float], None]) -> None:
+        """Tell how long each transaction that writes took, s."""
+        self._database.on_write = tell
+
+    def is_at(self, path: Path) -> bool:
+        """Return whether the database is this file."""
+        return (
+            self._database.kind == "sqlite"
+            and path.resolve() == Path(self._database.url.database or "").resolve()
+        )
+
+    async def backup(self, path: Path) -> None:
+        """Write the whole database, as of one moment, to a new SQLite file; people may go on meanwhile."""
+        await back_up(self._database, path)
+
+    async def study(self) -> StudyRow:
+        async with self._database.reading() as connection:
+            row = (await connection.execute(select(study).where(study.c.id == self._study_id))).one()
+        quotas = {int(cell): wanted for cell, wanted in row.quotas.items()}
+        return StudyRow(row.id, row.name, row.file_hash, row.state, row.created, quotas)
+
+    async def set_state(self, state: StudyState, who: str, now: datetime | None = None) -> None:
+        """Open, pause or close the study, and note who did."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await connection.execute(update(study).where(study.c.id == self._study_id).values(state=state))
+            await note(connection, self._study_id, who, f"study {state}", {}, now)
+
+        await self._database.write(work)
+
+    async def audit(
+        self, who: str, action: str, details: Mapping[str, Any] | None = None, now: datetime | None = None
+    ) -> None:
+        """Note who did what. People are named by their number; never note a platform's id."""
+        now = now or utc_now()
+
+        async def work(connection: AsyncConnection) -> None:
+            await note(connection, self._study_id, who, action, details or {}, now)
+
+        await self._database.write(work)
+
+    async def audit_log(self) -> tuple[AuditRow, ...]:
+        columns = (audit.c.id, audit.c.at, audit.c.who, audit.c.action, audit.c.details)
+        query = select(*columns).where(audit.c.study_id == self._study_id).order_by(audit.c.id)
+        async with self._database.reading() as connection:
+            return tuple(AuditRow(*row) for row in await connection.execute(query))
+
+
+async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
+    """Let `work` change what a backup or another SQLite file holds of a study, and return what it returned.
+
+    Raises StoreError if the file cannot be read, or the database cannot do it.
+    """
+    try:
+        with closing(sqlite3.connect(path)) as connection:
+            row = connection.execute("SELECT file_hash FROM study WHERE name = ?", (study_name,)).fetchone()
+    except sqlite3.DatabaseError as error:
+        raise StoreError(f"cannot read {path} ({error}): delete it.") from error
+    if row is None:
+        return False
+    store = await Store.open(f"sqlite:///{path}", study_name, row[0])
+    try:
+        return await work(store)
+    finally:
+        await store.close()
+        with suppress(sqlite3.OperationalError):  # another process serves it
+            one_file(path)
+
+
+async def _study_id(database: Database, name: str, file_hash: str) -> int:
+    now = utc_now()
+
+    async def work(connection: AsyncConnection) -> int:
+        columns = (study.c.id, study.c.file_hash)
+        row = (
+            await connection.execute(select(*columns).where(study.c.name == name).with_for_update())
+        ).first()
+        if row is None:
+            made = await connection.execute(
+                insert(study).values(name=name, file_hash=file_hash, state="open", created=now, quotas={})
+            )
+            return new_id(made)
+        if row.file_hash != file_hash:
+            await connection.execute(update(study).where(study.c.id == row.id).values(file_hash=file_hash))
+            change = {"before": row.file_hash, "now": file_hash}
+            await note(connection, row.id, "mjsim", "study file changed", change, now)
+        return int(row.id)
+
+    return await database.write(work)

@@ -1,0 +1,68 @@
+"""Brings a database to the newest form of the tables, one process at a time."""
+
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, inspect, text
+from sqlalchemy.ext.asyncio import AsyncConnection
+
+from experiments.errors import StoreError
+from experiments.visit.store.engine import PATIENCE_S, Database
+from experiments.visit.store.tables import metadata
+
+MIGRATIONS = Path(__file__).parent / "migrations"
+VERSIONS = "alembic_version"
+LOCK = 7_303_014  # any number, the same for everybody who upgrades
+
+
+async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
+    """Make the tables, or bring them to their newest form; what they hold is kept.
+
+    Raises StoreError if a newer mjsim made them, or if tables of somebody else are in the way.
+    """
+
+    async def work(connection: AsyncConnection) -> None:
+        await _lock(connection, database.kind)
+        try:
+            await connection.run_sync(_upgrade, migrations, database.name)
+        finally:
+            if database.kind == "mysql":
+                await connection.execute(text("DO RELEASE_LOCK(:name)"), {"name": f"mjsim{LOCK}"})
+
+    await database.write(work)
+
+
+async def _lock(connection: AsyncConnection, kind: str) -> None:
+    """SQLite's transaction is a lock by itself."""
+    if kind == "mysql":
+        found = await connection.execute(
+            text("SELECT GET_LOCK(:name, :wait)"), {"name": f"mjsim{LOCK}", "wait": PATIENCE_S}
+        )
+        if found.scalar() != 1:
+            raise StoreError(
+                "Another process has been upgrading the database for long: try again when it is done."
+            )
+    elif kind == "postgresql":
+        await connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
+
+
+def _upgrade(connection: Connection, migrations: Path, name: str) -> None:
+    config = Config()
+    config.set_main_option("script_location", str(migrations).replace("%", "%%"))
+    config.attributes["connection"] = connection
+    script = ScriptDirectory.from_config(config)
+    current = MigrationContext.configure(connection).get_current_revision()
+    if current is not None and current not in {step.revision for step in script.walk_revisions()}:
+        raise StoreError(
+            f"The database {name} was made by a newer mjsim (its form is {current!r}): install that version."
+        )
+    tables = set(inspect(connection).get_table_names())
+    if VERSIONS not in tables and tables & set(metadata.tables):
+        raise StoreError(
+            f"The database {name} holds tables of another program: give the study one of its own."
+        )
+    if current != script.get_current_head():
+        command.upgrade(config, "head")

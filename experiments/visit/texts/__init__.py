@@ -1,0 +1,139 @@
+"""Texts that participants read, from the files in `experiments/texts`: one for each language, and its story."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from experiments.errors import ConfigError
+from experiments.visit.texts.items import Item
+from mjsim.support.files import read_bytes
+
+FOLDER = Path(__file__).parents[2] / "texts"
+_PLACE = re.compile(r"\{(\w+)\}")
+
+
+class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The texts of a page by name, and the items of its form."""
+
+    words: dict[str, str]
+    items: tuple[Item, ...] = ()
+    scale: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> str:
+        return self.words[name]
+
+    def paragraphs(self, name: str = "text") -> list[str]:
+        return [part.strip() for part in self.words.get(name, "").split("\n\n") if part.strip()]
+
+
+class _Items(msgspec.Struct):
+    item: list[Item] = []
+    scale: Annotated[list[str], msgspec.Meta(min_length=2)] | None = None
+
+
+Texts = Mapping[str, Section]
+
+
+def words_of(texts: Texts) -> Mapping[str, Mapping[str, str]]:
+    """Return texts by section and name, without items of forms."""
+    return {name: section.words for name, section in texts.items()}
+
+
+def languages() -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
+    """The texts of a language, with those of a file in place of some of them.
+
+    Args:
+        language: Of one of this package's files; for another language, `path` has all texts.
+        path: A file with some sections; a section's items replace all of the original ones.
+        values: What stands for `{name}` in texts.
+
+    Raises:
+        ConfigError: A file cannot be read, or names something that does not exist; it names the file and the value.
+    """
+    known = language in languages()
+    if not known and path is None:
+        raise ConfigError(
+            f"no texts in language {language!r}; there are {', '.join(languages())}, or name a file with all `texts`"
+        )
+    english = _tables(FOLDER / "en.toml")
+    usual = _tables(FOLDER / f"{language}.toml") if known else english
+    own = _tables(path) if path else {}
+    for name, table in {} if known else usual.items():
+        if missing := sorted(set(table) - set(own.get(name, {}))):
+            raise ConfigError(f"{path}: [{name}] lacks {missing[0]!r} in language {language!r}")
+    for name, table in own.items():
+        if name not in usual:
+            raise ConfigError(f"{path}: no section [{name}]; there are {', '.join(usual)}")
+        if unknown := sorted(set(table) - set(usual[name]) - {"item", "scale"}):
+            raise ConfigError(
+                f"{path}: no text {unknown[0]!r} in [{name}]; there are {', '.join(usual[name])}"
+            )
+    tables = {name: {**table, **own.get(name, {})} for name, table in usual.items()}
+    values = {"pay": tables["common"]["no_payment"], **values}
+    return {name: _section(name, table, english[name], values, path) for name, table in tables.items()}
+
+
+def story_file(language: str) -> Path | None:
+    """The story of a language but English, whose story is that of all trials; a ConfigError if there is none."""
+    if language == "en":
+        return None
+    path = FOLDER / f"story.{language}.md"
+    if not path.is_file():
+        raise ConfigError(
+            f"there is no story in language {language!r}; name a file with `story` in [all_cells]"
+        )
+    return path
+
+
+def _tables(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        return msgspec.toml.decode(read_bytes(path), type=dict[str, dict[str, Any]])
+    except OSError as error:
+        raise ConfigError(f"cannot read texts {path}: {error.strerror}") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
+def _section(
+    name: str, table: dict[str, Any], english: dict[str, Any], values: Mapping[str, str], path: Path | None
+) -> Section:
+    where = f"{path}: " if path else ""
+    try:
+        form = msgspec.convert({key: table[key] for key in ("item", "scale") if key in table}, _Items)
+        words = {key: value for key, value in table.items() if key not in ("item", "scale")}
+        words = msgspec.convert(words, dict[str, str])
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}[{name}]: {error}") from error
+    if len({item.name for item in form.item}) < len(form.item):
+        raise ConfigError(f"{where}[{name}] has two items of one name")
+    for item in form.item:
+        points = range(1, len(form.scale or ()) + 1)
+        if item.kind == "scale" and item.right is not None and item.right not in points:
+            raise ConfigError(
+                f"{where}[{name}] item {item.name}: right is {item.right!r}, no point of the scale"
+            )
+    filled = {
+        key: _filled(text, values, str(english.get(key, "")), f"{where}[{name}] {key}")
+        for key, text in words.items()
+    }
+    return Section(filled, tuple(form.item), tuple(form.scale or ()))
+
+
+def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
+    """Fill in the values of a study; the other places of the English text stay."""
+    places = _PLACE.findall(english)
+    later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
+
+    def value(found: re.Match[str]) -> str:
+        if found[1] in values or found[1] in later:
+            return values.get(found[1], found[0])
+        raise ConfigError(f"{where} has a place {found[0]}; there are {', '.join(sorted({*values, *later}))}")
+
+    return _PLACE.sub(value, text)

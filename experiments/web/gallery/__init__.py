@@ -1,1 +1,0 @@
-"""Shows many homes: `mjsim house gallery`."""

@@ -1,1 +1,0 @@
-"""Shows recorded runs in the browser: `mjsim view`."""

@@ -1,0 +1,87 @@
+"""A folder that shows many homes: contact sheets, a page that lists them, and a page for each."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import as_completed
+from pathlib import Path
+
+import cv2
+
+from experiments.errors import ConfigError, ExperimentError
+from experiments.trials.design import house_names
+from experiments.trials.workers import worker_pool
+from experiments.web.viewing.homes import PAGE, Home, draw_home, home_key
+from experiments.web.viewing.page import own_page
+from experiments.web.viewing.sheet import sheets
+from mjsim.support.files import replacing
+from mjsim.values.errors import MjsimError, RenderError
+
+HOMES, SHEET = "homes", "sheet_{}.png"
+
+
+def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
+    """Folder in the gallery -> name of the house, each house once, in their order.
+
+    Raises:
+        AssetError, HouseError: A source names no house.
+        ConfigError: Two houses would have the same folder.
+    """
+    found: dict[str, str] = {}
+    for name in house_names(list(sources)):
+        key = home_key(name)
+        if (other := found.setdefault(key, name)) != name:
+            raise ConfigError(f"{other} and {name} are both called {key}; rename one of the folders")
+    return found
+
+
+def write_gallery(
+    homes: Mapping[str, str], out: Path, *, workers: int, on_home: Callable[[str | None], None]
+) -> int:
+    """Draw the homes that are not in the folder `out` yet, then its sheets and its page; how many homes failed.
+
+    Args:
+        homes: Of `homes_of`.
+        out: A new folder, or that of a gallery.
+        workers: Homes at a time.
+        on_home: Called for each home: with None, or with what is wrong with it.
+
+    Raises:
+        ConfigError: `workers` is below 1, or `out` holds something else.
+        RenderError: Nothing can be drawn on this machine.
+        OSError: A file cannot be written.
+    """
+    if workers < 1:
+        raise ConfigError(f"a gallery needs at least one worker, got {workers}")
+    if out.exists() and not (out / HOMES).is_dir() and (not out.is_dir() or any(out.iterdir())):
+        raise ConfigError(f"{out} exists and is no gallery; name a new folder")
+    (out / HOMES).mkdir(parents=True, exist_ok=True)
+    drawn = {}
+    for key, home in _drawn(homes, out / HOMES, workers):
+        if isinstance(home, Home):
+            drawn[key] = home
+        on_home(None if isinstance(home, Home) else f"{homes[key]}: {home}")
+    shown = [(drawn[key], out / HOMES / key) for key in homes if key in drawn]
+    count = 0
+    for count, sheet in enumerate(sheets(shown), 1):
+        with replacing(out / SHEET.format(count)) as temporary:
+            cv2.imwrite(str(temporary), sheet[..., ::-1])
+    number = count + 1
+    while (old := out / SHEET.format(number)).is_file():  # of a longer gallery
+        old.unlink()
+        number += 1
+    page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
+    with replacing(out / PAGE) as temporary:
+        temporary.write_text(page, "utf-8")
+    return len(homes) - len(shown)
+
+
+def _drawn(homes: Mapping[str, str], folder: Path, workers: int) -> Iterator[tuple[str, Home | Exception]]:
+    """Each home as it is finished, or what is wrong with it."""
+    with worker_pool(min(workers, len(homes))) as pool:
+        running = {pool.submit(draw_home, name, folder / key): key for key, name in homes.items()}
+        for future in as_completed(running):
+            error = future.exception()
+            if error is not None and (
+                isinstance(error, RenderError) or not isinstance(error, MjsimError | ExperimentError)
+            ):
+                raise error
+            yield running[future], error if isinstance(error, Exception) else future.result()

@@ -1,0 +1,143 @@
+"""A home of a gallery: its pictures, its page, and what is said of it, in a folder of its own."""
+
+import functools
+import hashlib
+import re
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+
+from experiments.errors import ConfigError
+from experiments.house import House
+from experiments.session.house_pictures import floor_plan, room_views
+from experiments.web.viewing.page import run_page
+from experiments.web.viewing.tour import tour_page
+from mjsim.formats.gltf.export import export_scene
+from mjsim.generator.home_cache import load_catalogue
+from mjsim.house.catalogue.generated_names import parse_name
+from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.house.compiled.house import compiled_house
+from mjsim.render import Renderer
+from mjsim.support.files import exchange, source_digest, work_folder
+
+PLAN, VIEW = (480, 400), (300, 200)  # px
+PAGE, ABOUT = "index.html", "home.json"
+_WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
+
+
+class Home(msgspec.Struct, frozen=True):
+    """What a gallery says of a home.
+
+    Attributes:
+        name: Which names it wherever a house is named; a folder is named as it was given.
+        label: For people.
+        rooms: How many there are.
+        area: Of its floor, m2.
+        pictures: Files of the floor plan and of views at eye height.
+        digest: Of all that its files follow from.
+    """
+
+    name: str
+    label: str
+    rooms: int
+    area: float
+    pictures: tuple[str, ...]
+    digest: str
+
+    @property
+    def size(self) -> str:
+        return f"{self.rooms} {'room' if self.rooms == 1 else 'rooms'}, {self.area:.0f} m²"
+
+    @property
+    def origin(self) -> str:
+        """Seed and version of a generated home; how another one is named."""
+        found = re.fullmatch(r"generated:(\d+)\?rooms=\d+&version=(\d+)", self.name)
+        return f"seed {found[1]}, version {found[2]}" if found else self.name
+
+
+def home_key(name: str) -> str:
+    """The folder of a home in a gallery, which is checked as far as it costs no time.
+
+    Raises:
+        AssetError: A house that is not generated has no catalogue that can be read.
+        ConfigError: It has no name of which a folder could be called.
+        HouseError: A generated house is named wrongly.
+    """
+    named = parse_house(name)
+    if named.kind == "generated":
+        home = parse_name(named.name)
+        return f"generated_{home.seed}_{home.rooms}"
+    load_catalogue(name)
+    path = Path(name).absolute()
+    key = re.sub(r"[^A-Za-z0-9-]+", "_", path.parent.name if path.is_file() else path.name).strip("_")
+    if not key:
+        raise ConfigError(f"{name} has no letter or digit in its name; rename the folder")
+    return key
+
+
+def draw_home(name: str, folder: Path) -> Home:
+    """Write pictures and page of a home into `folder`, whole or not at all, unless they are there.
+
+    Raises:
+        AssetError: The house cannot be read or used.
+        HouseError: It cannot be generated.
+        RenderError: Nothing can be drawn on this machine.
+        OSError: The folder cannot be written.
+    """
+    catalogue = load_catalogue(name)
+    digest = hashlib.sha256(f"{name}\n{catalogue.content}\n{_code()}".encode()).hexdigest()[:20]
+    if (kept := _kept(folder)) and kept.digest == digest:
+        return kept
+    house = House.of(catalogue)
+    shown = catalogue.name if catalogue.ref.kind == "generated" else name
+    count, area = len(house.rooms.labels), round(house.rooms.area, 1)
+    with work_folder(folder.parent) as work:
+        home = Home(shown, catalogue.label, count, area, _draw(house, work), digest)
+        scene = {
+            file: content
+            for file, content in export_scene(catalogue).items()
+            if not file.startswith("objects/")
+        }
+        (work / PAGE).write_text(tour_page(house, scene, f"{home.size}, {home.origin}"), "utf-8")
+        (work / ABOUT).write_bytes(msgspec.json.encode(home))
+        work.chmod(0o755)
+        if folder.exists():
+            exchange(work, folder)
+        else:
+            work.rename(folder)
+    return home
+
+
+def _draw(house: House, folder: Path) -> tuple[str, ...]:
+    """Write a floor plan and two views; their names."""
+    compiled, rooms = compiled_house(house.catalogue), house.rooms
+    areas = dict.fromkeys(house.viewpoints, 0.0)
+    for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
+        if key in areas:  # one can stand in it
+            areas[key] += float(half.prod())
+    largest = sorted(areas, key=lambda key: -areas[key])[:2]
+    views = list(room_views(house, largest).values())
+    cameras = views[0][:2] if len(views) == 1 else [views[0][0], views[1][0]]
+    pictures = {"plan.webp": floor_plan(house, PLAN)}
+    with Renderer(compiled.model, width=2 * VIEW[0], height=2 * VIEW[1], profile="quality") as renderer:
+        for number, camera in enumerate(cameras, 1):
+            pictures[f"view_{number}.webp"] = renderer.rgb(compiled.data, camera)
+    for name, picture in pictures.items():
+        cv2.imwrite(str(folder / name), np.ascontiguousarray(picture[..., ::-1]), _WEBP)
+    return tuple(pictures)
+
+
+def _kept(folder: Path) -> Home | None:
+    try:
+        return msgspec.json.decode((folder / ABOUT).read_bytes(), type=Home)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+@functools.cache
+def _code() -> str:
+    """All but the house that a home's files follow from: our Python sources, and the page's."""
+    page = run_page("", {}, {}, tour="")
+    return source_digest("mjsim", "experiments") + hashlib.sha256(page.encode()).hexdigest()

@@ -1,0 +1,139 @@
+"""One self-contained HTML file that shows a run: the client's modules, the scene and the recorded run in it."""
+
+import base64
+import gzip
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from jinja2 import Environment, FileSystemLoader
+
+from experiments.house import House, read_words
+from experiments.record.reader import Record
+from experiments.trials.replay.replay import replay
+from experiments.trials.replay.replayer import Replayer
+from experiments.web.modules import STATIC, modules_of
+from experiments.web.server.pages import CLIENT, trial_texts
+from experiments.web.viewing import timeline
+from experiments.web.viewing.recorder import RunRecorder
+from experiments.web.worker.encoders import data_url
+from mjsim.formats.gltf.cache import cached_scene
+from mjsim.formats.gltf.store import GZIP, scenes_folder
+from mjsim.house.scene.avatar import EYE_FORWARD
+from mjsim.render import render_pictures
+
+_TYPES = {
+    ".js": "text/javascript",
+    ".json": "application/json",
+    ".glb": "model/gltf-binary",
+    ".webp": "image/webp",
+}
+
+
+def view_page(
+    directory: Path,
+    *,
+    catalogue: str | None = None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
+) -> str:
+    """HTML of the page that shows a run, which is simulated again for that.
+
+    Args:
+        directory: Directory of a run, or of a failed run.
+        catalogue: Where the catalogue of its house lies now, if not where it was.
+        on_progress: Called with the numbers of replayed and of recorded control steps.
+
+    Raises:
+        RecordError: `directory` is not a run directory.
+        ReplayError: It cannot be replayed, or differs from the record.
+    """
+    watched: list[tuple[Replayer, RunRecorder]] = []
+
+    def watch(replayer: Replayer) -> RunRecorder:
+        watched.append((replayer, RunRecorder(replayer.scene)))
+        return watched[0][1]
+
+    replay(directory, watch=watch, catalogue=catalogue, on_progress=on_progress)
+    ((replayer, seen),) = watched
+    record, house = replayer.record, replayer.house
+    models = {placed.model for placed in record.episode.objects}
+    return run_page(_title(record), _run(record, house, seen), _scene(house, models))
+
+
+def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
+    """HTML of the page that shows a run as it is recorded, in a scene of these files; `values` are the template's."""
+    urls = {name: _data_url(name, content) for name, content in scene.items()}
+    texts = trial_texts(read_words())
+    packed = {"run": _packed(run), "scene": _packed(urls)}
+    return own_page("view.html", "view/view.js", title=title, texts=texts, **packed, **values)
+
+
+def own_page(template: str, entry: str, **values: Any) -> str:
+    """HTML of a page that runs the module `entry` of the client, with nothing in another file."""
+    modules = {name: _data_url(name, source.encode()) for name, source in modules_of(entry).items()}
+    page: str = (
+        Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True, trim_blocks=True)
+        .get_template(template)
+        .render(
+            style=(STATIC / "style.css").read_text("utf-8"),
+            modules=msgspec.json.encode({"imports": modules}).decode(),
+            entry=entry,
+            **values,
+        )
+    )
+    return page
+
+
+def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
+    """What the page reads: `Run` of view/run.js."""
+    person = record.person
+    catalogue = house.catalogue.objects
+    return {
+        "title": _title(record),
+        "person": {
+            "eye_height": person.eye_height,
+            "eye_forward": EYE_FORWARD,
+            "body_radius": person.body_radius,
+            "field_of_view": person.field_of_view,
+        },
+        "bounds": house.bounds,
+        "models": {placed.name: placed.model for placed in record.episode.objects},
+        "labels": {placed.name: catalogue[placed.model].label for placed in record.episode.objects},
+        "time": seen.time,
+        "body": seen.body,
+        "hands": seen.hands,
+        "objects": seen.objects,
+        "hud": seen.hud,
+        "markers": seen.markers,
+        "shown": seen.shown,
+        "moments": timeline.moments(record, house),
+        "plans": timeline.plans(record, house),
+        "pictures": {key: data_url(picture) for key, picture in render_pictures(house.catalogue).items()},
+    }
+
+
+def _scene(house: House, models: set[str]) -> dict[str, bytes]:
+    """The files that draw a house with objects of some models, by name."""
+    folder = cached_scene(house.catalogue, scenes_folder())
+    found = {}
+    for path in sorted(folder.rglob("*.*")):
+        name = path.relative_to(folder).as_posix().removesuffix(GZIP)
+        if Path(name).stem in models or not name.startswith(("objects/", "floor")):
+            content = path.read_bytes()
+            found[name] = gzip.decompress(content) if path.suffix == GZIP else content
+    return found
+
+
+def _title(record: Record) -> str:
+    start = record.start
+    return f"{start['user']}, {start['assistance']}, {len(record.names)} objects, seed {start['house_seed']}"
+
+
+def _packed(value: Any) -> str:
+    """JSON, compressed, in base64."""
+    return base64.b64encode(gzip.compress(msgspec.json.encode(value), 9, mtime=0)).decode()
+
+
+def _data_url(name: str, data: bytes) -> str:
+    return f"data:{_TYPES[Path(name).suffix]};base64,{base64.b64encode(data).decode()}"

@@ -1,0 +1,138 @@
+"""The table of a study: a row for each person who has played, with answers, and without ids or formulas."""
+
+import asyncio
+import shutil
+from collections.abc import Mapping
+
+import pytest
+
+from experiments.cli.main import main
+from experiments.study.data.collect import TEXTS, collect, harmless, write_collected
+from experiments.study.data.copies import copies
+from experiments.study.file import read_people_study
+from experiments.trials.designs import FOLDER
+from experiments.trials.table import read_rows
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from experiments.visit.store import Store
+
+BRIEF = TrialConfig(objects=1, assistance="optimal", seed=0, fidelity="event", regret=False)
+TEXT = "=HYPERLINK(1)"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, house):
+    out = tmp_path_factory.mktemp("runs") / "task"
+    run_trial(BRIEF, out, topdown=False, house=house)
+    return out
+
+
+@pytest.fixture
+def study():
+    return read_people_study(FOLDER / "paper.toml")
+
+
+async def _fill(store, folder, run):
+    """Somebody who finished, one who left during the task, and one who finished and wants it deleted."""
+    answers: Mapping[str, object] = {"useful": 4, "games": "Every day", "age": 30, "comments": TEXT}
+    for name, deletes in (("first", False), ("leaves", False), ("deletes", True)):
+        person = await store.arrive(
+            "prolific", name, {"PROLIFIC_PID": f"secret-{name}"}, name[0] * 64, "consent"
+        )
+        await store.finish_phase(person.id, "consent", "comprehension", {"agreed": True})
+        await store.finish_phase(person.id, "comprehension", "task", {"attempts": 2, "hands": "Two"})
+        if name == "leaves":
+            await store.withdraw(person.id, delete=False)
+            continue
+        shutil.copytree(run, folder / "visits" / (name[0] * 64) / "task")
+        await store.finish_trial(person.id, "task", f"visits/{name[0] * 64}/task", "all delivered")
+        await store.finish_phase(person.id, "task", "survey", {}, "all delivered")
+        await store.finish_phase(person.id, "survey", "completion", answers, status="finished")
+        if deletes:
+            await store.withdraw(person.id, delete=True)
+
+
+async def _collected(study, folder, run):
+    store = await Store.open(f"sqlite:///{folder / 'study.db'}", "study", study.sha256)
+    try:
+        await _fill(store, folder, run)
+        return await collect(study, store, folder)
+    finally:
+        await store.close()
+
+
+def test_the_table_has_a_row_for_each_person_who_played(tmp_path, study, run):
+    found = asyncio.run(_collected(study, tmp_path, run))
+    (row,) = found.rows
+    assert (row["likert_useful"], row["likert_faster"], row["answer_games"], row["answer_age"]) == (
+        4, None, "Every day", 30,
+    )  # fmt: skip
+    assert row["comprehension_attempts"] == 2 and row["consent_agreed"] is True
+    assert (row["delivered"], row["assistance"]) == (1, "optimal")
+    assert found.unfinished == {"withdrawn": 1} and found.unusable == {}
+    table, _, texts = write_collected(found, tmp_path / "out")
+    assert read_rows(table)[0]["likert_useful"] == 4
+    assert texts.name == TEXTS and f"'{TEXT}" in texts.read_text()
+    for path in (tmp_path / "out").iterdir():
+        assert b"secret-" not in path.read_bytes()
+
+
+def test_a_run_that_was_changed_is_named(tmp_path, study, run):
+    broken = tmp_path / "run"
+    shutil.copytree(run, broken)
+    with (broken / "events.jsonl").open("a") as events:
+        events.write("{}\n")
+    found = asyncio.run(_collected(study, tmp_path, broken))
+    assert found.rows == [] and "not as written" in found.unusable["p00001"]
+
+
+def test_folders_of_play_are_collected_without_their_links(tmp_path, run, capsys):
+    for name, over in (("a" * 64, True), ("b" * 64, False)):
+        visit = tmp_path / "play" / name
+        visit.mkdir(parents=True)
+        (visit / "visit.json").write_text("{}")
+        if over:
+            shutil.copytree(run, visit / "task")
+    out = tmp_path / "table"
+    assert main(["study", "collect", "paper", str(tmp_path / "play"), "--out", str(out)]) == 0
+    assert "1 row; without one: 1 under way" in capsys.readouterr().out
+    (row,) = read_rows(out / "trials.parquet")
+    assert row["delivered"] == 1 and len(row["participant"]) == 9
+    assert not [path for path in out.iterdir() if b"a" * 64 in path.read_bytes()]
+    assert not (tmp_path / "play" / "copies.jsonl").exists()
+
+
+def test_texts_are_no_formulas():
+    for text in ("=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1"):
+        assert harmless(text) == f"'{text}"
+    assert harmless("a = b") == "a = b"
+
+
+def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tmp_path, run, capsys):
+    study_file = tmp_path / "study.toml"
+    assert main(["study", "init", str(study_file)]) == 0
+    folder = tmp_path / "served"
+    folder.mkdir()
+    asyncio.run(_filled(study_file, folder, run))
+    names = [str(study_file), str(folder)]
+    assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 0
+    assert main(["study", "erase", *names, "p00001", "--who", "me"]) == 2, "there is nobody any more"
+    assert main(["study", "backup", *names, "--out", str(study_file)]) == 2, "it is there already"
+    assert main(["study", "backup", *names, "--out", str(tmp_path / "b.db"), "--database", "../.."]) == 2
+    assert not copies(folder), "nothing was written"
+    assert main(["study", "backup", *names, "--out", str(tmp_path / "backup.db")]) == 0
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    assert main(["study", "restore", str(tmp_path / "backup.db"), str(moved / "study.db")]) == 0
+    assert main(["study", "collect", str(study_file), str(moved), "--out", str(tmp_path / "table")]) == 2
+    assert "nobody" in capsys.readouterr().err
+    for path in (*folder.rglob("*"), tmp_path / "backup.db"):
+        assert not path.is_file() or b"secret-first" not in path.read_bytes()
+    assert not (folder / "visits" / ("f" * 64)).exists()
+
+
+async def _filled(study_file, folder, run):
+    study = read_people_study(study_file)
+    store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
+    await _fill(store, folder, run)
+    await store.close()

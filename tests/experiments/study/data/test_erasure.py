@@ -1,0 +1,221 @@
+"""Who is erased or forgotten leaves no trace: every byte of what is kept is searched."""
+
+import asyncio
+import datetime
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from experiments.analysis.study.table import read_people
+from experiments.cli.main import main
+from experiments.study.data import retention
+from experiments.study.data.retention import forget_old
+from experiments.study.file import read_people_study
+from experiments.trials.trial import run_trial
+from experiments.trials.trial_config import TrialConfig
+from experiments.visit.store import Store, utc_now
+
+PEOPLE = ("anna", "bert", "cleo")
+TRACES = ("PID", "SUBMISSION", "key", "wrote")  # each with the name before it
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, house):
+    folder = tmp_path_factory.mktemp("runs")
+    for seed, name in enumerate(PEOPLE):
+        config = TrialConfig(objects=1, assistance="optimal", seed=seed, fidelity="event", regret=False)
+        run_trial(config, folder / name, topdown=False, house=house)
+    return folder
+
+
+@pytest.fixture
+def served(tmp_path, runs):
+    """A study with three people of a platform, a backup, a table and an export of it."""
+    study = tmp_path / "study.toml"
+    assert main(["study", "init", str(study)]) == 0
+    study.write_text(study.read_text().replace("attempts = 3 ", "keep_days = 30\nattempts = 3 "))
+    folder = tmp_path / "served"
+    folder.mkdir()
+    asyncio.run(_fill(read_people_study(study), folder, runs))
+    names = [str(study), str(folder)]
+    assert main(["study", "backup", *names, "--out", str(tmp_path / "backup.db")]) == 0
+    assert main(["study", "collect", *names, "--out", str(tmp_path / "table")]) == 0
+    assert main(["study", "export", *names, "--out", str(tmp_path / "export")]) == 0
+    return names
+
+
+async def _open(names):
+    study = read_people_study(Path(names[0]))
+    return await Store.open(f"sqlite:///{names[1]}/study.db", study.settings.name, study.sha256)
+
+
+async def audit_log(names):
+    store = await _open(names)
+    try:
+        return await store.audit_log()
+    finally:
+        await store.close()
+
+
+async def _fill(study, folder, runs):
+    store = await Store.open(f"sqlite:///{folder}/study.db", study.settings.name, study.sha256)
+    for name in PEOPLE:
+        ids = {"PROLIFIC_PID": f"{name}-PID" * 20, "SESSION_ID": f"{name}-SUBMISSION"}
+        person = await store.arrive("prolific", f"{name}-key", ids, name[0] * 64, "consent")
+        await store.show_phase(person.id, "consent")
+        await store.finish_phase(person.id, "consent", "task", {"agreed": True})
+        shutil.copytree(runs / name, folder / "visits" / (name[0] * 64) / "task")
+        await store.finish_trial(person.id, "task", f"visits/{name[0] * 64}/task", "all delivered")
+        await store.finish_phase(person.id, "task", "survey", {}, "all delivered")
+        for draft in range(20):  # kept as they are given
+            await store.save_answers(person.id, "survey", {"comments": f"{name}-wrote {draft} " * 50})
+        answers = {"useful": 4, "comments": f"{name}-wrote " * 100}
+        await store.finish_phase(person.id, "survey", "completion", answers, status="finished")
+    await store.close()
+
+
+def traces(folder, *wanted):
+    """Files below a folder with any of these texts in their bytes or their path."""
+    return [
+        (str(path.relative_to(folder)), text)
+        for path in folder.rglob("*")
+        if path.is_file()
+        for text in wanted
+        if text.encode() in path.read_bytes() or text in str(path.relative_to(folder))
+    ]
+
+
+def test_who_is_erased_is_nowhere_any_more(served, tmp_path, capsys):
+    gone = [f"bert-{trace}" for trace in TRACES] + ["b" * 64]
+    assert {path for path, _ in traces(tmp_path, *gone)} >= {
+        "backup.db",
+        "served/study.db",
+        "table/texts.csv",
+    }
+    assert (tmp_path / "export" / "runs" / "p00002").is_dir()
+    capsys.readouterr()
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"{tmp_path / name} of " in said for name in ("backup.db", "table", "export"))
+    assert traces(tmp_path, *gone) == []
+    assert traces(tmp_path, "p00002") == []
+    assert [row["participant"] for row in read_people(tmp_path / "table")] == ["p00001", "p00003"]
+    assert {path.name for path in (tmp_path / "export" / "runs").iterdir()} == {"p00001", "p00003"}
+    for others in ("anna-PID", "cleo-wrote"):
+        assert {path for path, _ in traces(tmp_path, others)} >= {"backup.db", "served/study.db"}
+    (tmp_path / "again").mkdir()
+    assert main(["study", "restore", str(tmp_path / "backup.db"), str(tmp_path / "again" / "study.db")]) == 0
+
+
+def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
+    moved = [tmp_path / "backup.db", tmp_path / "runs.csv", tmp_path / "served" / "restored.db"]
+    assert main(["study", "restore", str(moved[0]), str(moved[2])]) == 0
+    assert main(["metrics", f"{served[1]}/visits/{'b' * 64}/task", "--out", str(moved[1])]) == 0
+    for path in moved:
+        path.rename(path.with_name(f"{path.name}-elsewhere"))
+    visits = tmp_path / "served" / "visits"
+    (visits / ("b" * 64)).rename(tmp_path / "another-host")
+    capsys.readouterr()
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    said = capsys.readouterr().out
+    for path in moved:
+        (line,) = (line for line in said.splitlines() if f"{path} of " in line)
+        assert "is not there any more; where it was moved, delete p00002 there" in line
+    assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
+
+
+def test_another_person_with_the_same_number_stays_in_a_backup(served, tmp_path):
+    """As after an older backup was restored and the study went on."""
+    with closing(sqlite3.connect(tmp_path / "backup.db")) as database, database:
+        database.execute("UPDATE person SET created = '2020-01-01 00:00:00.000000' WHERE id = 2")
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 0
+    with closing(sqlite3.connect(tmp_path / "backup.db")) as database:
+        assert database.execute("SELECT count(*) FROM person WHERE id = 2").fetchone() == (1,)
+
+
+def test_the_last_person_of_a_table_leaves_an_empty_one(served, tmp_path):
+    for name in ("p00001", "p00002", "p00003"):
+        assert main(["study", "erase", *served, name, "--who", "me"]) == 0
+    assert not (tmp_path / "table" / "trials.parquet").exists()
+    assert traces(tmp_path, *PEOPLE, "p00001", "p00003") == []
+
+
+def test_a_backup_that_cannot_be_read_stops_erasing_before_anything_is_deleted(served, tmp_path):
+    (tmp_path / "backup.db").write_bytes(b"no database" * 1000)
+    assert main(["study", "erase", *served, "p00002", "--who", "me"]) == 2
+    assert (tmp_path / "served" / "visits" / ("b" * 64)).is_dir()
+
+
+def test_who_people_are_is_forgotten_by_date(served, tmp_path, capsys):
+    async def forget(days, **options):
+        store = await _open(served)
+        try:
+            if days == 31:
+                await store.withdraw(3, delete=True)
+                await store.ledger.decide(1, "reward", 750, "USD", "p00001-reward", "finished")
+            later = utc_now() + datetime.timedelta(days=days)
+            visits = tmp_path / "served" / "visits"
+            return await forget_old(store, visits, 30, now=later, **options)
+        finally:
+            await store.close()
+
+    assert asyncio.run(forget(29)).forgotten == ()
+    planned = asyncio.run(forget(31, dry=True))
+    assert (planned.forgotten, planned.erased, planned.unpaid) == (("p00002",), ("p00003",), ("p00001",))
+    assert traces(tmp_path / "served", "bert-PID")
+    assert asyncio.run(forget(32)) == planned
+    log = [(row.who, row.action, row.details) for row in asyncio.run(audit_log(served))]
+    assert ("keep_days", "people forgotten", {"people": [2]}) in log
+    assert ("keep_days", "person erased", {"person": 3, "paid": []}) in log
+    assert traces(tmp_path, "bert-PID", "bert-SUBMISSION", "bert-key", "b" * 64) == []
+    assert traces(tmp_path, *[f"cleo-{trace}" for trace in TRACES], "c" * 64) == []
+    assert traces(tmp_path / "served", "anna-PID") and traces(tmp_path / "served", "bert-wrote")
+    capsys.readouterr()
+    assert main(["study", "collect", *served, "--out", str(tmp_path / "table"), "--force"]) == 0
+    assert {row["participant"] for row in read_people(tmp_path / "table")} == {"p00001", "p00002"}
+    assert main(["study", "forget", *served]) == 0
+    assert capsys.readouterr().out.endswith("forgotten: nobody\nerased: nobody\nnot paid yet: nobody\n")
+
+
+def test_forgetting_that_was_interrupted_is_finished_later(served, tmp_path, monkeypatch):
+    async def stopped(*_):
+        raise KeyboardInterrupt
+
+    async def forget():
+        store = await _open(served)
+        try:
+            later = utc_now() + datetime.timedelta(days=31)
+            await forget_old(store, tmp_path / "served" / "visits", 30, now=later)
+        finally:
+            await store.close()
+
+    with monkeypatch.context() as killed, pytest.raises(KeyboardInterrupt):
+        killed.setattr(Store, "forget", stopped)
+        asyncio.run(forget())
+    asyncio.run(forget())
+    assert traces(tmp_path, "a" * 64, "anna-PID") == []
+    with closing(sqlite3.connect(tmp_path / "served" / "study.db")) as database:
+        folders = [row[0] for row in database.execute("SELECT folder FROM trial")]
+    assert len(folders) == 3 and all(
+        (tmp_path / "served" / path / "events.jsonl").is_file() for path in folders
+    )
+
+
+def test_the_server_forgets_every_day(served, tmp_path, monkeypatch):
+    times = iter([utc_now() + datetime.timedelta(days=days) for days in (29, 31, 32)])
+    monkeypatch.setattr(retention, "utc_now", lambda: next(times))
+    monkeypatch.setattr(retention, "DAY", 0.0)
+
+    async def days():
+        store = await _open(served)
+        try:
+            await retention.forget_daily(store, tmp_path / "served" / "visits", 30)
+        finally:
+            await store.close()
+
+    with pytest.raises((StopIteration, RuntimeError)):
+        asyncio.run(days())
+    assert traces(tmp_path, "bert-PID", "b" * 64) == []

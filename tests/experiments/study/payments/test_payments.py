@@ -1,0 +1,94 @@
+"""Who gets what: by rule, noted once, paid once."""
+
+import asyncio
+import dataclasses
+
+import msgspec
+import pytest
+
+from experiments.cli.main import main
+from experiments.study.file import Pay, read_people_study
+from experiments.study.payments.rules import decide, due
+from experiments.trials.designs import FOLDER
+from experiments.visit.store import Store
+
+PAY = Pay(currency="EUR", reward=7.5, screen_out=0.505, bonus_for_all=1.0, partial=True)
+
+
+def with_pay(pay):
+    study = read_people_study(FOLDER / "paper.toml")
+    return dataclasses.replace(study, settings=msgspec.structs.replace(study.settings, pay=pay))
+
+
+async def fill(store):
+    """People who end in every way; the first one put everything away."""
+    ends = (("task", "finished"), ("task", "finished"), ("device", "screened_out"), ("consent", "no_consent"))
+    for number, (phase, status) in enumerate(
+        (*ends, ("survey", "withdrawn"), ("story", "withdrawn"), ("task", None))
+    ):
+        person = await store.arrive("link", None, {}, f"{number:064}", phase)
+        if number == 0:
+            await store.finish_trial(person.id, "task", "x", "all delivered")
+        if status == "finished":
+            await store.finish_phase(person.id, phase, "completion", {}, status=status)
+        elif status:
+            await store.finish(person.id, status)
+
+
+@pytest.mark.parametrize(
+    ("pay", "expected"),
+    [
+        (
+            PAY,
+            {
+                "p00001-reward": 750,
+                "p00001-bonus": 100,
+                "p00002-reward": 750,
+                "p00003-screen_out": 51,  # half a cent rounds up
+                "p00005-partial": 525,  # 7 of 10 phases
+            },
+        ),
+        (Pay(reward=2.0), {"p00001-reward": 200, "p00002-reward": 200}),
+        (Pay(), {}),
+    ],
+)
+def test_rules_say_who_gets_what_and_deciding_again_changes_nothing(tmp_path, pay, expected):
+    async def run():
+        store = await Store.open(f"sqlite:///{tmp_path / 'study.db'}", "study", "0" * 64)
+        await fill(store)
+        payments = due(with_pay(pay), await store.people(), await store.trials())
+        first, again = await decide(store, payments), await decide(store, payments)
+        owed = await store.ledger.owed()
+        await store.close()
+        return payments, first, again, owed
+
+    payments, first, again, owed = asyncio.run(run())
+    assert {payment.key: payment.cents for payment in payments} == expected
+    assert (first, again, len(owed)) == (len(expected), 0, len(expected))
+
+
+def test_a_payment_is_noted_once(tmp_path, capsys):
+    study = tmp_path / "study.toml"
+    assert main(["study", "init", str(study)]) == 0
+
+    async def prepare():
+        read = read_people_study(study)
+        store = await Store.open(f"sqlite:///{tmp_path / 'study.db'}", read.settings.name, read.sha256)
+        await fill(store)
+        await store.close()
+
+    asyncio.run(prepare())
+    words = ["study", "pay", str(study), str(tmp_path)]
+    assert main([*words, "--dry-run"]) == 0
+    paid = [*words, "--without-rehearsal", "--paid", "p00001-reward", "--reference", "receipt 1"]
+    assert main(paid) == 2, "the dry run decided nothing"
+    assert main(words) == 0
+    assert main(paid) == 0
+    assert main(paid) == 2
+    assert main([*words, "--paid", "p00001-reward"]) == 2
+    capsys.readouterr()
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert "p00001-reward  7.50 USD  finished the study  paid" in text
+    assert "p00002-reward  7.50 USD  finished the study  owed" in text
+    assert "7.50 USD are owed" in text

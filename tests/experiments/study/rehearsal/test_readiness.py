@@ -1,0 +1,201 @@
+"""`mjsim study check`: what is not ready is listed with its line; a dry run goes through every phase."""
+
+import asyncio
+import dataclasses
+
+import msgspec
+import pytest
+from scripted_workers import ScriptedPool
+
+from experiments.cli.main import main
+from experiments.study.file import read_people_study
+from experiments.study.plan import plan_of
+from experiments.study.recruitment import recruiter
+from experiments.study.rehearsal import dry_run as runs
+from experiments.study.rehearsal.costs import Played, cost, detectable, durations
+from experiments.study.rehearsal.pictures import browser
+from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
+from experiments.visit.phases import phases_of
+from experiments.visit.phases.base import Done, FormPhase
+
+STUDY = """\
+[all_cells]
+user = "guest"
+house_seeds = 57
+
+[[cells]]
+assistance = "none"
+objects = 1
+people = 2
+
+[[cells]]
+assistance = "optimal"
+objects = 1
+seeds = "2:4"
+
+[study]
+name = "small"
+title = "Tidying up"
+institution = "A university"
+contact = "people@university.edu"
+minutes = 10
+
+[study.pay]
+reward = 2.0
+fee = 0.5
+bonus_for_all = 1.0
+
+[study.minimum]
+story = 20
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return read_people_study(path)
+
+
+def with_text(tmp_path, **replaced):
+    text = STUDY
+    for before, after in replaced.values():
+        assert before in text
+        text = text.replace(before, after)
+    path = tmp_path / "other.toml"
+    path.write_text(text)
+    return read_people_study(path)
+
+
+def test_a_good_file_has_no_problems(study):
+    assert problems_of_file(study) == []
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "line", "said"),
+    [
+        ("people@university.edu", "you@example.org", 19, "somebody answers"),
+        ("A university", "your institution", 18, "name yours"),
+        ("reward = 2.0", "reward = 2.0\nwage = 15.0", 23, "12.00 an hour, below the wage of 15.00"),
+        ("[study.pay]", '[study.recruitment]\nplatform = "prolific"\n[study.pay]', 22, "completed"),
+        ("people = 2", "people = 1", 16, "one person"),
+    ],
+)
+def test_problems_name_file_and_line(tmp_path, before, after, line, said):
+    changed = with_text(tmp_path, only=(before, after))
+    (found,) = located(changed, problems_of_file(changed))
+    assert found.startswith(f"{changed.path}, line {line}: ") and said in found
+
+
+def test_minutes_that_contradict_the_length_are_a_problem(study):
+    assert problems_of_length(study, 400.0, 700.0) == []
+    assert "11 to 20" in problems_of_length(study, 660.0, 1200.0)[0].text
+    assert "2 to 3" in problems_of_length(study, 120.0, 180.0)[0].text
+
+
+def test_cost_length_and_power(study):
+    found = cost(study)
+    assert (found.rewards, found.bonuses, found.fee, found.total, found.hourly) == (8.0, 4.0, 6.0, 18.0, 12.0)
+    shorter = dataclasses.replace(
+        study,
+        settings=msgspec.structs.replace(study.settings, phases=("consent", "story", "task", "completion")),
+    )
+    played = Played(60.0, {"none": 100.0, "optimal": 80.0})
+    seconds = durations(shorter, phases_of(plan_of(shorter)), {"consent": 238, "story": 10}, played)
+    assert seconds == {"consent": 60.0, "story": 20.0, "task": 90.0, "completion": 0.0}
+    assert detectable(study).keys() == {"assistance"}
+    assert 0.5 < detectable(study)["assistance"] < 1.0
+
+
+class _Sloppy(FormPhase):
+    """A survey that takes anything."""
+
+    def read(self, *_):
+        return Done({})
+
+
+def _walked(study, folder, monkeypatch, phases=None):
+    pictures = []
+
+    async def photograph(name, _):
+        pictures.append(name)
+
+    if phases:
+        monkeypatch.setattr("experiments.visit.procedure.phases_of", lambda _: phases)
+    walked = asyncio.run(
+        runs.dry_run(study, recruiter(study.settings.recruitment), folder, ScriptedPool(), photograph)
+    )
+    return walked, pictures
+
+
+def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    walked, pictures = _walked(study, tmp_path, monkeypatch)
+    (unplayed,) = walked.faults
+    assert "the run that was recorded cannot be used" in unplayed
+    assert pictures == [
+        "welcome", *study.settings.phases[:-1], "finished", "consent-no_consent", "device-screened_out",
+        "comprehension-screened_out", "withdrawal", "withdrawn",
+    ]  # fmt: skip
+    assert walked.words["consent"] > 100 and walked.words["survey"] > 200
+
+
+async def _play_nothing(self, link, trial):
+    """The trial is over; what is tested here is what is around it."""
+    person = await self._person(link)
+    run = self._procedure.folders.find(person.token_hash).run(trial)
+    run.mkdir()
+    (run / "metrics.json").write_text('{"ended": "time limit"}')
+    await self._procedure.record_trials(person)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        'platform = "prolific"\ncompleted = "C1"\nscreened_out = "C2"\nno_consent = "C3"\nstudy_id = "5f000000"',
+        'platform = "connect"\ncompleted = "CODE1"\nstudy_id = "5f00000000"',
+        'platform = "external-question"\nsites = ["https://platform.example.org"]',
+        'platform = "lab"',
+    ],
+)
+def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
+    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    phases = 'phases = ["consent", "task", "debriefing", "completion"]'
+    changed = with_text(
+        tmp_path,
+        phases=("minutes = 10", f"minutes = 10\n{phases}\n[study.recruitment]\n{settings}"),
+        minimum=("story = 20", ""),
+    )
+    walked, _ = _walked(changed, tmp_path, monkeypatch)
+    assert [fault for fault in walked.faults if "cannot be used" not in fault] == []
+
+
+def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    phases = [
+        _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
+    ]
+    walked, _ = _walked(study, tmp_path, monkeypatch, phases)
+    assert "survey takes a form that it should refuse" in walked.faults
+
+
+@pytest.mark.slow
+def test_the_command_plays_takes_pictures_and_says_what_is_missing(tmp_path, capsys):
+    short = with_text(
+        tmp_path,
+        phases=("minutes = 10", 'minutes = 10\nphases = ["consent", "training", "task", "completion"]'),
+        minimum=("story = 20", "consent = 1"),
+        contact=("people@university.edu", "nobody"),
+    )
+    assert main(["study", "check", str(short.path), "--out", str(tmp_path / "pictures")]) == 1
+    said = capsys.readouterr().out
+    assert "line 19: contact is 'nobody'" in said
+    assert (
+        "not ready (1 to put right)" in said or "not ready (2" in said
+    )  # minutes depend on who is simulated
+    assert "18.00 USD in all" in said and "partial eta squared" in said
+    if browser():
+        assert {path.name for path in (tmp_path / "pictures").glob("*-consent-*.png")} >= {
+            "02-consent-desk.png", "02-consent-phone.png",
+        }  # fmt: skip
+        assert "04-task-phone.png" in (tmp_path / "pictures" / "index.html").read_text()

@@ -1,0 +1,133 @@
+"""Rehearsals: a seed plans the same people, a small study passes, is continued, and is kept apart from people."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+import pytest
+from check_rehearsal import check
+
+from experiments.cli.main import main
+from experiments.record.origin import REHEARSED
+from experiments.study.rehearsal.plan import plan_people
+from experiments.visit.plan import PHASES
+
+STUDY = """
+[all_cells]
+user = "guest"
+fidelity = "event"
+regret = false
+house_seeds = 57
+
+[[cells]]
+assistance = "optimal"
+objects = 1
+people = 4
+
+[[cells]]
+assistance = "none"
+objects = 1
+seeds = "20:24"
+
+[study]
+name = "small"
+title = "Tidying up"
+institution = "an institution"
+contact = "you@example.org"
+phases = ["consent", "device", "story", "comprehension", "training", "task", "survey", "completion"]
+
+[study.minimum]
+story = 10
+
+[study.pay]
+reward = 7.5
+
+[study.recruitment]
+platform = "prolific"
+completed = "CODE1"
+screened_out = "CODE2"
+no_consent = "CODE3"
+"""
+PATIENCE = 120.0  # s
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return path
+
+
+def ended(out):
+    """Numbers of the people whose end is noted."""
+    path = out / "people.jsonl"
+    lines = path.read_text().splitlines() if path.is_file() else []
+    return [one["number"] for one in map(json.loads, lines) if one["outcome"]]
+
+
+def test_a_seed_plans_the_same_people_with_the_shares_that_are_wanted():
+    first, again = (plan_people(PHASES, 2000, 7, per_minute=2.0, dropouts=0.2) for _ in range(2))
+    assert first == again
+    assert first != plan_people(PHASES, 2000, 8, per_minute=2.0, dropouts=0.2)
+    leave, back = (
+        np.mean([value is not None for value in values])
+        for values in zip(*((one.leaves, one.returns_in) for one in first), strict=True)
+    )
+    assert abs(leave - 0.2) < 0.03 and abs(back - 0.1) < 0.02
+    assert abs(first[-1].arrives / 2000 - 30.0) < 3.0
+    assert {one.leaves_in for one in first if one.leaves} == set(PHASES[:-1])
+
+
+def test_nobody_is_paid_before_a_rehearsal_has_passed(tmp_path, study, capsys):
+    served, out = tmp_path / "served", tmp_path / "rehearsal"
+    served.mkdir()
+    out.mkdir()
+    sha = hashlib.sha256(study.read_bytes()).hexdigest()
+    words = ["study", "pay", str(study), str(served), "--database", f"sqlite:///{served}/study.db"]
+    paid = [*words, "--paid", "p00001-reward", "--reference", "receipt"]
+    assert main(paid) == 2 and "study rehearse" in capsys.readouterr().err
+    for hashed, passed, said in ((sha[::-1], True, "another study file"), (sha, False, "went wrong")):
+        report = {"settings": {"study": hashed, "people": 6}, "passed": passed}
+        (out / "rehearsal.json").write_text(json.dumps(report))
+        assert main([*paid, "--rehearsal", str(out)]) == 2
+        assert said in capsys.readouterr().err
+    (out / "rehearsal.json").write_text(json.dumps({**report, "passed": True}))
+    for further in (["--rehearsal", str(out)], []):  # it is asked for once
+        assert main([*paid, *further]) == 2
+        assert "p00001-reward" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_small_study_is_rehearsed_continued_and_consistent(tmp_path, study, capsys):
+    out = tmp_path / "rehearsal"
+    words = ["study", "rehearse", str(study), "--people", "6", "--seed", "0", "--dropouts", "0.4"]
+    words += ["--per-minute", "8", "--out", str(out)]
+    command = [sys.executable, "-m", "experiments.cli.main", *words]
+    first = subprocess.Popen(command, env=os.environ, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + PATIENCE
+    while not ended(out) and first.poll() is None:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    first.send_signal(signal.SIGTERM)
+    _, said = first.communicate(timeout=PATIENCE)
+    assert first.returncode == 128 + signal.SIGTERM
+    assert said.splitlines()[-1] == "mjsim: stopped by SIGTERM; what was finished is kept"
+    assert "Traceback" not in said
+    before = ended(out)
+    assert main(words) == 0, (out / "rehearsal.json").read_text()
+    assert Counter(ended(out)) == dict.fromkeys(range(6), 1) and ended(out)[: len(before)] == before
+    wrong, numbers = check(out)
+    assert wrong == []
+    assert numbers["people"] == 6 and set(numbers["statuses"]) > {"finished"}
+    assert REHEARSED in (out / "analysis" / "report.html").read_text()
+    served = str(out / "served")
+    capsys.readouterr()
+    assert main(["study", "collect", str(study), served, "--out", str(tmp_path / "table")]) == 2
+    assert "rehearsal" in capsys.readouterr().err
+    assert main(["study", "pay", str(study), served, "--paid", "p00001-reward", "--reference", "x"]) == 2

@@ -1,0 +1,156 @@
+"""Backups, restoring and deleting: all is there, or nothing is left."""
+
+import asyncio
+import sqlite3
+from datetime import timedelta
+
+import numpy as np
+import pytest
+from sqlalchemy import select
+
+from experiments.errors import StoreError
+from experiments.visit.store import CellQuota, Store, restore
+from experiments.visit.store.tables import metadata
+
+pytestmark = pytest.mark.anyio
+
+SECRET = "5f3c9a61e0platform"
+
+
+@pytest.fixture
+async def played(store):
+    """A study with something in every table; the person."""
+    person = await store.arrive("prolific", "f" * 64, {"participant": SECRET}, "a" * 64, "consent")
+    await store.assign(person.id, [CellQuota(2, (7,))], "balanced", np.random.default_rng(0))
+    await store.show_phase(person.id, "consent")
+    await store.save_answers(person.id, "consent", {"free text": f"I am {SECRET}"})
+    await store.finish_phase(person.id, "consent", "task", {"age": 30})
+    await store.finish_trial(person.id, "task", f"visits/{'a' * 64}/task", "finished")
+    await store.ledger.decide(person.id, "reward", 750, "USD", f"reward-{SECRET}", "finished")
+    await store.ledger.confirm(f"reward-{SECRET}", 1, SECRET)
+    ada = await store.researchers.add("ada", "correct horse", "owner")
+    await store.researchers.log_in(ada.id, "b" * 64, person.created)
+    await store.set_quota(0, 3, "ada")
+    await store.greet("first")
+    return person
+
+
+async def everything(store):
+    async with store._database.reading() as connection:
+        return {
+            table.name: [tuple(row) for row in await connection.execute(select(table).order_by(table.c.id))]
+            for table in metadata.sorted_tables
+        }
+
+
+@pytest.mark.usefixtures("played")
+async def test_a_backup_restored_elsewhere_is_the_same_study(store, tmp_path, other_url):
+    await store.backup(tmp_path / "backup.db")
+    assert sorted(path.name for path in tmp_path.glob("backup*")) == ["backup.db"]
+    await restore(tmp_path / "backup.db", other_url)
+    restored = await Store.open(other_url, "pilot", "0" * 64)
+    try:
+        before = await everything(store)
+        assert all(before.values())
+        assert await everything(restored) == before
+        await restored.arrive("link", None, {}, "c" * 64, "consent")
+        with pytest.raises(StoreError, match="not empty"):
+            await restore(tmp_path / "backup.db", other_url)
+    finally:
+        await restored.close()
+
+
+async def test_a_backup_is_of_one_moment_while_people_go_on(store, tmp_path, arrive):
+    stop = asyncio.Event()
+
+    async def crowd():
+        number = 0
+        while not stop.is_set():
+            number += 1
+            await arrive(number)
+
+    running = asyncio.create_task(crowd())
+    for number in range(3):
+        await asyncio.sleep(0.05)
+        await store.backup(tmp_path / f"{number}.db")
+    stop.set()
+    await running
+    for number in range(3):
+        with sqlite3.connect(tmp_path / f"{number}.db") as copy:
+            people = {row[0] for row in copy.execute("SELECT id FROM person")}
+            assert people
+            assert people == {row[0] for row in copy.execute("SELECT person_id FROM identity")}
+
+
+async def test_a_backup_overwrites_nothing_and_a_damaged_one_is_refused(store, tmp_path, arrive, other_url):
+    for number in range(200):
+        await arrive(number)
+    backup = tmp_path / "backup.db"
+    await store.backup(backup)
+    with pytest.raises(StoreError, match="there already"):
+        await store.backup(backup)
+    content = bytearray(backup.read_bytes())
+    content[len(content) // 2 :] = bytes(len(content) - len(content) // 2)
+    backup.write_bytes(content)
+    with pytest.raises(StoreError, match="damaged"):
+        await restore(backup, other_url)
+    with pytest.raises(StoreError, match="no backup"):
+        await restore(tmp_path / "none.db", other_url)
+
+
+async def test_who_is_erased_leaves_nothing_but_what_was_paid(store, played, arrive, url):
+    other = await arrive(5)
+    await store.erase(played.id, "ada")
+    left = await everything(store)
+    assert SECRET not in repr(left)
+    assert {name for name, rows in left.items() if rows} == {
+        "study",
+        "person",
+        "identity",
+        "audit",
+        "researcher",
+        "login",
+        "host",
+    }
+    assert await store.find("a" * 64) is None
+    assert [person.id for person in await store.people()] == [other.id]
+    paid = {"kind": "reward", "cents": 750, "currency": "USD"}
+    assert (await store.audit_log())[-1].details == {"person": played.id, "paid": [paid]}
+    if url.startswith("sqlite"):
+        file = url.removeprefix("sqlite:///")
+        for name in (file, f"{file}-wal"):
+            with open(name, "rb") as content:  # noqa: PTH123
+                assert SECRET.encode() not in content.read()
+    with pytest.raises(StoreError, match=f"no person {played.id}"):
+        await store.erase(played.id, "ada")
+
+
+async def test_who_is_forgotten_keeps_what_they_did_and_nothing_that_tells_who_they_are(
+    store, played, arrive
+):
+    other = await arrive(5)
+    await store.save_answers(played.id, "task", {"later": 1})
+    assert await store.known(other.seen + timedelta(days=1)) == (played.id, other.id)
+    assert await store.known(other.seen - timedelta(days=1)) == ()
+    before = await store.answers(played.id)
+    await store.forget([played.id], ["c" * 64], "keep_days")
+    assert await store.known(other.seen + timedelta(days=1)) == (other.id,)
+    assert await store.find("a" * 64) is None
+    assert (await store.person(played.id)).token_hash == "c" * 64
+    assert [row.folder for row in await store.trials()] == [f"visits/{'c' * 64}/task"]
+    assert await store.answers(played.id) == before
+    left = await everything(store)
+    for name in ("person", "identity", "trial"):
+        assert SECRET not in repr(left[name]) and "f" * 64 not in repr(left[name])
+    assert [event.reference for event in await store.ledger.history(played.id)] == ["", ""]
+    assert [event.cents for event in await store.ledger.history(played.id)] == [750, 750]
+    again = await store.arrive("prolific", "f" * 64, {"participant": SECRET}, "d" * 64, "consent")
+    assert again.id not in (played.id, other.id) and not again.returning
+
+
+async def test_nobody_is_erased_who_is_owed_something(store, arrive):
+    person = await arrive()
+    await store.ledger.decide(person.id, "reward", 750, "USD", "r")
+    with pytest.raises(StoreError, match="owed r: pay first"):
+        await store.erase(person.id, "ada")
+    assert await store.person(person.id)
