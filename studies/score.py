@@ -18,7 +18,7 @@ from experiments.analysis.statistics.noncentral import Interval
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
-from experiments.record.origin import RECORDED
+from experiments.record.phases import RECORDED
 from experiments.trials.exclusions import LeftOut
 from studies.prediction import effect_found, log_score, population_interval, prediction_interval
 from studies.published import Direction, Published, PublishedTest

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, read_checksums
+from experiments.record.files import CHECKSUMS, read_checksums
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import run_batch
 from experiments.trials.batch_checks import check_trials

@@ -19,7 +19,7 @@ from scipy.stats import t
 
 from experiments.analysis.statistics.noncentral import t_interval
 from experiments.errors import ConfigError, RecordError
-from experiments.record.origin import origin_of
+from experiments.record.phases import origin_of
 from experiments.trials.design import counted
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
@@ -97,7 +97,7 @@ def read_blocks(folder: Path) -> list[Block]:
 
 
 def batch_origin(blocks: Sequence[Block]) -> str:
-    """Whether the people of a batch were simulated, as in `experiments.record.origin`."""
+    """Whether the people of a batch were simulated, as in `experiments.record.phases`."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     return origin_of(row["user"] for row in rows)
 

@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     write_text_atomically(out / "objects.csv", _table(found))
     write_text_atomically(out / "disorder.json", json.dumps(disorder.tables()) + "\n")
     if importlib.util.find_spec("matplotlib"):
-        from experiments.analysis.disorder_plot import draw_disorder
+        from experiments.analysis.check_picture import draw_disorder
 
         draw_disorder(out / "disorder.png", disorder, kinds)
     _print_summary(things, disorder, kinds)

@@ -157,7 +157,7 @@ def _run(words: list[str]) -> int:
         flush_output()
         raise
     if "numba" in sys.modules:
-        from experiments.trials.compile_notice import announce_compiling
+        from experiments.trials.warmup import announce_compiling
 
         announce_compiling()
     with exit_raised():

@@ -28,8 +28,7 @@ from experiments.cli.server import (
 )
 from experiments.cli.study.database import DATABASE, sqlite_url
 from experiments.errors import ConfigError
-from experiments.record.origin import HUMAN
-from experiments.record.phases import PHASES, TASK
+from experiments.record.phases import HUMAN, PHASES, TASK
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
 from planner.solver import SOLVERS, solver

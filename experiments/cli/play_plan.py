@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from experiments.cli.play_phases import questions_of, shown_phases
 from experiments.record.phases import STORY, TRAINING
-from experiments.session.story import story_text
+from experiments.session.familiarise import story_text
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import MAX_SEED, TrialConfig
 from experiments.visit.plan import COMPREHENSION, RESULT, Device, Limits, VisitPlan

@@ -17,7 +17,7 @@ from experiments.cli.options import (
     given_options,
     trial_options,
 )
-from experiments.session.endings import INTERRUPTED
+from experiments.record.phases import INTERRUPTED
 from experiments.session.signals import exit_code
 from experiments.trials.trial_config import TrialConfig
 

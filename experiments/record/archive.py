@@ -18,7 +18,7 @@ from pathlib import Path
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
+from experiments.record.files import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.run_directory import PACKED, is_run
 from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 

@@ -7,8 +7,7 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import write_checksums
-from experiments.record.files import save_arrays, write_json
+from experiments.record.files import save_arrays, write_checksums, write_json
 from experiments.record.metrics import measure
 from experiments.record.reader import Record
 from experiments.record.run_directory import free_name

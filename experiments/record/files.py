@@ -1,8 +1,10 @@
-"""Arrays and JSON on disk: written whole or not at all, and read with errors that name the file."""
+"""Arrays, JSON and checksums on disk: written atomically, and read with errors that name the file."""
 
+import hashlib
 import json
+import re
 import zipfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import RecordError
-from mjsim.support.files import check_input, read_text, replacing, write_text_atomically
+from mjsim.support.files import check_input, read_bytes, read_text, replacing, write_text_atomically
 from mjsim.support.files import read_json as strict_json
 
 # NumPy's name of an array's type (or `TEXT`), and its shape; None where any length will do.
@@ -91,3 +93,40 @@ def read_json(path: Path) -> Any:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested too deeply
         raise RecordError(f"{path} is not JSON: {error}") from error
+
+
+CHECKSUMS = "SHA256SUMS"
+_LINE = re.compile(r"([0-9a-f]{64})  ([^/\\]+)")
+
+
+def write_checksums(folder: Path, names: Iterable[str]) -> None:
+    """Write `SHA256SUMS` for those of the files that exist; `sha256sum -c SHA256SUMS` checks it."""
+    found = sorted(name for name in names if (folder / name).is_file())
+    write_text_atomically(
+        folder / CHECKSUMS, "".join(f"{sha256_of(folder / name)}  {name}\n" for name in found)
+    )
+
+
+def read_checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 by file name, as written with the run.
+
+    Raises:
+        RecordError: The file is missing or damaged; the message names it.
+    """
+    path = folder / CHECKSUMS
+    try:
+        lines = read_bytes(path).decode("ascii").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordError(f"cannot read {path}: {error}") from error
+    found = [_LINE.fullmatch(line) for line in lines[:-1]]
+    sums = {match[2]: match[1] for match in found if match}
+    if lines[-1] or len(sums) != len(found):
+        raise RecordError(f"{path} is not as written: a line is not a checksum and a file name")
+    return sums
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's content, in hexadecimal digits."""
+    check_input(path)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

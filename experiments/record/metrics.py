@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.record.displays import displays
 from experiments.record.health import summarise_health
-from experiments.record.origin import is_simulated
-from experiments.record.phases import FLYTHROUGH
+from experiments.record.phases import FLYTHROUGH, is_simulated
 from experiments.record.records import PARTICIPANT, PHASE_ENDED, Event
 from mjsim.values.motion_parameters import GROUPS
 

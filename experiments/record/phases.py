@@ -1,4 +1,6 @@
-"""The phases of a session: names, order, and which of them a trial has."""
+"""Phases of a session, where a recorded run comes from, and why it ended."""
+
+from collections.abc import Iterable
 
 from experiments.errors import ConfigError
 
@@ -21,3 +23,42 @@ def phases_of(text: str) -> tuple[str, ...]:
             "with the task last"
         )
     return names
+
+
+HUMAN = "human"  # name of the participant that nothing simulates
+REHEARSAL = (
+    "rehearsal"  # name of the simulated participant of `mjsim study rehearse`, who answers questions too
+)
+REHEARSED = "Rehearsed, with answers drawn at random"
+SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
+
+
+def is_simulated(user: object) -> bool:
+    """Whether a participant of this name is simulated."""
+    return user != HUMAN
+
+
+def origin_of(users: Iterable[object]) -> str:
+    """What trials by participants of these names are: `Simulated`, `Recorded from people`, and so on."""
+    users = set(users)
+    if users == {REHEARSAL}:
+        return REHEARSED
+    kinds = {is_simulated(user) for user in users}
+    return PARTLY_SIMULATED if len(kinds) > 1 else RECORDED if kinds == {False} else SIMULATED
+
+
+ALL_DELIVERED = "all delivered"
+TIME_LIMIT = "time limit"
+INTERRUPTED = "interrupted"
+PHYSICS_ERROR = "physics error"
+ERROR = "error"  # anything else, such as an error in a user-supplied participant
+
+COMPLETE = (ALL_DELIVERED, TIME_LIMIT)  # nothing disturbed the session
+BROKEN_OFF = (
+    INTERRUPTED,
+    ERROR,
+)  # between two control steps, or in one: the last one recorded may not be complete
+
+
+class LeaveSession(BaseException):  # not an Exception, as nothing failed
+    """Raised by a participant or a viewer to leave a session early; not a failure."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, write_checksums
+from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # of what is in the way

@@ -11,10 +11,9 @@ import numpy as np
 
 from experiments.errors import RecordError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import TRAJECTORY_COLUMNS, action_hashes
 from experiments.record.event_check import check_event
-from experiments.record.files import read_json
+from experiments.record.files import CHECKSUMS, read_checksums, read_json, sha256_of
 from experiments.record.metrics import CIRCUMSTANCES, measure
 from experiments.record.reader import Record, read_log
 from mjsim.world.state import checkpoint_hash

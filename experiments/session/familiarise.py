@@ -1,16 +1,17 @@
-"""The knowledge of a simulated participant from the phases before the task."""
+"""What a simulated participant learns before the task: the story and the fly-through (PAPER sections 4 and 7)."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.record.phases import FLYTHROUGH, STORY, TRAINING
 from experiments.record.records import PHASE_BEGUN, PHASE_ENDED, Event, EventLog
 from experiments.session.camera_path import bins_seen, camera_path
-from experiments.session.story import reading_time, story_text
 from mjsim.house.sight.sight import FieldOfView
+from mjsim.support.files import read_text
 from mjsim.values.person_parameters import PersonParameters
 
 
@@ -61,3 +62,26 @@ def _phases(
         yield {"phase": STORY, "duration_s": round(reading_time(text), 6)}
     if FLYTHROUGH in phases:
         yield watch_flythrough(house, person)
+
+
+STORY_FILE = Path(__file__).with_name("story.md")
+READING_SPEED = 238.0  # words a minute (Brysbaert, Journal of Memory and Language 109, 2019)
+
+
+def story_text(path: Path | None = None) -> str:
+    """The story of a UTF-8 file, or of this package: plain text with blank lines between paragraphs."""
+    file = path or STORY_FILE
+    try:
+        text = read_text(file).strip()
+    except OSError as error:
+        raise ConfigError(f"cannot read the story {file}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"the story {file} is not UTF-8: {error}") from error
+    if not text:
+        raise ConfigError(f"the story {file} is empty; write at least one sentence")
+    return text
+
+
+def reading_time(text: str) -> float:
+    """How long an adult takes to read a text silently, s."""
+    return 60.0 * len(text.split()) / READING_SPEED

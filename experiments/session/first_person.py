@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from experiments.house import House
-from experiments.session.film_config import FilmConfig
-from experiments.session.video import VideoWriter
+from experiments.session.video import FilmConfig, VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView

@@ -4,10 +4,10 @@ from typing import Any
 
 from experiments.errors import RecordError, SessionError, UserCodeError, describe
 from experiments.participants.base import Participant
+from experiments.record.phases import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.record.reader import Record
 from experiments.record.writer import RecordWriter
 from experiments.session.assistant import Assistant
-from experiments.session.endings import ALL_DELIVERED, ERROR, INTERRUPTED, PHYSICS_ERROR, TIME_LIMIT
 from experiments.session.perception import SessionPercept
 from experiments.session.recorded_events import EXTERNAL_EVENTS, catch_up
 from experiments.session.signals import signal_of

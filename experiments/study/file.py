@@ -1,7 +1,8 @@
-"""The file of a study with people: a design (docs/designs.md) with a table `[study]`."""
+"""The file of a study with people: a design (docs/designs.md) with a table `[study]`. Errors name its lines."""
 
 import hashlib
 import itertools
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,10 +14,8 @@ from urllib.parse import urlsplit
 import msgspec
 
 from experiments.errors import ConfigError
-from experiments.record.origin import HUMAN
-from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
-from experiments.session.story import story_text
-from experiments.study.file_lines import at_line
+from experiments.record.phases import FLYTHROUGH, HUMAN, STORY, TASK, TRAINING
+from experiments.session.familiarise import story_text
 from experiments.trials.design import read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import SEEDS, TrialConfig
@@ -214,3 +213,33 @@ def _values(settings: Settings) -> Mapping[str, str]:
         "minutes": str(settings.minutes),
         **paid,
     }
+
+
+_PATH = re.compile(r"`\$\.?([\w.\[\]-]*)`")
+_HEADER = re.compile(r"\s*\[\[?\s*([\w.\"-]+)\s*\]\]?")
+_KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
+
+
+def at_line(path: Path, text: str, message: str) -> str:
+    """A message of msgspec about a value, with file and line where they can be told."""
+    found = _PATH.search(message)
+    wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
+    if unknown := re.search(r"unknown field `([^`]+)`", message):
+        wanted = f"{wanted}.{unknown[1]}".strip(".")
+    line = line_of(text, wanted)
+    return f"{path}, line {line}: {message}" if line else f"{path}: {message}"
+
+
+def line_of(text: str, wanted: str) -> int | None:
+    """The line of a key such as `study.pay.reward`, or of the innermost table around it that the file names."""
+    table, best, depth = "", None, 0
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = name = header[1].replace('"', "")
+        elif key := _KEY.match(line):
+            name = f"{table}.{key[1]}".strip(".").replace('"', "")
+        else:
+            continue
+        if f"{wanted}.".startswith(f"{name}.") and name.count(".") + 1 > depth:
+            best, depth = number, name.count(".") + 1
+    return best

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from experiments.record.origin import REHEARSAL
+from experiments.record.phases import REHEARSAL
 from experiments.study.file import Study
 from experiments.study.recruitment import recruiter
 from experiments.trials.training import trials_of

@@ -20,13 +20,12 @@ from typing import Any
 from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.archive import discard
-from experiments.record.checksums import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.columns import HEALTH
-from experiments.record.files import read_arrays, read_json
+from experiments.record.files import CHECKSUMS, read_arrays, read_checksums, read_json, sha256_of
 from experiments.record.metrics import CIRCUMSTANCES, measure
+from experiments.record.phases import COMPLETE
 from experiments.record.records import read_events
 from experiments.record.run_directory import PACKED, TRIALS, free_name
-from experiments.session.endings import COMPLETE
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.fingerprint import Inputs
 from experiments.trials.table import write_tables

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from experiments.errors import RecordError
-from experiments.session.endings import ALL_DELIVERED
+from experiments.record.phases import ALL_DELIVERED
 
 Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]

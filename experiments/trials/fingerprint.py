@@ -15,7 +15,7 @@ from pathlib import Path
 
 from experiments.participants import participant_names
 from experiments.record.phases import STORY
-from experiments.session.story import story_text
+from experiments.session.familiarise import story_text
 from experiments.trials.trial_config import PATHS, TrialConfig
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest

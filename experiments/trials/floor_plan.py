@@ -47,7 +47,7 @@ def draw_topdown(
         episode: What lay where at the start.
         plan: The first `plan` event of the log.
         walked: Positions of the person, m, shape (T, 2).
-        origin: Whether the participant is simulated (`experiments.record.origin`).
+        origin: Whether the participant is simulated (`experiments.record.phases`).
     """
     planned = planned_path(house, episode, plan)
     lines = {

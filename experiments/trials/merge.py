@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.errors import RecordError
 from experiments.record.archive import adopt, copy, opened_run, run_paths
-from experiments.record.checksums import read_checksums
+from experiments.record.files import read_checksums
 from experiments.record.run_directory import TRIALS, check_batch_folder, is_batch, is_run, link_or_copy
 from experiments.trials.batch_folder import CHECKED, StoredTrial, put_aside, trial_key, write_rows
 from experiments.trials.design import Design

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import ConfigError
-from experiments.record.origin import HUMAN, is_simulated
+from experiments.record.phases import HUMAN, is_simulated
 from experiments.trials.design import Design, read_design
 from experiments.trials.designs import FOLDER
 from experiments.trials.trial_config import TrialConfig

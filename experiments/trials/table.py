@@ -10,7 +10,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from experiments.errors import RecordError
-from experiments.record.origin import is_simulated
+from experiments.record.phases import is_simulated
 from experiments.trials.trial_config import SEEDS
 from mjsim.support.files import check_input, replacing
 

@@ -13,15 +13,13 @@ from experiments.errors import UserCodeError, describe
 from experiments.house import House
 from experiments.record import records
 from experiments.record.export import NOTHING_FILMED, save_record
-from experiments.record.origin import RECORDED, origin_of
-from experiments.record.phases import TRAINING
+from experiments.record.phases import INTERRUPTED, RECORDED, TRAINING, origin_of
 from experiments.record.reader import Record
 from experiments.record.records import EventLog
 from experiments.record.run_directory import add_files, run_directory
-from experiments.session.endings import INTERRUPTED
 from experiments.session.familiarise import Familiarisation, familiarise
-from experiments.session.film_config import FilmConfig
 from experiments.session.signals import Stopped, signals_postponed
+from experiments.session.video import FilmConfig
 from experiments.session.viewer import OnProgress, Progress
 from experiments.trials.floor_plan import draw_topdown
 from experiments.trials.setup import (

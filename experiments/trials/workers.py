@@ -55,7 +55,7 @@ def worker_pool(count: int | None = None) -> Iterator[_Pool]:
 
 def _begin(end_of_work: Connection, voice: Semaphore) -> None:
     """Begin to work: one of the workers says it if kernels are compiled, all end with their parent."""
-    from experiments.trials.compile_notice import announce_compiling  # numba takes a while to load
+    from experiments.trials.warmup import announce_compiling  # numba takes a while to load
 
     announce_compiling(lambda: voice.acquire(block=False))
     _end_with(end_of_work)

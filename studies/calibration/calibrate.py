@@ -10,7 +10,7 @@ import numpy as np
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import RecordError, StatisticsError
 from experiments.participants.distribution import Distributions
-from experiments.record.origin import origin_of
+from experiments.record.phases import origin_of
 from experiments.trials.exclusions import LeftOut
 from mjsim.support.files import read_text
 from studies.calibration.inference import OBJECTS, Cells, Fit, Rows, fit

@@ -29,7 +29,7 @@ from rich.console import Console
 from experiments.analysis.comparison_plot import mark_origin
 from experiments.record import records
 from experiments.record.files import read_arrays
-from experiments.record.origin import origin_of
+from experiments.record.phases import origin_of
 from experiments.record.records import Event, read_events
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import BatchProgress, run_batch

@@ -25,8 +25,8 @@ from experiments.analysis.study.measures import FILE as MEASURES
 from experiments.cli.main import main
 from experiments.participants.distribution import Distributions
 from experiments.participants.guest import PARAMETERS
+from experiments.session.familiarise import STORY_FILE
 from experiments.session.own_planner import planner_named
-from experiments.session.story import STORY_FILE
 from experiments.trials.person import PARAMETERS as PERSON
 from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial

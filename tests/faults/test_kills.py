@@ -14,7 +14,7 @@ import pytest
 
 from experiments.cli.main import main
 from experiments.record import records, run_directory
-from experiments.record.checksums import CHECKSUMS
+from experiments.record.files import CHECKSUMS
 from experiments.trials import trial
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial

@@ -12,8 +12,14 @@ from hypothesis import strategies as st
 
 from experiments.errors import ExperimentError
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS, write_checksums
-from experiments.record.files import read_arrays, read_json, save_arrays, write_json
+from experiments.record.files import (
+    CHECKSUMS,
+    read_arrays,
+    read_json,
+    save_arrays,
+    write_checksums,
+    write_json,
+)
 from experiments.record.metrics import CIRCUMSTANCES
 from experiments.record.reader import read_run
 from experiments.record.verify import checksum_mismatches, derived_mismatches

@@ -112,7 +112,7 @@ def prepare(folder: Path) -> None:
 
 async def _played(folder: Path) -> None:
     """A study in which one person has played, and its backup."""
-    from experiments.record.checksums import sha256_of
+    from experiments.record.files import sha256_of
     from experiments.visit.store import Store
 
     served = folder / "served"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from sessions import opened
 
-from experiments.session.story import story_text
+from experiments.session.familiarise import story_text
 from mjsim.house.scene import sampling
 from mjsim.values.observation import ObjectStatus
 

@@ -11,7 +11,7 @@ from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.participants.distribution import Distributions, distribution
 from experiments.participants.guest import PARAMETERS
-from experiments.record.origin import SIMULATED
+from experiments.record.phases import SIMULATED
 from experiments.trials.design import read_design
 from experiments.trials.simulate import read_study, study_path
 from experiments.trials.table import write_tables

@@ -10,8 +10,8 @@ from scipy import stats
 
 from experiments.analysis.page import Block, Paragraph, Picture, freedom, p_value, shown, table
 from experiments.analysis.report.figures import COLOURS, MAX_DOTS, framed, grid
-from experiments.analysis.statistics.diagnostics import residuals_of
 from experiments.analysis.statistics.effects import ALPHA, FTest
+from experiments.analysis.statistics.models import residuals_of
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"

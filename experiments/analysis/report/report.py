@@ -26,7 +26,7 @@ from experiments.analysis.study.analysis import (
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.robustness import Selection
 from experiments.errors import ExperimentError
-from experiments.record.origin import RECORDED, REHEARSED
+from experiments.record.phases import RECORDED, REHEARSED
 from mjsim.values.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"

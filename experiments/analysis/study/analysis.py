@@ -9,16 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.analysis.comparison import Interval, mean_interval
-from experiments.analysis.statistics.anova import EFFECTS, Values, brown_forsythe, one_way, two_way, welch
+from experiments.analysis.statistics.anova import (
+    EFFECTS,
+    Values,
+    brown_forsythe,
+    hc3,
+    one_way,
+    two_way,
+    welch,
+    welch_james,
+)
 from experiments.analysis.statistics.by_house import HouseDifference, differences_by_house
-from experiments.analysis.statistics.diagnostics import diagnose
 from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.statistics.mixed import MIN_LEVELS, MixedModel, WaldTest, mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
-from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, ordinal_model
+from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
 from experiments.analysis.statistics.power import POWER, detectable_eta_squared
-from experiments.analysis.statistics.unequal import hc3, welch_james
 from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError

@@ -20,10 +20,8 @@ from experiments.analysis.study.measures import (
 )
 from experiments.errors import RecordError
 from experiments.record.files import read_json
-from experiments.record.origin import RECORDED, REHEARSED, origin_of
-from experiments.record.phases import TASK
+from experiments.record.phases import ALL_DELIVERED, RECORDED, REHEARSED, TASK, origin_of
 from experiments.record.run_directory import VISIT, is_run, visit_folders
-from experiments.session.endings import ALL_DELIVERED
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.design import confounded_rows, counted
 from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_name

@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 async def _run(study: "Study", store: "Store", arguments: argparse.Namespace) -> int:
     from experiments.study.recruitment import payer
-    from experiments.study.rehearsal.passed import require_rehearsal
+    from experiments.study.rehearsal.report import require_rehearsal
 
     client = payer(study.settings) if arguments.send or arguments.reject else None
     try:

@@ -13,8 +13,7 @@ from typing import Any, TypeVar
 
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.errors import ConfigError, RecordError, ReplayError
-from experiments.record.origin import REHEARSAL
-from experiments.record.phases import TASK
+from experiments.record.phases import REHEARSAL, TASK
 from experiments.record.run_directory import is_run, visit_folders
 from experiments.study.data.copies import INDEX
 from experiments.study.file import Study

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 
 from experiments.errors import StoreError
-from experiments.record.phases import TASK
-from experiments.session.endings import ALL_DELIVERED
+from experiments.record.phases import ALL_DELIVERED, TASK
 from experiments.study.data.collect import person_name
 from experiments.study.file import Pay, Study
 from experiments.visit.plan import PLAYED

@@ -10,10 +10,9 @@ import msgspec
 
 from experiments.analysis.statistics.power import POWER, detectable_eta_squared
 from experiments.house import House
-from experiments.record.origin import HUMAN
-from experiments.record.phases import FLYTHROUGH, TASK, TRAINING
+from experiments.record.phases import FLYTHROUGH, HUMAN, TASK, TRAINING
 from experiments.session.camera_path import camera_path
-from experiments.session.story import READING_SPEED
+from experiments.session.familiarise import READING_SPEED
 from experiments.study.file import Cell, Study
 from experiments.trials.design import read_design
 from experiments.trials.training import training_config

@@ -19,8 +19,7 @@ from experiments.study.plan import plan_of
 from experiments.study.rehearsal.reading import words_of
 from experiments.study.rehearsal.server import serving
 from experiments.visit.folders import VISITS, VisitFolders
-from experiments.visit.phases.base import Phase
-from experiments.visit.phases.comprehension import Comprehension
+from experiments.visit.phases.base import Comprehension, Phase
 from experiments.visit.phases.played import Played
 from experiments.visit.plan import COMPREHENSION, CONSENT, DEVICE
 from experiments.visit.procedure import Procedure

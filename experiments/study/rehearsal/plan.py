@@ -7,7 +7,7 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from experiments.record.origin import REHEARSAL
+from experiments.record.phases import REHEARSAL
 from experiments.study.file import Cell, Study
 from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
 

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
-from experiments.study.file import Study
-from experiments.study.file_lines import line_of
+from experiments.study.file import Study, line_of
 from experiments.study.recruitment import recruiter
 from experiments.visit.plan import COMPREHENSION, CONSENT
 from mjsim.support.files import read_text

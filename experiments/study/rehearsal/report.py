@@ -7,7 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from experiments.study.data.collect import collect, write_collected
+from experiments.errors import ConfigError
+from experiments.record.files import read_json
+from experiments.study.data.collect import check_people, collect, write_collected
 from experiments.study.data.copies import note_copy
 from experiments.study.data.export import export
 from experiments.study.file import Study
@@ -85,3 +87,41 @@ async def report(
     )
     write_text_atomically(out / REPORT, msgspec.json.format(msgspec.json.encode(made)).decode() + "\n")
     return made
+
+
+PASSED, WITHOUT = "rehearsal passed", "pays without a rehearsal"
+
+
+async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, without: bool) -> None:
+    """Check that a rehearsal of the study file has passed; the audit log remembers that, or that none was wanted.
+
+    Args:
+        store: Of real people.
+        study: The study.
+        folder: Of a rehearsal; None if its success is in the audit log already.
+        without: Whether people may be paid all the same.
+
+    Raises:
+        ConfigError: No rehearsal of this very file has passed.
+        RecordError: The people are those of a rehearsal.
+    """
+    check_people(study, await store.people())
+    log = await store.audit_log()
+    if any(row.action == PASSED and row.details.get("study") == study.sha256 for row in log):
+        return
+    if folder is not None:
+        found = read_json(folder / REPORT)
+        if found.get("settings", {}).get("study") != study.sha256:
+            raise ConfigError(
+                f"{folder / REPORT} is that of another study file; rehearse {study.path} as it is now"
+            )
+        if found.get("passed") is not True:
+            raise ConfigError(f"{folder / REPORT} lists what went wrong; correct it and rehearse again")
+        await store.audit("mjsim", PASSED, {"study": study.sha256, "people": found["settings"]["people"]})
+    elif without:
+        await store.audit("mjsim", WITHOUT, {"study": study.sha256})
+    else:
+        raise ConfigError(
+            f"no rehearsal of {study.path} has passed: run `mjsim study rehearse` and name its folder by --rehearsal, "
+            "or pay all the same by --without-rehearsal"
+        )

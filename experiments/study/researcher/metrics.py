@@ -11,7 +11,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Proc
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from experiments.visit.store import Counts
-from experiments.web.server.meter import Meter
+from experiments.web.server.player import Meter
 from experiments.web.server.sessions import Sessions
 
 LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # s

@@ -6,10 +6,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from experiments.record.columns import TRAJECTORY_COLUMNS
+from experiments.record.phases import BROKEN_OFF, COMPLETE, PHYSICS_ERROR
 from experiments.record.reader import Record
 from experiments.record.records import EVENTS, RECORDING, TRAJECTORY, Event
 from experiments.record.verify import Mismatch
-from experiments.session.endings import BROKEN_OFF, COMPLETE, PHYSICS_ERROR
 from experiments.session.recorded_events import WORLD_EVENTS
 from experiments.trials.replay.replayer import Replayer
 

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from experiments.errors import RecordError
-from experiments.record.origin import is_simulated
-from experiments.record.phases import FLYTHROUGH, TASK, TRAINING, phases_of
+from experiments.record.phases import FLYTHROUGH, TASK, TRAINING, is_simulated, phases_of
 from experiments.record.records import EVENTS, PHASE_ENDED, Event, read_events
 from experiments.record.records import TRAINING as TRAINING_FOLDER
 from experiments.record.verify import Mismatch

@@ -7,12 +7,12 @@ from typing import Any, Never
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
 from experiments.participants.base import Percept
+from experiments.record.phases import COMPLETE, PHYSICS_ERROR
 from experiments.record.reader import Record
 from experiments.record.records import RECORDING, Event, EventLog
 from experiments.record.verify import Mismatch
 from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant
-from experiments.session.endings import COMPLETE, PHYSICS_ERROR
 from experiments.session.session import Session
 from experiments.session.task_board import TaskBoard
 from experiments.session.viewer import Viewer

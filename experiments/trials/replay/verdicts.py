@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.record import records
-from experiments.record.checksums import CHECKSUMS
+from experiments.record.files import CHECKSUMS
 from experiments.record.reader import Record
 from experiments.record.verify import Mismatch
 

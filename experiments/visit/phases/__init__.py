@@ -6,12 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.visit import plan as names
-from experiments.visit.phases.base import FormPhase, Phase, Result, Story
-from experiments.visit.phases.comprehension import Comprehension
-from experiments.visit.phases.consent import Consent
+from experiments.visit.phases.base import Comprehension, Consent, FormPhase, Phase, Result, Story, Survey
 from experiments.visit.phases.device import DeviceCheck
 from experiments.visit.phases.played import Played
-from experiments.visit.phases.survey import Survey
 from experiments.visit.plan import VisitPlan
 
 KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {

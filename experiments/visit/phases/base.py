@@ -1,5 +1,6 @@
-"""What all phases share: the interface, and phases that are a text with a form."""
+"""Phases of a visit: the interface, and phases that are a text with a form."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, runtime_checkable
@@ -155,3 +156,52 @@ class Result(FormPhase):
             "again": bool(self._plan.recruiter.parameters),
             "decimal": self._plan.texts["hud"]["decimal"],
         }
+
+
+class Consent(FormPhase):
+    """A statement to agree with, or not."""
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """Whether the person agrees; items of a study's own texts have to be answered besides."""
+        if sent.get("agree") == "no":
+            return Done({"agreed": False}, "no_consent")
+        if sent.get("agree") != "yes":
+            return Again(self._plan.texts["common"]["required"])
+        read = super().read(visitor, sent)
+        return Done({"agreed": True, **read.answers}) if isinstance(read, Done) else read
+
+    def example(self) -> dict[str, str]:
+        return {"agree": "yes", **super().example()}
+
+
+class Comprehension(FormPhase):
+    """Questions about the story, which can be read again on the same page."""
+
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+        return {"story": self._plan.story_paragraphs}
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """The answers, if all are right; after the last attempt the person is screened out."""
+        read = super().read(visitor, sent)
+        if isinstance(read, Again):
+            return read
+        wrong = any(item.is_wrong(read.answers.get(item.name)) for item in self.items)
+        answers = dict(read.answers)
+        if not wrong:
+            return Done(answers)
+        if visitor.attempts + 1 >= self._plan.limits.attempts:
+            return Done(answers, "screened_out")
+        return Again(self.texts["wrong"], {"form": self._form(None, read.answers)})
+
+
+class Survey(FormPhase):
+    """Items; those with a right answer show whether they were read."""
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
+        """The answers; whoever gives too many wrong ones is screened out where the study file says so."""
+        read = super().read(visitor, sent)
+        allowed = self._plan.limits.inattentive
+        if isinstance(read, Again) or allowed is None:
+            return read
+        wrong = sum(item.is_wrong(read.answers.get(item.name)) for item in self.items)
+        return dataclasses.replace(read, outcome="screened_out") if wrong > allowed else read

@@ -13,8 +13,7 @@ from experiments.visit.recruiter import Arrival, Preview, Refusal
 from experiments.visit.server.pages import VisitPages
 from experiments.visit.store import Person
 from experiments.visit.tokens import Keys, new_token, token_hash
-from experiments.web.server.form import sent_form
-from experiments.web.server.guards import Rate
+from experiments.web.server.guards import Rate, sent_form
 
 LOG = logging.getLogger("mjsim.study")
 NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s

@@ -21,18 +21,16 @@ from experiments.visit.phases.played import Played
 from experiments.visit.plan import RESULT
 from experiments.visit.procedure import Now, Procedure
 from experiments.visit.server.admission import Arrivals
-from experiments.visit.server.host import HostOfVisits
+from experiments.visit.server.background import HostOfVisits, end_absent
 from experiments.visit.server.pages import VisitPages
-from experiments.visit.server.timeouts import end_absent
 from experiments.visit.server.trials import Trials
 from experiments.visit.store import Assignment, Person
 from experiments.visit.tokens import TOKEN, Keys, token_hash
-from experiments.web.server.form import sent_form
-from experiments.web.server.guards import Guards, Network, allowed_hosts
-from experiments.web.server.meter import Meter
+from experiments.web.client_files import static_routes
+from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
+from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.scene_files import scene_route
-from experiments.web.server.static_files import static_routes
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")

@@ -21,8 +21,8 @@ from experiments.visit.texts import words_of
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.capacity import Capacity, usable_cores
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.meter import Meter
 from experiments.web.server.pages import page, trial_texts
+from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Sessions
 

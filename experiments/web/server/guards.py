@@ -5,13 +5,14 @@ import socket
 import time
 from collections.abc import Mapping, Sequence
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from urllib.parse import urlsplit
+from urllib.parse import parse_qsl, urlsplit
 
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers, ImmutableMultiDict, MutableHeaders
+from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from experiments.web.server.static_files import static_caching
+from experiments.web.client_files import static_caching
 
 MAX_BODY = 4096  # bytes of a form
 HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
@@ -188,3 +189,15 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
         forms=" ".join(("'self'", *embedded_by)),
         frames=" ".join(embedded_by) or "'none'",
     )
+
+
+MAX_FIELDS = 500
+
+
+async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
+    """The fields of a form that was sent; none where that is no form, or has too many."""
+    text = (await request.body()).decode("utf-8", "replace")
+    try:
+        return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))
+    except ValueError:
+        return ImmutableMultiDict()

@@ -8,8 +8,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.templating import Jinja2Templates
 
-from experiments.web.modules import STATIC, modules_of
-from experiments.web.server.static_files import static_url
+from experiments.web.client_files import STATIC, modules_of, static_url
 from hud.texts import filled
 
 CLIENT = STATIC.parent

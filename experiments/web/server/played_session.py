@@ -34,8 +34,7 @@ from experiments.web.protocol import (
     WireMessage,
 )
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.meter import Meter
-from experiments.web.server.player import LiveTrial, Player
+from experiments.web.server.player import LiveTrial, Meter, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
 from experiments.web.server.spectators import Spectators
 from experiments.web.state import FAILED, LOADING, READY, RUNNING, Trigger

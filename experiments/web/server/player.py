@@ -49,3 +49,13 @@ class Player(Protocol):
     async def over(self, trial: LiveTrial) -> None:
         """Record that the run directory of a trial has been written, and move on to the next phase."""
         ...
+
+
+class Meter:
+    """Forgets what it is told; see subclasses."""
+
+    def acknowledged(self, seconds: float) -> None:
+        """The inputs of a message are safe, so long after they came."""
+
+    def worker_lost(self) -> None:
+        """The worker of a session has died."""

@@ -8,9 +8,8 @@ from typing import Any
 from experiments.web import protocol
 from experiments.web.server.capacity import Capacity
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.meter import Meter
 from experiments.web.server.played_session import PlayedSession
-from experiments.web.server.player import Player
+from experiments.web.server.player import Meter, Player
 from experiments.web.server.pool import WorkerPool
 
 WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone

@@ -11,8 +11,7 @@ from experiments.web.protocol import Frame, Pictures, View
 from experiments.web.state import RUNNING, Trigger
 from experiments.web.worker.clock import Send
 from experiments.web.worker.control import SessionControl
-from experiments.web.worker.encoders import Encoder, H264Encoder, JpegEncoder
-from experiments.web.worker.frame_size import SIZES, FrameSize, pause_after
+from experiments.web.worker.encoders import SIZES, Encoder, FrameSize, H264Encoder, JpegEncoder, pause_after
 from hud.state import HudState, Marker
 from mjsim.house.scene.scene import Scene
 from mjsim.render import FAST, Renderer

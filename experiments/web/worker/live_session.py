@@ -14,11 +14,11 @@ from experiments.house import House
 from experiments.participants.base import Percept
 from experiments.record.export import save_record
 from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries, sync_folder
+from experiments.record.phases import INTERRUPTED
 from experiments.record.reader import read_journal, read_run, same_record
 from experiments.record.records import TOPDOWN, EventLog
 from experiments.record.run_directory import JOURNALS, is_run, run_directory
 from experiments.record.verify import checksum_mismatches
-from experiments.session.endings import INTERRUPTED
 from experiments.session.familiarise import Familiarisation
 from experiments.session.viewer import Viewer
 from experiments.trials.replay.log_source import LogSource

@@ -12,8 +12,8 @@ import msgspec
 
 from experiments.errors import describe
 from experiments.house import House
+from experiments.record.phases import INTERRUPTED
 from experiments.record.run_directory import is_run
-from experiments.session.endings import INTERRUPTED
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.protocol import (

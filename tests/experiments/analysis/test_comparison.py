@@ -12,7 +12,7 @@ from experiments.analysis.comparison_plot import CAPTION
 from experiments.cli.compare import METRICS
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
-from experiments.record.origin import SIMULATED
+from experiments.record.phases import SIMULATED
 from experiments.trials.table import write_tables
 from experiments.trials.trial_config import TrialConfig
 

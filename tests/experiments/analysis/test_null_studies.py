@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from study_people import SIZES, made_up_people, table_of
 
-from experiments.analysis.statistics.anova import brown_forsythe, one_way, two_way, welch
-from experiments.analysis.statistics.diagnostics import diagnose
+from experiments.analysis.statistics.anova import brown_forsythe, hc3, one_way, two_way, welch, welch_james
 from experiments.analysis.statistics.mixed import mixed_model
-from experiments.analysis.statistics.models import ordinal_model
+from experiments.analysis.statistics.models import diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
-from experiments.analysis.statistics.unequal import hc3, welch_james
 from studies.score_rules import _below, _trend
 
 STUDIES = 5000

@@ -10,14 +10,20 @@ import pytest
 from study_people import table_of
 
 from experiments.analysis.comparison import mean_interval
-from experiments.analysis.statistics.anova import EFFECTS, brown_forsythe, one_way, two_way, welch
-from experiments.analysis.statistics.diagnostics import diagnose
+from experiments.analysis.statistics.anova import (
+    EFFECTS,
+    brown_forsythe,
+    hc3,
+    one_way,
+    two_way,
+    welch,
+    welch_james,
+)
 from experiments.analysis.statistics.mixed import mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
-from experiments.analysis.statistics.models import ordinal_model
+from experiments.analysis.statistics.models import diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
 from experiments.analysis.statistics.power import detectable_eta_squared
-from experiments.analysis.statistics.unequal import hc3, welch_james
 from studies.score_rules import _below, _trend
 
 BY_R = Path(__file__).parent / "by_r"

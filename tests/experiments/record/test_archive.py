@@ -27,7 +27,7 @@ from experiments.record.archive import (
     run_paths,
     unpack,
 )
-from experiments.record.checksums import write_checksums
+from experiments.record.files import write_checksums
 from experiments.record.run_directory import TRIALS, is_batch
 
 KILLS = int(os.environ.get("MJSIM_FAULTS", "15"))

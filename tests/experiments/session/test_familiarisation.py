@@ -18,9 +18,9 @@ from experiments.record.metrics import measure
 from experiments.record.phases import PHASES
 from experiments.record.records import read_events
 from experiments.session.camera_path import SPEED, STEP, bins_seen, camera_path
+from experiments.session.familiarise import reading_time, story_text
 from experiments.session.film import write_flythrough
-from experiments.session.film_config import FilmConfig
-from experiments.session.story import reading_time, story_text
+from experiments.session.video import FilmConfig
 from experiments.trials.design import read_design
 from experiments.trials.replay.replay import replay
 from experiments.trials.setup import simulated_user

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
 from experiments.record import records
-from experiments.record.checksums import write_checksums
+from experiments.record.files import write_checksums
 from experiments.trials import trial_reader
 from experiments.trials.batch import run_batch
 from experiments.trials.batch_folder import read_trial

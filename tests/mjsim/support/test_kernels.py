@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.trials.compile_notice import NOT_KEPT, NOTICE
+from experiments.trials.warmup import NOT_KEPT, NOTICE
 from mjsim.support import files, kernels
 
 CALLEE = "from mjsim.support.kernels import kernel\n\n\n@kernel\ndef factor():\n    return {factor}\n"
@@ -92,7 +92,7 @@ def test_compiling_is_announced_once(tmp_path, kept):
     """No user may take a first command for one that hangs, or an unwritable cache for a cost that is paid once."""
     source, cache = tmp_path / "script.py", tmp_path / "cache" if kept else Path("/proc/self/nowhere")
     source.write_text(
-        "from experiments.trials.compile_notice import announce_compiling\n"
+        "from experiments.trials.warmup import announce_compiling\n"
         "from mjsim.support.kernels import kernel\n\n\n"
         "@kernel\ndef after(x):\n    return x + 1\n\n\n"
         "announce_compiling()\nprint(after(1), after(1.5))\n"

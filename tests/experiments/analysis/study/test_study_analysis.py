@@ -20,7 +20,7 @@ from experiments.analysis.study.measures import read_measures
 from experiments.cli import compare, run
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
-from experiments.record.origin import RECORDED, SIMULATED
+from experiments.record.phases import RECORDED, SIMULATED
 from experiments.trials.table import read_rows, write_tables
 from experiments.web.server.pages import CLIENT
 

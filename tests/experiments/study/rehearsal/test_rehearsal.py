@@ -14,7 +14,7 @@ import pytest
 from check_rehearsal import check
 
 from experiments.cli.main import main
-from experiments.record.origin import REHEARSED
+from experiments.record.phases import REHEARSED
 from experiments.study.rehearsal.plan import plan_people
 from experiments.visit.plan import PHASES
 

@@ -20,7 +20,7 @@ from experiments.study.data.collect import collect, write_collected
 from experiments.visit.server.admission import NEW_PEOPLE
 from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
-from experiments.web.server.static_files import static_url
+from experiments.web.client_files import static_url
 
 PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
 EVERYBODY = {"nobody", "participant", "other participant", *ROLES}

@@ -4,7 +4,7 @@ import pytest
 
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from experiments.web.modules import STATIC
+from experiments.web.client_files import STATIC
 from experiments.web.viewing.page import view_page
 
 HARMLESS = ("KHR_parallel_shader_compile", "GL Driver Message")  # said where there is no graphics card

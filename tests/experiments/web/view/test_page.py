@@ -11,7 +11,7 @@ import pytest
 from experiments.cli.main import main
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from experiments.web.modules import STATIC
+from experiments.web.client_files import STATIC
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """The size of frames follows the machine, the link and the view, and does not go to and fro."""
 
-from experiments.web.worker.frame_size import (
+from experiments.web.worker.encoders import (
     FIRST_SIZE,
     FRAMES,
     HELD_UP,

@@ -10,8 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from experiments.record.checksums import CHECKSUMS, write_checksums
-from experiments.record.files import read_arrays, read_json, save_arrays
+from experiments.record.files import CHECKSUMS, read_arrays, read_json, save_arrays, write_checksums
 from experiments.record.journal import read_entries
 from experiments.record.reader import read_journal
 from experiments.record.records import EVENTS, FILES, METRICS, TOPDOWN, TRAJECTORY

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from experiments.web.controls import Input
 from experiments.web.state import Trigger
+from experiments.web.worker.clock import PATIENCE, WINDOW, Schedule
 from experiments.web.worker.control import SessionControl
-from experiments.web.worker.schedule import PATIENCE, WINDOW, Schedule
 
 PERIOD = 0.04  # s
 ROUNDING = 1e-6  # s

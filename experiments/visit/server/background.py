@@ -1,13 +1,15 @@
-"""One of several hosts: it runs the visits that are its own, as long as the database knows that it is there."""
+"""Background of a server of visits: time-outs of absent participants, and one host among several."""
 
 import asyncio
+import datetime
 import logging
 import time
 
 from experiments.errors import StoreError
 from experiments.visit.folders import VisitFolders
 from experiments.visit.plan import PLAYED
-from experiments.visit.store import Person, Store
+from experiments.visit.procedure import Procedure
+from experiments.visit.store import Person, Store, utc_now
 from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
@@ -56,3 +58,28 @@ class HostOfVisits:
     async def leave(self) -> None:
         """Note that nothing runs here any more."""
         await self._store.greet(self._name, leaves=True)
+
+
+LOG = logging.getLogger("mjsim.study")
+SWEEP_PERIOD = 60.0  # s between two looks for people who never return
+CLOCK_SET = 30.0  # s by which the clock is off once it was set, or the machine slept
+
+
+async def end_absent(procedure: Procedure) -> None:
+    """Time out participants who do not return. Time in which this server did not run does not count."""
+    away = procedure.plan.limits.timed_out_after
+    since = time.monotonic()
+    ahead = time.time() - since
+    while True:
+        await asyncio.sleep(SWEEP_PERIOD)
+        now = time.monotonic()
+        if abs(time.time() - now - ahead) > CLOCK_SET:  # signs of life are noted by that clock
+            since, ahead = now, time.time() - now
+        if now - since < away:
+            continue
+        try:
+            gone = await procedure.store.time_out(utc_now() - datetime.timedelta(seconds=away))
+            if gone:
+                LOG.info("%d participants did not return", gone)
+        except StoreError as error:  # the next sweep may find them
+            LOG.warning("%s", error)

@@ -1,14 +1,42 @@
-"""Files of the client, at addresses that change with them: a browser that has them never asks again."""
+"""Files of the client: modules with their imports, and the addresses under which they are served."""
 
 import functools
 import hashlib
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
-from experiments.web.modules import STATIC
+STATIC = Path(__file__).parent / "client" / "static"
+_IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
+
+
+def modules_of(entry: str) -> Mapping[str, str]:
+    """Sources of the module `entry` and of all that it imports, by their paths; imports name those paths."""
+    found: dict[str, str] = {}
+    waiting = [entry]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            needs: list[str] = []
+            found[path] = _IMPORT.sub(_named_from(path, needs), (STATIC / path).read_text("utf-8"))
+            waiting += needs
+    return found
+
+
+def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
+    """Replaces relative imports of the module at `path` by paths, and appends these to `needs`."""
+
+    def named(match: re.Match[str]) -> str:
+        target = ((STATIC / path).parent / match[2]).resolve()
+        needs.append(target.relative_to(STATIC.resolve()).as_posix())
+        return f'{match[1]}"{needs[-1]}"'
+
+    return named
+
 
 IMMUTABLE = "public, max-age=31536000, immutable"
 CHECKED = "no-cache"  # used again while their ETag is the same
