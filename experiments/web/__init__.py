@@ -1,4 +1,4 @@
-"""A person at the keyboard: the server, its worker processes and the client that runs in the browser.
+"""A live trial in a browser: its server, worker processes and client, and pages that show recorded runs.
 
-It serves people who run `mjsim play`, alone or for the participants of a study.
+It serves visits, of `mjsim play` and of studies, without knowledge of them.
 """

@@ -1,4 +1,4 @@
-"""Import of mesh files: each becomes an object model that is sampled, carried and placed like those of the package.
+"""Import of objects from mesh files, of houses from scenes of other simulators, and of episodes.
 
 For users of `mjsim import` (docs/import.md); needs the extra `import`.
 """

@@ -1,4 +1,4 @@
-"""The server process of `mjsim play`: pages, visits, the queue and the sockets of browsers.
+"""The server of live trials: sockets of browsers, sessions, the queue for slots, and the pool of workers.
 
-It serves the browsers of participants and players; it simulates nothing and trusts no browser.
+It serves the visits of `mjsim play` and of studies; it simulates nothing and trusts no browser.
 """
