@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +16,7 @@ from experiments.study.rehearsal.link import Link, LostError, connected
 from experiments.study.rehearsal.plan import Planned, moment
 from experiments.study.rehearsal.player import Player
 from experiments.visit.phases.base import FormPhase, Phase
+from experiments.visit.plan import COMPREHENSION
 from experiments.visit.texts.items import Item
 
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
@@ -50,6 +51,13 @@ class Rehearsed:
     refused: int = 0
 
 
+Watch = Callable[[str, httpx.Response], Awaitable[None]]
+
+
+async def _ignore(name: str, page: httpx.Response) -> None:
+    pass
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """What all people of a rehearsal share: the server, the study's phases, house and platform, and how time runs."""
@@ -59,8 +67,10 @@ class Surroundings:
     phases: Mapping[str, Phase]
     house: House
     parameters: Mapping[str, str]  # of the platform's links; an empty value is an id of the person
-    minimum: Mapping[str, float]
+    minimum: Mapping[str, float]  # seconds, as the server has them
+    attempts: int  # at the comprehension check
     factor: float  # by which waiting is shorter
+    watch: Watch = _ignore  # receives the name of each page and the page
 
 
 class Person:
@@ -77,7 +87,7 @@ class Person:
         """Come to the study, perhaps twice; the link is known then."""
         number = self._planned.number
         ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
-        await self._get("/", ids)
+        await self._around.watch("welcome", await self._get("/", ids))
         for _ in range(2 if ids and self._planned.twice else 1):
             answer = await self._post("/begin", ids)
             if not (link := answer.headers.get("location", "")).startswith("/play/"):
@@ -101,6 +111,7 @@ class Person:
             if found is None:
                 return self._ended(page)
             name = found[1] or found[2]
+            await self._around.watch(name, page)
             tries, before = (tries + 1 if name == before else 0), name
             leaves = planned.leaves if planned.leaves_in == name else None
             phase = self._around.phases[name]
@@ -126,9 +137,8 @@ class Person:
             self._fault(f"the page says {page.status_code}")
             return "stuck"
         how = self._planned.leaves
-        return (
-            how if how in ("refuses", "fails") else "finished"
-        )  # a trial may be over before somebody leaves it
+        # A trial may be over before its participant leaves it.
+        return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
         """Read, answer, send; some send wrong answers first, or all of it twice."""
@@ -139,13 +149,21 @@ class Person:
             await self._get(f"{link}/film")
         if isinstance(phase, FormPhase) and phase.items:
             await self._post(f"{link}/answers", form)
-            wrong = wrong_form(phase, form)
-            if wrong is not None and (leaves == "fails" or (self._planned.wrong and not tries)):
-                await self._post(link, wrong)
-                return
+        minimum, careless = self._around.minimum.get(phase.name, 0.0), self._planned.wrong and not tries
+        if careless and minimum > 0.0 and (await self._post(link, form)).status_code == httpx.codes.SEE_OTHER:
+            self._fault(f"{phase.name} ends before its minimum time")
+        await asyncio.sleep(minimum)
+        careless &= phase.name != COMPREHENSION or self._around.attempts > 1
+        wrong = wrong_form(phase, form)
+        if wrong is not None and (leaves == "fails" or careless):
+            answer = await self._post(link, wrong)
+            if answer.status_code == httpx.codes.SEE_OTHER and leaves != "fails":
+                self._fault(f"{phase.name} takes a form that it should refuse")
+            return
         if leaves == "refuses":
             form = {"phase": phase.name, "agree": "no"}
-        await asyncio.sleep(self._around.minimum.get(phase.name, 0.0) / factor)
+        elif leaves == "gives up":
+            form = {**form, "latency_ms": "999999", "give_up": "yes"}
         sent = [self._post(link, form) for _ in range(2 if self._planned.twice else 1)]
         statuses = [answer.status_code for answer in await asyncio.gather(*sent)]
         if httpx.codes.SEE_OTHER in statuses:
@@ -156,7 +174,7 @@ class Person:
     async def _leave(self, how: str) -> str:
         if how != "vanishes":
             link = f"{self.rehearsed.link}/withdrawal"
-            await self._get(link)
+            await self._around.watch("withdrawal", await self._get(link))
             data = "delete" if how == "withdraws and deletes" else "keep"
             answer = await self._post(link, {"data": data})
             if answer.status_code != httpx.codes.SEE_OTHER:
@@ -246,12 +264,16 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
     return {"phase": phase.name, **example, **drawn}
 
 
-def wrong_form(phase: FormPhase, form: dict[str, Any]) -> dict[str, Any] | None:
-    """The form with another answer to a question that has a right one; None where there is none."""
-    for item in phase.items:
+def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
+    """Return a form that the phase has to refuse: a wrong answer to a question that has a right one, or an empty form.
+
+    None if the phase accepts any form.
+    """
+    example: dict[str, Any] = getattr(phase, "example", dict)()
+    for item in phase.items if isinstance(phase, FormPhase) else ():
         if item.right is not None and (others := [c for c in item.choices if c != item.right]):
             return {**form, item.name: others[0]}
-    return None
+    return {"phase": phase.name} if example else None
 
 
 def _drawn(item: Item, points: int, rng: np.random.Generator) -> Any:

@@ -10,8 +10,10 @@ import numpy as np
 from experiments.record.phases import REHEARSAL
 from experiments.study.file import Cell, Study
 from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
+from experiments.visit.recruiter import Recruiter
 
-Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails"]
+Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails", "gives up"]
+STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # names that platforms use
 RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of people
 HOW = (0.6, 0.2, 0.2)  # shares of those who leave: they vanish, withdraw, withdraw and have all deleted
 
@@ -93,6 +95,13 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 def moment(phase: str, rng: np.random.Generator) -> int:
     """After how many decisions something happens in a trial."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
+
+
+def link_parameters(study: Study, platform: Recruiter) -> dict[str, str]:
+    """Return the parameters of the platform's links; an empty value stands for an id of the participant."""
+    settings = study.settings.recruitment
+    own = {**dict.fromkeys(STUDY_IDS, settings.study_id), SUBMIT_TO: next(iter(settings.sites), "")}
+    return {name: own.get(name, "") for name in platform.parameters}
 
 
 def rehearsed(study: Study, factor: float) -> Study:

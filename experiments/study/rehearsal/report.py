@@ -16,17 +16,19 @@ from experiments.study.file import Study
 from experiments.study.payments.rules import decide, due
 from experiments.study.rehearsal.person import Rehearsed
 from experiments.study.rehearsal.run import SERVED, Settings
+from experiments.visit.recruiter import Leaving
 from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
-STATUS = {  # of people by what they did
+STATUS: dict[str, Leaving] = {  # of people by what they did
     "finished": "finished",
     "withdraws": "withdrawn",
     "withdraws and deletes": "withdrawn",
     "refuses": "no_consent",
     "fails": "screened_out",
+    "gives up": "screened_out",
 }
 
 

@@ -17,7 +17,7 @@ from experiments.study.file import Study
 from experiments.study.plan import plan_of
 from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal.person import Person, Rehearsed, Surroundings
-from experiments.study.rehearsal.plan import Planned, plan_people
+from experiments.study.rehearsal.plan import Planned, link_parameters, plan_people
 from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
@@ -132,15 +132,15 @@ async def _send(
     on_person: Callable[[Rehearsed], None],
 ) -> None:
     platform = recruiter(study.settings.recruitment)
-    own = {"STUDY_ID": study.settings.recruitment.study_id}
-    parameters = {name: own.get(name, "") for name in platform.parameters}
+    parameters = link_parameters(study, platform)
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
+    minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
     # Each request on a connection of its own: a pool looks at all that it keeps before each one.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(
-            base, client, phases, house, parameters, study.settings.minimum, settings.factor
+            base, client, phases, house, parameters, minimum, study.settings.limits.attempts, settings.factor
         )
         with (out / PEOPLE).open("ab", buffering=0) as kept:
 

@@ -2,10 +2,12 @@
 
 import asyncio
 import dataclasses
+import json
 
 import msgspec
 import pytest
-from scripted_workers import ScriptedPool
+from scripted_workers import LAST, ScriptedPool, hello
+from websockets.asyncio.client import connect
 
 from experiments.cli.main import main
 from experiments.study.file import read_people_study
@@ -13,11 +15,13 @@ from experiments.study.plan import plan_of
 from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal import dry_run as runs
 from experiments.study.rehearsal.costs import Played, cost, detectable, durations
+from experiments.study.rehearsal.person import Person
 from experiments.study.rehearsal.pictures import browser
 from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
 from experiments.visit.phases import phases_of
 from experiments.visit.phases.base import Done, FormPhase
 
+ENDS = {"type": "inputs", "inputs": [{"number": 1, "scroll": LAST}]}
 STUDY = """\
 [all_cells]
 user = "guest"
@@ -129,7 +133,7 @@ def _walked(study, folder, monkeypatch, phases=None):
 
 
 def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    monkeypatch.setattr(Person, "_play", _play_nothing)
     walked, pictures = _walked(study, tmp_path, monkeypatch)
     (unplayed,) = walked.faults
     assert "the run that was recorded cannot be used" in unplayed
@@ -140,13 +144,18 @@ def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
     assert walked.words["consent"] > 100 and walked.words["survey"] > 200
 
 
-async def _play_nothing(self, link, trial):
-    """The trial is over; what is tested here is what is around it."""
-    person = await self._person(link)
-    run = self._procedure.folders.find(person.token_hash).run(trial)
-    run.mkdir()
-    (run / "metrics.json").write_text('{"ended": "time limit"}')
-    await self._procedure.record_trials(person)
+async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays
+    """The trial is over at once; what is tested here is what is around it."""
+    address = self._around.base.replace("http", "ws", 1) + self.rehearsed.link
+    async with connect(address, origin=self._around.base) as socket:
+        for message in (hello(trial), {"type": "run"}, ENDS):
+            await socket.send(json.dumps(message))
+            if message["type"] == "hello":
+                while json.loads(await socket.recv()).get("phase") != "ready":
+                    pass
+        while json.loads(await socket.recv())["type"] != "saved":
+            pass
+    return True
 
 
 @pytest.mark.parametrize(
@@ -159,7 +168,7 @@ async def _play_nothing(self, link, trial):
     ],
 )
 def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
-    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    monkeypatch.setattr(Person, "_play", _play_nothing)
     phases = 'phases = ["consent", "task", "debriefing", "completion"]'
     changed = with_text(
         tmp_path,
@@ -171,7 +180,7 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
 
 
 def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(runs._DryRun, "_play", _play_nothing)
+    monkeypatch.setattr(Person, "_play", _play_nothing)
     phases = [
         _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
     ]
