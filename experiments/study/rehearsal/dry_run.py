@@ -72,6 +72,7 @@ async def dry_run(
             study.settings.minimum,
             study.settings.limits.attempts,
             FACTOR,
+            hasty=True,
         )
         walk = _Walk(procedure, around, photograph)
         for planned in _ways(procedure):

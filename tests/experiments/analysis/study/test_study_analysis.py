@@ -20,6 +20,7 @@ from experiments.analysis.study.measures import read_measures
 from experiments.cli import compare, run
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError, StatisticsError
+from experiments.house import read_words
 from experiments.record.phases import RECORDED, SIMULATED
 from experiments.trials.table import read_rows, write_tables
 from experiments.web.server.pages import CLIENT
@@ -64,10 +65,11 @@ def test_a_measure_has_one_column_wherever_it_is_named():
     for name in ("normalized deviations", "inverse path length"):
         assert told[name] == (columns[name], f"{name} ({columns[name]})")
         assert columns[name] in compare.METRICS
-    assert (
-        f'<dt>Inverse path length</dt><dd>{{{{ "%.2f" | format(metrics.{columns["inverse path length"]})'
-        in page
+    column = columns["inverse path length"]
+    assert re.search(
+        rf'section\["path_length"\] }}}}</dt><dd>{{{{ \("%.2f" \| format\(metrics.{column}\)\)', page
     )
+    assert read_words()["result"]["path_length"] == "Inverse path length"
 
 
 class Elements(HTMLParser):
