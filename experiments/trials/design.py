@@ -136,7 +136,7 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
     cells: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1)]
     all_cells: dict[str, Any] = msgspec.field(default_factory=dict)
     exclusions: Exclusions | None = None
-    study: dict[str, Any] = msgspec.field(default_factory=dict)  # with people: `people.study_file`
+    study: dict[str, Any] = msgspec.field(default_factory=dict)  # with people: `experiments.study.file`
 
 
 def read_design(path: Path) -> Design:
