@@ -18,8 +18,8 @@ from planner.plan import Status, Visit, VisitKind
 from planner.regret import RegretEvaluator
 from planner.route import XY, Route, TaskState
 from planner.service import Mode, Planner
-from planner.solver import solver
 from planner.solver_source import SolverSource
+from planner.solvers import solver
 
 REACH = 0.3  # m, spread of where a person stands to reach something
 LARGE = 15  # objects left from which on a first plan is a matter of search rather than of a small table

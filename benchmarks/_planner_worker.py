@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from planner.problem import RoutingProblem
-from planner.solver import PATIENT_WORK, SolveLimit, solver
+from planner.solvers import PATIENT_WORK, SolveLimit, solver
 
 # Length of a tour in m (None: found none), its lower bound in m if the planner gives one, whether it is proven.
 Answer = tuple[float | None, float | None, bool]

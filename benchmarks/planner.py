@@ -42,7 +42,7 @@ FIRST_CALL = """
 from pathlib import Path
 import pickle, sys
 problem = pickle.loads(Path(sys.argv[1]).read_bytes())
-from planner.solver import solver
+from planner.solvers import solver
 solver("exact").solve(problem)
 """
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from planner.certificate import Certificate, Proof
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 from planner.tour import make_plan, possible_next, spanning_bound
 
 

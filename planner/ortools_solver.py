@@ -13,7 +13,7 @@ from planner.certificate import Certificate, Proof
 from planner.greedy_solver import GreedySolver, nearest_first
 from planner.plan import Plan, Visit
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 from planner.tour import make_plan, possible_next, spanning_bound
 
 FIRST_SOLUTIONS = (1, 10)  # of the anytime form

@@ -15,7 +15,7 @@ from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.route import TaskState
-from planner.solver import SolveLimit, Solver
+from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
 from planner.tour import possible_next, tour_length
 

@@ -13,7 +13,7 @@ from planner.errors import PlannerError
 from planner.plan import Plan, Visit
 from planner.regret import Regret, RegretEvaluator, same_state
 from planner.route import PlanSource, Route, TaskState
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 
 T = TypeVar("T")
 REGRET_SECONDS = 5.0  # s of wall time for the regrets of one state, live

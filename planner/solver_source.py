@@ -13,7 +13,7 @@ from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.route import XY, PlanSource, Route, TaskState, remaining
-from planner.solver import SolveLimit, Solver
+from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
 from planner.tour import tour_length
 

@@ -19,7 +19,7 @@ from hud.conditions import condition_names
 from hud.options import option_names
 from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
-from planner.solver import SOLVERS
+from planner.solvers import SOLVERS
 
 PERSON_VALUES = {  # options of their own, because they are changed most
     "walking_speed": "usual walk",

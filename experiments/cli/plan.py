@@ -17,7 +17,7 @@ from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status
 from planner.problem import RoutingProblem
 from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, problem_from_json
-from planner.solver import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, Solver, solver
+from planner.solvers import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, Solver, solver
 
 T = TypeVar("T")
 GRACE = 0.15  # s beyond a time limit that a planner may take to stop

@@ -31,7 +31,7 @@ from experiments.errors import ConfigError
 from experiments.record.phases import HUMAN, PHASES, TASK
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import condition
-from planner.solver import SOLVERS, solver
+from planner.solvers import SOLVERS, solver
 
 if TYPE_CHECKING:
     from experiments.web.server.pool import WorkerPool

@@ -11,7 +11,7 @@ from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit, Solver, solver
+from planner.solvers import SolveLimit, Solver, solver
 
 SAME = 1e-6  # share of its length by which what is said of a tour may be rounded
 

@@ -23,7 +23,7 @@ from mjsim.house.scene.scene import compose
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.person_parameters import PersonParameters
-from planner.solver import solver
+from planner.solvers import solver
 
 Houses = Callable[[str], House]
 

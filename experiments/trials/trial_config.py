@@ -16,7 +16,7 @@ from experiments.trials.person import check_person, view_limits
 from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
-from planner.solver import DEFAULT_SOLVER
+from planner.solvers import DEFAULT_SOLVER
 
 SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
 SEEDS = ("house_seed", "person_seed", "order_seed")

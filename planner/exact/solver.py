@@ -12,7 +12,7 @@ from planner.exact.table import BIN_ROWS, Solution
 from planner.exact.warm_start import Start, WarmStart
 from planner.plan import Plan
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 from planner.tour import make_plan
 
 TABLE_RATE = 500e6  # bytes of a full table filled per second, roughly

@@ -40,7 +40,7 @@ from mjsim.support.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver
 from planner.plan import Plan
 from planner.problem import RoutingProblem
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 
 HURRIED = "studies.examples.planner_slack:HurriedOrTools"
 PLANNERS = {"exact": "exact", "ortools": "OR-Tools", HURRIED: "OR-Tools, hurried", "greedy": "nearest"}

@@ -19,7 +19,7 @@ from rich.table import Table
 from experiments.house import House
 from experiments.session.assistant import deliveries
 from planner.route import TaskState
-from planner.solver import solver
+from planner.solvers import solver
 from planner.task_problems import TaskProblems
 
 OBJECTS = (6, 12, 18, 24)

@@ -113,7 +113,7 @@ def test_the_example_of_the_import_page_runs(tmp_path, monkeypatch):
         "mjsim.world.world",
         "planner.geodesics",
         "planner.problem",
-        "planner.solver",
+        "planner.solvers",
     ],
 )
 def test_examples_in_docstrings_are_true(name):

@@ -70,7 +70,7 @@ def nothing_is_computed(monkeypatch):
     def fail(*_args, **_options):
         pytest.fail("computed before it was known where to write")
 
-    for name in ("experiments.house.House.load", "tools.gallery.take_pictures", "planner.solver.solver"):
+    for name in ("experiments.house.House.load", "tools.gallery.take_pictures", "planner.solvers.solver"):
         monkeypatch.setattr(name, fail)
     monkeypatch.setattr("experiments.cli.plan.solver", fail)
     monkeypatch.setattr("experiments.trials.replay.replay.replay", fail)

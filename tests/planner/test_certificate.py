@@ -15,7 +15,7 @@ from planner.checker import check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
-from planner.solver import SOLVERS, SolveLimit, solver
+from planner.solvers import SOLVERS, SolveLimit, solver
 from planner.verifier import verify_optimal
 
 seeds = st.integers(0, 2**32 - 1)

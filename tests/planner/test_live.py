@@ -27,8 +27,8 @@ from planner.plan import Plan, Status, VisitKind
 from planner.regret import RegretEvaluator
 from planner.route import TaskState, remaining
 from planner.service import Mode, Planner
-from planner.solver import SolveLimit, solver
 from planner.solver_source import TIE, SolverSource
+from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
 from planner.tour import possible_next, tour_length
 

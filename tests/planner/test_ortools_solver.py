@@ -9,7 +9,7 @@ from planning_cases import optimum, random_problem
 from planner.checker import check
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
-from planner.solver import SolveLimit, solver
+from planner.solvers import SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
 

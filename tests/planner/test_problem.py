@@ -11,7 +11,7 @@ from planner.checker import check
 from planner.errors import PlannerError, ProblemError
 from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
-from planner.solver import SOLVERS, SolveLimit, solver
+from planner.solvers import SOLVERS, SolveLimit, solver
 
 LINE = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
 PICK, PLACE = VisitKind.PICK, VisitKind.PLACE

@@ -11,7 +11,7 @@ from planning_cases import optimum, random_problem
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.regret import after, regrets
-from planner.solver import SolveLimit, solver
+from planner.solvers import SolveLimit, solver
 from planner.tour import possible_next
 
 seeds = st.integers(0, 2**32 - 1)

@@ -9,7 +9,7 @@ from planning_cases import Task, optimum, two_rooms
 from planner.exact.solver import ExactSolver
 from planner.plan import Visit, VisitKind
 from planner.regret import RegretEvaluator, regrets
-from planner.solver import SolveLimit, solver
+from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
 
 SEARCH = ExactSolver(table_bytes=0)

@@ -16,7 +16,7 @@ from planner.exact.solver import ExactSolver
 from planner.integer_distances import TOLERANCE
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
-from planner.solver import SOLVERS, solver
+from planner.solvers import SOLVERS, solver
 from planner.verifier import verify_optimal
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)

@@ -11,7 +11,7 @@ from planner.exact.solver import ExactSolver
 from planner.plan import Status, VisitKind
 from planner.route import TaskState
 from planner.service import Mode
-from planner.solver import SolveLimit, solver
+from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
 
 

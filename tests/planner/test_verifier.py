@@ -13,7 +13,7 @@ from planner.exact.solver import ExactSolver
 from planner.greedy_solver import GreedySolver
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 from planner.verifier import verify_optimal
 from tests.planning_cases import optimum, random_problem
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from planner.solver import solver
+from planner.solvers import solver
 from studies.examples import planner_slack
 
 

@@ -23,7 +23,7 @@ from planner.exact.table_kernels import fill, walk
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import one_by_one, regrets
-from planner.solver import SolveLimit, solver
+from planner.solvers import SolveLimit, solver
 from planner.tour import tour_length
 
 seeds = st.integers(0, 2**32 - 1)

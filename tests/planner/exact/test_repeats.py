@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from planner.exact.nodes import smallest_but
 from planner.exact.solver import ExactSolver
 from planner.problem import RoutingProblem, Shipment
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 
 SEARCH = ExactSolver(table_bytes=0, passes=((60, 300), (200, 600)))
 

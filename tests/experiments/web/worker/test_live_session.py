@@ -28,7 +28,7 @@ from experiments.web.worker.live_session import (
     save_run,
 )
 from experiments.web.worker.main import Worker
-from planner.solver import SolveLimit
+from planner.solvers import SolveLimit
 
 pytestmark = pytest.mark.usefixtures("frequent_checkpoints")
 CONFIG = TrialConfig(objects=6, assistance="guided", seed=3, user="human", live=True, fidelity="event")
