@@ -11,9 +11,60 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from experiments.errors import ConfigError
+from mjsim.support.lazy_names import lazy_names
+
+__all__ = [
+    "Choice",
+    "Follower",
+    "FullTurn",
+    "Guidance",
+    "Nearest",
+    "Parameter",
+    "Participant",
+    "ParticipantFactory",
+    "Percept",
+    "Point",
+    "VisitExecutor",
+    "participant",
+    "participant_names",
+    "positions_of",
+]
 
 if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
-    from experiments.participants.base import ParticipantFactory
+    from experiments.participants.base import (
+        Choice,
+        Guidance,
+        Participant,
+        ParticipantFactory,
+        Percept,
+        Point,
+        positions_of,
+    )
+    from experiments.participants.behaviour import Parameter
+    from experiments.participants.follower import Follower
+    from experiments.participants.looking import FullTurn
+    from experiments.participants.nearest import Nearest
+    from experiments.participants.visit_executor import VisitExecutor
+else:  # hidden from type checkers, which would otherwise accept any name
+    __getattr__, __dir__ = lazy_names(
+        __name__,
+        {
+            "base": (
+                "Choice",
+                "Guidance",
+                "Participant",
+                "ParticipantFactory",
+                "Percept",
+                "Point",
+                "positions_of",
+            ),
+            "behaviour": ("Parameter",),
+            "follower": ("Follower",),
+            "looking": ("FullTurn",),
+            "nearest": ("Nearest",),
+            "visit_executor": ("VisitExecutor",),
+        },
+    )
 
 DEFAULT_PARTICIPANT = "follower"
 _BUILDS = re.compile(r"^(def build\(|build = )", re.MULTILINE)

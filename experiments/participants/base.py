@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # options of commands name participants, and must not load th
     from mjsim.house.compiled.receptacles import ReceptacleGeometry
 
 Point = NDArray[np.float64]
+"""Position on the floor, m, shape (2,)."""
 
 NEARBY = 1.3  # m
 USUAL_PERSON = PersonParameters()

@@ -29,6 +29,7 @@ from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]
+"""Sensor name -> array."""
 MAX_SEED = 2**31 - 1
 MAX_DRAWS = 10  # seeds tried by `reset_random` where the house has no room for the objects
 

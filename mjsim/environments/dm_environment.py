@@ -15,7 +15,7 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
 
     Args:
         seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
-        **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
+        **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
         EnvironmentConfigError: An option is unknown or unusable.

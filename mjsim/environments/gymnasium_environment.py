@@ -25,7 +25,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
 
     Args:
         render_mode: None, `rgb_array` for the first-person view, or `human` for dm_control's viewer.
-        **options: Fields of `mjsim.environments.options.EnvironmentOptions`.
+        **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
         EnvironmentConfigError: An option is unknown or unusable.

@@ -5,6 +5,8 @@ Each name is loaded at its first use: what only names a profile needs no OpenGL.
 
 from typing import TYPE_CHECKING
 
+from mjsim.support.lazy_names import lazy_names
+
 __all__ = [
     "DRAFT",
     "FAST",
@@ -43,27 +45,22 @@ if TYPE_CHECKING:
     from mjsim.render.profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
     from mjsim.render.renderer import Frame, LayeredRenderer, Renderer
 else:  # hidden from type checkers, which would otherwise accept any name
-    _MODULES = {
-        "cameras": ("CameraPose",),
-        "context": ("GlInfo", "gl_info"),
-        "labels": ("Labels",),
-        "markers": ("MarkerLike",),
-        "pictures": (
-            "FloorPlan",
-            "largest_scale",
-            "render_floorplan",
-            "render_house_map",
-            "render_picture",
-            "render_pictures",
-        ),
-        "profiles": ("DRAFT", "FAST", "PROFILES", "QUALITY", "RenderProfile"),
-        "renderer": ("Frame", "LayeredRenderer", "Renderer"),
-    }
-
-    def __getattr__(name):
-        import importlib
-
-        for module, names in _MODULES.items():
-            if name in names:
-                return getattr(importlib.import_module(f"mjsim.render.{module}"), name)
-        raise AttributeError(f"module 'mjsim.render' has no attribute {name!r}")
+    __getattr__, __dir__ = lazy_names(
+        __name__,
+        {
+            "cameras": ("CameraPose",),
+            "context": ("GlInfo", "gl_info"),
+            "labels": ("Labels",),
+            "markers": ("MarkerLike",),
+            "pictures": (
+                "FloorPlan",
+                "largest_scale",
+                "render_floorplan",
+                "render_house_map",
+                "render_picture",
+                "render_pictures",
+            ),
+            "profiles": ("DRAFT", "FAST", "PROFILES", "QUALITY", "RenderProfile"),
+            "renderer": ("Frame", "LayeredRenderer", "Renderer"),
+        },
+    )

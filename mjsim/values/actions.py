@@ -136,12 +136,14 @@ class Wait:
             raise ActionError(f"Wait.until must be a time or None, got {self.until!r}")
 
 
-StepAction = Move | Pick | Place  # takes one control step
+StepAction = Move | Pick | Place
+"""An action that takes one control step."""
 Action = StepAction | FollowPath | Wait
 
 IDLE = Move()
 """Stand still."""
 WAIT = Wait()
+"""Wait for the end of a pick or place, or for one control step."""
 
 
 class Refusal(enum.Enum):

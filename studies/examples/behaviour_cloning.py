@@ -23,11 +23,8 @@ from numpy.typing import NDArray
 from rich.console import Console
 from stable_baselines3 import PPO
 
-from experiments.house import House
-from mjsim.environments.control import Continuous
-from mjsim.environments.core import ObservationDict
-from mjsim.environments.gymnasium_environment import RearrangeEnv
-from mjsim.environments.sensors import Sensor
+from experiments import House
+from mjsim.environments import Continuous, ObservationDict, RearrangeEnv, Sensor
 from studies.examples.breadcrumbs import breadcrumb_sensor
 from studies.examples.demonstrations import Demonstrations, demonstrate
 

@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.house import House
-from experiments.participants.base import Point
-from mjsim.environments.sensors import Sensor, SensorInput, unit_spec
-from mjsim.values.observation import ObjectStatus
-from mjsim.world.walking.polyline import path_length, point_along
+from experiments import House
+from experiments.participants import Point
+from mjsim import ObjectStatus, path_length, point_along
+from mjsim.environments import Sensor, SensorInput, unit_spec
 
 LOOK_AHEAD = 1.0  # m along the path
 

@@ -8,15 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.house import House
-from experiments.participants.base import Percept, Point, positions_of
-from experiments.participants.nearest import Nearest
-from mjsim.environments.core import ObservationDict, Rearrangement
-from mjsim.house.scene.scene import Scene
-from mjsim.values.actions import IDLE, ActionResult, FollowPath, Move, Pick, StepAction
-from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.values.person_parameters import PersonParameters
-from mjsim.world.walking.walker import Walker
+from experiments import House
+from experiments.participants import Nearest, Percept, Point, positions_of
+from mjsim import (
+    IDLE,
+    ActionResult,
+    FollowPath,
+    Move,
+    ObjectStatus,
+    Observation,
+    PersonParameters,
+    Pick,
+    Scene,
+    StepAction,
+    Walker,
+)
+from mjsim.environments import ObservationDict, Rearrangement
 
 Policy = Callable[[ObservationDict], NDArray[np.float32]]
 

@@ -13,9 +13,10 @@ import mjsim
 import mjsim.render
 
 PUBLIC = [
-    "IDLE", "ActionResult", "Catalogue", "Episode", "FollowPath", "MjsimError", "Move", "Observation",
-    "PersonParameters", "Pick", "Place", "Refusal", "Scene", "StepResult", "Stop", "Wait", "World", "WorldOptions",
-    "compose", "load_catalogue", "make", "navigable_floor", "sample_episode",
+    "IDLE", "WAIT", "ActionResult", "Catalogue", "Disorder", "Episode", "FollowPath", "MjsimError", "Move",
+    "ObjectStatus", "Observation", "PersonParameters", "Pick", "Place", "Refusal", "Scene", "StepAction", "StepResult",
+    "Stop", "Wait", "Walker", "World", "WorldOptions", "compose", "load_catalogue", "make", "navigable_floor",
+    "path_length", "point_along", "sample_episode",
 ]  # fmt: skip
 
 
@@ -27,7 +28,7 @@ def test_the_public_names_are_these():
 @pytest.mark.parametrize("name", PUBLIC)
 def test_every_name_resolves_to_something_documented(name):
     value = getattr(mjsim, name)
-    assert name == "IDLE" or (value.__name__ == name and value.__doc__)
+    assert name in {"IDLE", "WAIT", "StepAction"} or (value.__name__ == name and value.__doc__)
 
 
 @pytest.mark.parametrize("name", mjsim.render.__all__)
@@ -52,7 +53,7 @@ def test_type_checkers_see_the_same_names():
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():
-    with pytest.raises(AttributeError, match=r"'maker'.*'make'"):
+    with pytest.raises(AttributeError, match=r"'maker'.* make,"):
         _ = mjsim.maker
 
 

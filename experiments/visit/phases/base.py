@@ -15,6 +15,7 @@ from experiments.visit.texts.items import Item
 Outcome = Literal["next", "no_consent", "screened_out"]
 Answers = Mapping[str, Any]
 FormData = ImmutableMultiDict[str, str]
+"""Fields of a submitted form."""
 
 
 @dataclass(frozen=True)
