@@ -30,7 +30,7 @@ def visit(browser, server, look):
 
     page.goto(server.url)
     check()
-    begin(page)
+    begin(page, check)
     check()
     page.get_by_role("button", name="Continue").press("Enter")
     page.get_by_role("heading", name="Training").wait_for()
@@ -66,9 +66,13 @@ def visit(browser, server, look):
     return found
 
 
-def begin(page):
-    """Leave the first page by Enter on its button, which has the focus as soon as the page was drawn."""
+def begin(page, check=lambda: None):
+    """Leave the first pages by Enter on their buttons, which have the focus as soon as the page was drawn."""
     page.locator("button:focus", has_text="Begin").wait_for()
+    page.keyboard.press("Enter")
+    page.get_by_role("heading", name="Your task").wait_for()
+    page.locator("button:focus", has_text="Continue").wait_for()
+    check()
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="The apartment", exact=True).wait_for()
 
@@ -81,9 +85,9 @@ def elsewhere(browser, server, page, look):
         waiting.goto(server.url)
         begin(waiting)
         waiting.get_by_role("button", name="Continue").press("Enter")
-        waiting.get_by_role("heading", name="All places are taken").wait_for()
+        waiting.get_by_role("heading", name="Please wait a moment").wait_for()
         found += violations(waiting)
-        assert "You are next." in waiting.locator("#panel-text").inner_text()
+        assert "You are number 1 in the queue" in waiting.locator("#queue").inner_text()
     second = page.context.new_page()
     second.goto(page.url)
     second.get_by_role("heading", name="This session is open in another page").wait_for()

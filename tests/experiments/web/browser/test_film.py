@@ -29,8 +29,9 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
         options += ["--field-of-view-range", "1.0,2.0"]
     with PlayProcess(tmp_path / "visits", *options) as server:
         page.goto(server.url)
-        page.hold("Enter")  # the button has the focus
-        page.wait_for("location.pathname.startsWith('/play/')")
+        for shown in ("[name=phase][value=story]", "[data-trial]"):  # its button has the focus
+            page.hold("Enter")
+            page.wait_for(f"document.querySelector('{shown}')")
         address = page.evaluate("location.href")
         page.goto(f"{address}?draw=browser")
         choose(page, "Skip the training")

@@ -24,6 +24,8 @@ def test_firefox_shows_the_task_and_turns(tmp_path):
     ):
         browser.goto(server.url)
         browser.hold("Enter")
+        browser.wait_for("document.querySelector('[name=phase][value=story]')")
+        browser.hold("Enter")
         browser.wait_for(f"{TITLE} === 'Training' && document.activeElement.textContent.startsWith('Start')")
         browser.hold("Enter")
         browser.wait_for("!document.getElementById('panel').open")

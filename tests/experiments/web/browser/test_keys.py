@@ -38,8 +38,9 @@ def test_objects_are_put_away_by_keys(tmp_path, request, browser, objects, assis
     page.resize(640, 480)
     with PlayProcess(tmp_path / "visits", *words) as server:
         page.goto(server.url)
-        page.hold("Enter")  # the button has the focus
-        page.wait_for("location.pathname.startsWith('/play/')")
+        for shown in ("[name=phase][value=story]", "[data-trial]"):  # its button has the focus
+            page.hold("Enter")
+            page.wait_for(f"document.querySelector('{shown}')")
         address = page.evaluate("location.href")
         page.goto(f"{address}?draw=browser")  # however slowly
         choose(page, "Skip the training")
