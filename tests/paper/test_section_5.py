@@ -88,8 +88,10 @@ def test_all_conditions_show_the_bins_with_picture_room_and_place(starts, house,
 
 @sizes
 @pytest.mark.parametrize("assistance", CONDITIONS)
-def test_the_rows_of_the_list_stand_in_their_order_with_their_pictures(starts, pictures, size, assistance):
-    rows = list(tiles(starts[assistance][2], pictures, size, "checklist"))
+def test_the_rows_of_the_list_stand_in_their_order_with_their_pictures(
+    starts, house, pictures, size, assistance
+):
+    rows = list(tiles(starts[assistance][2], house.texts, pictures, size, "checklist"))
     assert len(rows) >= 6
     assert all(likest(tile, pictures, "object:") == item.picture for item, tile in rows)
 

@@ -14,6 +14,7 @@ from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.trials import setup
+from experiments.trials.training import trials_of
 from experiments.trials.replay.log_source import LogSource
 from experiments.trials.setup import prepare_session, prepared_planner
 from experiments.trials.trial_config import TrialConfig
@@ -242,8 +243,8 @@ def test_a_batch_and_play_take_or_tools():
     play.add_parser(commands)
     design = batch._design(parser.parse_args(["batch", "--planner", "ortools", "--out", "out"]))
     assert {trial.planner for trial in design.trials} == {"ortools"}
-    trials = play._trials(parser.parse_args(["play", "--planner", "ortools"]))
-    assert {trial["planner"] for trial in trials.values()} == {"ortools"}
+    task = play.task_of(parser.parse_args(["play", "--planner", "ortools"]))
+    assert {trial["planner"] for trial in trials_of(task).values()} == {"ortools"}
 
 
 def test_a_better_plan_that_was_logged_is_handed_out_when_it_was_shown(geodesics, mirrored):
