@@ -19,8 +19,8 @@ from experiments.record import records
 from experiments.record.phases import LeaveSession
 from experiments.record.records import EventLog
 from experiments.record.run_directory import check_file
+from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
-from experiments.session.video import FilmConfig
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

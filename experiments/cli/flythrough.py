@@ -14,7 +14,7 @@ from experiments.cli.options import (
     seconds,
 )
 from experiments.errors import ConfigError
-from experiments.session.video import FilmConfig
+from experiments.session.film_config import FilmConfig
 
 DESCRIPTION = """\
 Film a tidy house as its guests see it before the task: a camera at eye height goes through all rooms, looks around each

@@ -18,7 +18,7 @@ from experiments.cli.options import (
     seconds,
 )
 from experiments.errors import ConfigError, ReplayError
-from experiments.session.video import CAMERAS, FIRST_PERSON
+from experiments.session.film_config import CAMERAS, FIRST_PERSON
 
 if TYPE_CHECKING:
     from experiments.trials.replay.replay import ReplayReport

@@ -9,7 +9,8 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.session.camera_path import CameraPath, camera_path
-from experiments.session.video import FilmConfig, VideoWriter
+from experiments.session.film_config import FilmConfig
+from experiments.session.video import VideoWriter
 from hud.caption import Captions
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import CameraPose, Renderer

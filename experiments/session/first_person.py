@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from experiments.errors import RecordError
 from experiments.house import House
-from experiments.session.video import FilmConfig, VideoWriter
+from experiments.session.film_config import FilmConfig
+from experiments.session.video import VideoWriter
 from hud.compose import Compositor
 from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView

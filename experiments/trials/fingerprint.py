@@ -26,10 +26,7 @@ CODE = (
     "hud",
     "planner",
     "mjsim",
-    *(
-        f"experiments/{room}"
-        for room in ("house.py", "participants", "procedure", "record", "session", "trials")
-    ),
+    *(f"experiments/{room}" for room in ("house.py", "participants", "record", "session", "trials")),
 )
 
 Inputs = Mapping[str, str]

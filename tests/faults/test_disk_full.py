@@ -13,7 +13,7 @@ from msgspec import structs
 from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.files import read_json
-from experiments.session.video import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.replay.replay import replay
 from experiments.trials.trial import run_trial
 from faults.conftest import BRIEF, FAST

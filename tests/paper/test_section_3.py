@@ -8,8 +8,8 @@ from sessions import SIZES, opened
 
 from experiments.participants.follower import Follower
 from experiments.record.records import EventLog
+from experiments.session.film_config import FilmConfig
 from experiments.session.first_person import FirstPersonRenderer
-from experiments.session.video import FilmConfig
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor

@@ -6,7 +6,8 @@ from types import TracebackType
 
 import numpy as np
 
-from experiments.session.video import TOP_DOWN, FilmConfig, VideoWriter
+from experiments.session.film_config import TOP_DOWN, FilmConfig
+from experiments.session.video import VideoWriter
 from hud.projection import CameraView
 from hud.state import HudState, Marker, Rgba, Vec3
 from mjsim.house.scene.scene import Scene

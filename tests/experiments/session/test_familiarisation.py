@@ -20,7 +20,7 @@ from experiments.record.records import read_events
 from experiments.session.camera_path import SPEED, STEP, bins_seen, camera_path
 from experiments.session.familiarise import reading_time, story_text
 from experiments.session.film import write_flythrough
-from experiments.session.video import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.design import read_design
 from experiments.trials.replay.replay import replay
 from experiments.trials.setup import simulated_user

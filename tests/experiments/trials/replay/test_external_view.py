@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from experiments.session.video import FilmConfig
+from experiments.session.film_config import FilmConfig
 from experiments.trials.replay.external_view import ExternalViewer, camera_path
 from mjsim.house.compiled.footprint import Footprint
 from mjsim.world.world import World

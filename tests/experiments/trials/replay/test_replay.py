@@ -23,8 +23,8 @@ from experiments.record.columns import TRAJECTORY_COLUMNS
 from experiments.record.files import read_arrays, read_json, write_checksums
 from experiments.record.reader import read_run
 from experiments.record.records import read_events
+from experiments.session.film_config import FilmConfig
 from experiments.session.session import Session
-from experiments.session.video import FilmConfig
 from experiments.trials.replay.replay import ReplayFilm, as_seen, replay
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
