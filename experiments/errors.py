@@ -16,10 +16,6 @@ import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
 
-from hud.errors import HudError
-from mjsim.values.errors import MjsimError
-from planner.errors import PlannerError
-
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
@@ -71,16 +67,18 @@ class ReplayError(ExperimentError):
         self.verdicts = tuple(verdicts)
 
 
-OUR_ERRORS = (ExperimentError, HudError, MjsimError, PlannerError)
-
-
 def describe(error: BaseException) -> str:
     """An error as one line: its message, preceded by its type unless it is one of this project's errors."""
+    # Imported late, so that `mjsim doctor` can name a distribution that hides one of these packages.
+    from hud.errors import HudError
+    from mjsim.values.errors import MjsimError
+    from planner.errors import PlannerError
+
     try:
         message = " ".join(str(error).split()).encode(errors="backslashreplace").decode()
     except Exception:  # a user's own error
         message = ""
-    if isinstance(error, OUR_ERRORS):
+    if isinstance(error, ExperimentError | HudError | MjsimError | PlannerError):
         return message
     return f"{type(error).__name__}: {_cut(message)}" if message else type(error).__name__
 

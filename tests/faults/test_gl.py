@@ -111,7 +111,7 @@ def test_a_driver_that_fails_late_costs_the_pictures_alone(
     monkeypatch.setattr(context._PROCESS, "_gl", lost)
     warnings = []
     out = tmp_path / "out"
-    metrics = run_trial(BRIEF, out, film=FilmConfig(160, 120), house=house, on_warning=warnings.append)
+    metrics = run_trial(BRIEF, out, film=FilmConfig(320, 240), house=house, on_warning=warnings.append)
     assert metrics["ended"] == "all delivered" and metrics["frames_sha256"] is None
     assert [warning.partition(": ")[0] for warning in warnings] == ["no video", "no floor plan"]
     assert all("\n" not in warning for warning in warnings)

@@ -126,6 +126,7 @@ def test_a_batch_that_is_stopped_writes_its_tables(number, tmp_path):
     assert len((tmp_path / "out" / "trials.csv").read_text().splitlines()) == len(done) + 1 < 200
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_is_one_line_for_each_trial(tmp_path, mjsim, own_module):
     own_module(participant("os.kill(os.getpid(), signal.SIGKILL)"))
     words = ("--assistance", "none", "--user", "own_code:build", "--workers", "1", "--seeds", "0:2")
