@@ -2,6 +2,7 @@
 
 import asyncio
 import csv
+import dataclasses
 import json
 import os
 import re
@@ -15,6 +16,7 @@ import pytest
 
 from experiments.cli.main import main
 from experiments.study.data.collect import FORMULA
+from experiments.study.data.export import export
 from experiments.study.file import read_people_study
 from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal.dry_run import dry_run
@@ -181,14 +183,20 @@ def test_nothing_of_who_came_by_http_is_in_an_export(tmp_path):
     pool = WorkerPool(study.cells[0].trial(0).house)
     walked = asyncio.run(dry_run(study, recruiter(study.settings.recruitment), folder, pool, note))
     assert walked.faults == []
-    assert main(["study", "export", str(study.path), str(folder), "--out", str(tmp_path / "export")]) == 0
+    asyncio.run(_export(dataclasses.replace(study, rehearsal=True), folder, tmp_path / "export"))
     tokens = {found[1] for url in addresses if (found := re.search("/play/([^/]+)", url))}
     assert len(tokens) >= 4
-    secrets = {"dryrun0", "127.0.0.1", "CODE12345", *tokens, *map(token_hash, tokens)}
-    assert b"dryrun0" in (folder / "study.db").read_bytes()
+    secrets = {"rehearsal0", "127.0.0.1", "CODE12345", *tokens, *map(token_hash, tokens)}
+    assert b"rehearsal0" in (folder / "study.db").read_bytes()
     for path in filter(lambda p: p.is_file(), (tmp_path / "export").rglob("*")):
         content = path.read_bytes()
         assert not [secret for secret in secrets if secret.encode() in content or secret in path.name], path
+
+
+async def _export(study, folder, out):
+    store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
+    await export(study, store, folder, out)
+    await store.close()
 
 
 def _prolific(tmp_path):

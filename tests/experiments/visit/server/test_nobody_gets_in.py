@@ -37,7 +37,7 @@ PEOPLE = {
     ("GET", "/play/{token}/withdrawal"): PARTICIPANT,
     ("POST", "/play/{token}/withdrawal"): PARTICIPANT,
     ("GET", "/play/{token}/film"): PARTICIPANT,
-    ("GET", "/play/{token}/floor-plan.png"): PARTICIPANT,
+    ("GET", "/play/{token}/floor-plan.png"): NOBODY,  # a study has no page of the result
     ("GET", "/play/{token}/ping"): EVERYBODY,  # it does nothing; the time that it takes is measured
     ("WS", "/play/{token}"): PARTICIPANT,
     SCENE: EVERYBODY,
