@@ -45,11 +45,12 @@ def play_app(folder, pool, *words, sessions=20, made=lambda _: None):
 
 @contextmanager
 def playing(folder, pool, *words, sessions=20):
-    """A client of `mjsim play WORDS`; its `release` ends all sessions, as if their participants had been away."""
+    """A client of `mjsim play WORDS` with its `server`; `release` ends all sessions."""
     servers = []
     app = play_app(folder, pool, *words, sessions=sessions, made=servers.append)
     with TestClient(app, base_url=ORIGIN, follow_redirects=False) as client:
-        client.release = lambda: servers[0].sessions.release()
+        client.server = servers[0]
+        client.release = servers[0].sessions.release
         yield client
 
 

@@ -5,6 +5,10 @@ from collections.abc import Iterable
 from experiments.errors import ConfigError
 
 STORY, FLYTHROUGH, TRAINING, TASK = PHASES = ("story", "flythrough", "training", "task")
+HUMAN = "human"  # name of the participant that nothing simulates
+REHEARSAL = "rehearsal"  # name of the simulated participants of `mjsim study rehearse`
+REHEARSED = "Rehearsed, with answers drawn at random"
+SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
 def phases_of(text: str) -> tuple[str, ...]:
@@ -23,14 +27,6 @@ def phases_of(text: str) -> tuple[str, ...]:
             "with the task last"
         )
     return names
-
-
-HUMAN = "human"  # name of the participant that nothing simulates
-REHEARSAL = (
-    "rehearsal"  # name of the simulated participant of `mjsim study rehearse`, who answers questions too
-)
-REHEARSED = "Rehearsed, with answers drawn at random"
-SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
 def is_simulated(user: object) -> bool:

@@ -1,4 +1,4 @@
-"""One participant's visit: plan, phases, server and store. `mjsim play` needs only this."""
+"""One participant's visit: plan, phases, server and store."""
 
 from typing import TYPE_CHECKING
 

@@ -139,7 +139,6 @@ class VisitFolders:
         except msgspec.DecodeError as error:
             raise RecordError(f"{path} is damaged: {error}") from error
 
-    def all(self) -> list[VisitFolder]:
-        """Return the folders of all visits, by name."""
-        found = (self.find(path.parent.name) for path in sorted(self.path.glob(f"*/{VISIT}")))
-        return [one for one in found if one is not None]
+    def names(self) -> list[str]:
+        """Return the names of all visits."""
+        return sorted(path.parent.name for path in self.path.glob(f"*/{VISIT}"))

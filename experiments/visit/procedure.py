@@ -3,24 +3,28 @@
 import asyncio
 import dataclasses
 import datetime
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
+from experiments.errors import RecordError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK
 from experiments.visit.folders import Ended, VisitFolder, VisitFolders
 from experiments.visit.phases import phases_of
 from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, Visitor
 from experiments.visit.phases.played import Played
-from experiments.visit.plan import PLAYED, RESULT, VisitPlan
+from experiments.visit.plan import PHASES, PLAYED, RESULT, VisitPlan
 from experiments.visit.recruiter import AFTER
 from experiments.visit.store import Assignment, Person, Status, Store
 from experiments.visit.store.values import utc_now
 from experiments.web.server.player import LiveTrial
 
+LOG = logging.getLogger("mjsim.study")
 FULL = "full"  # reason of a phase that ended because no place was left
 ATTEMPTS = "attempts"  # answer in which the attempts at a phase are counted
 
@@ -64,6 +68,8 @@ class Procedure:
         """Return where a participant is, and record when the phase was first shown."""
         if not person.active and person.status != "finished":
             return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
+        if person.phase not in self.names:
+            person = await self._leave_missing_phase(person)
         number = self.names.index(person.phase)
         passed, wait = await self.times(person)
         rows = await self.store.answers(person.id)
@@ -152,19 +158,42 @@ class Procedure:
             person = await self.store.person(person.id)
         return person
 
-    async def recover(self) -> None:
-        """Record the trials that ended while no server ran."""
+    async def recover(self, before: datetime.datetime | None = None) -> None:
+        """Record trials whose end is not in the database, of all participants or of those inactive since `before`.
+
+        A damaged folder is logged, and concerns its own participant only.
+        """
         for person in await self.store.people():
-            await self.record_trials(person)
+            if before is None or person.seen < before:
+                try:
+                    await self.record_trials(person)
+                except (RecordError, OSError, msgspec.DecodeError) as error:
+                    LOG.error("person %d: %s", person.id, error)
 
     async def adopt(self) -> None:
         """Add participants for folders of visits that were made before `mjsim play` had a database."""
-        for folder in await asyncio.to_thread(self.folders.all):
-            if await self.store.find(folder.path.name) is None:
+        for name in await asyncio.to_thread(self.folders.names):
+            try:
+                folder = self.folders.find(name)
+            except RecordError as error:
+                LOG.error("%s", error)
+                continue
+            if folder is not None and await self.store.find(folder.path.name) is None:
                 here = folder.stored.phase
                 if here != FLYTHROUGH or here not in self.names:
                     here = next(name for name in self.names if name in folder.stored.trials)
                 await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
+
+    async def _leave_missing_phase(self, person: Person) -> Person:
+        """Move a participant on whose phase the plan no longer has, such as the film of a server without one."""
+        order = (*PHASES, RESULT)
+        later = order[order.index(person.phase) + 1 :] if person.phase in order else ()
+        following = next((name for name in later if name in self.names), None)
+        if following is None:
+            raise RecordError(f"person {person.id} is in the phase {person.phase}, which the plan lacks")
+        status: Status | None = "finished" if following == self.names[-1] else None
+        await self.store.finish_phase(person.id, person.phase, following, {}, status=status)
+        return await self.store.person(person.id)
 
     @property
     def _away(self) -> datetime.timedelta:

@@ -14,15 +14,17 @@ from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
 LOG = logging.getLogger("mjsim.study")
-PERIOD = 10.0  # s between two words to the database
+HEARTBEAT_S = 10.0  # time between two heartbeats to the database
+SWEEP_S = 60.0  # time between two searches for absent participants
+CLOCK_SET_S = 30.0  # deviation from which the clock was set, or the machine slept
 
 
 class HostOfVisits:
-    """This host among others.
+    """This host among several.
 
     Args:
-        name: Of the host, another one than those of the others.
-        store: Knows all hosts.
+        name: Name of the host, unique among the hosts.
+        store: Records the heartbeats of all hosts.
         folders: Hold the journals of this host.
     """
 
@@ -32,20 +34,20 @@ class HostOfVisits:
         self._new = False
 
     async def keep(self, sessions: Sessions) -> None:
-        """Say for ever that this host is there; end its sessions where nobody has heard that for long."""
+        """Send heartbeats until cancelled. End all sessions if the database has received none for too long."""
         while True:
             began = time.monotonic()
             try:
-                self._new = await asyncio.wait_for(self._store.greet(self._name), PERIOD)
+                self._new = await asyncio.wait_for(self._store.greet(self._name), HEARTBEAT_S)
                 self._until = began + LEASE.total_seconds()
             except (StoreError, TimeoutError) as error:
                 LOG.warning("host %s: the database does not hear it: %s", self._name, error)
             if time.monotonic() > self._until:
                 await sessions.release()
-            await asyncio.sleep(PERIOD)
+            await asyncio.sleep(HEARTBEAT_S)
 
     async def has(self, person: Person) -> bool:
-        """Whether a person's pages are here; those of the first phases are everywhere."""
+        """Return whether this host shows a participant's pages. Every host shows those of the first phases."""
         if person.host is None and person.phase not in PLAYED:
             return True
         if time.monotonic() > self._until:
@@ -56,13 +58,8 @@ class HostOfVisits:
         return await self._store.claim(person.id, self._name, new=self._new, journal=journal)
 
     async def leave(self) -> None:
-        """Note that nothing runs here any more."""
+        """Record that no sessions run on this host any more."""
         await self._store.greet(self._name, leaves=True)
-
-
-LOG = logging.getLogger("mjsim.study")
-SWEEP_PERIOD = 60.0  # s between two looks for people who never return
-CLOCK_SET = 30.0  # s by which the clock is off once it was set, or the machine slept
 
 
 async def end_absent(procedure: Procedure) -> None:
@@ -71,15 +68,16 @@ async def end_absent(procedure: Procedure) -> None:
     since = time.monotonic()
     ahead = time.time() - since
     while True:
-        await asyncio.sleep(SWEEP_PERIOD)
+        await asyncio.sleep(SWEEP_S)
         now = time.monotonic()
-        if abs(time.time() - now - ahead) > CLOCK_SET:  # signs of life are noted by that clock
+        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # signs of life are noted by that clock
             since, ahead = now, time.time() - now
         if now - since < away:
             continue
         try:
-            gone = await procedure.store.time_out(utc_now() - datetime.timedelta(seconds=away))
-            if gone:
+            before = utc_now() - datetime.timedelta(seconds=away)
+            await procedure.recover(before)  # a participant whose trial is over may still answer the survey
+            if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
         except StoreError as error:  # the next sweep may find them
             LOG.warning("%s", error)

@@ -124,7 +124,9 @@ class Trials:
 
     def _has_room(self, participant: str, address: str) -> bool:
         """Return whether one more socket of a participant and an address is served."""
-        from_address = max(SOCKETS_OF_AN_ADDRESS, self._limit.count)  # all may be behind one address
+        # All participants may be behind one address. A page that is loaded again has two sockets for a moment.
+        playing = max(self._limit.count, len(self._limit.held))
+        from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address
 
     async def _beat(self, person: Person) -> None:

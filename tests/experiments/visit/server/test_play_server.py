@@ -5,7 +5,7 @@ import json
 import re
 import sqlite3
 import time
-from contextlib import closing
+from contextlib import closing, contextmanager
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -345,21 +345,51 @@ def test_presses_without_end_are_cut_off(client):
     assert closed.value.code == protocol.TOO_MUCH
 
 
+@contextmanager
+def full_address(client):
+    """Other visits have as many sockets open at the client's address as it may have."""
+    sockets = client.server._trials._sockets
+    (address,) = (name for name in sockets if len(name) < 64)  # others are hashes of links
+    before, sockets[address] = sockets[address], 4
+    yield
+    sockets[address] = before
+
+
 def test_a_visit_and_an_address_have_few_sockets(tmp_path, pool, monkeypatch):
+    monkeypatch.setattr("experiments.visit.server.trials.SOCKETS_OF_AN_ADDRESS", 2)
     with playing(tmp_path, pool, sessions=2) as client:
-        few_sockets(client, monkeypatch)
+        link, other = new_visit(client), new_visit(client)
+        with connected(client, link), connected(client, link), connected(client, other):
+            with pytest.raises(WebSocketDisconnect), connected(client, link):
+                pass
+            with connected(client, other):  # all who can play may be at one address, and load pages again
+                pass
+            with full_address(client), pytest.raises(WebSocketDisconnect), connected(client, other):
+                pass
+        with connected(client, link) as socket:
+            started(socket)
 
 
-def few_sockets(client, monkeypatch):
-    link = new_visit(client)
-    with connected(client, link), connected(client, link):
-        with pytest.raises(WebSocketDisconnect), connected(client, link):
-            pass
-        monkeypatch.setattr("experiments.visit.server.trials.SOCKETS_OF_AN_ADDRESS", 2)
-        with pytest.raises(WebSocketDisconnect), connected(client, new_visit(client)):
-            pass
-    with connected(client, link) as socket:
-        started(socket)
+def test_one_damaged_visit_does_not_keep_the_server_from_starting(tmp_path, pool, caplog):
+    with playing(tmp_path, pool) as client:
+        damaged, whole = new_visit(client), new_visit(client)
+    (tmp_path / token_hash(damaged[6:]) / VISIT).write_text("{")
+    unknown = tmp_path / ("0" * 64)
+    unknown.mkdir()
+    (unknown / VISIT).write_text("{")
+    with playing(tmp_path, pool) as client:
+        assert client.get(damaged).status_code == 503
+        play_trial(client, whole, "training")
+    assert caplog.text.count("is damaged") >= 3
+
+
+def test_a_server_without_the_film_leads_on_who_was_to_see_it(tmp_path, pool):
+    (tmp_path / "film.mp4").write_bytes(b"film")
+    with playing(tmp_path / "visits", pool, "--film", str(tmp_path / "film.mp4")) as client:
+        link = begin(client)
+        assert "This film" in client.get(link).text
+    with playing(tmp_path / "visits", pool) as client:
+        assert 'data-trial="training"' in client.get(link).text
 
 
 def test_a_page_is_told_twice_a_second_that_the_server_lives(client):
