@@ -13,3 +13,13 @@ test("a button waits, says how long, and has the focus then", async () => {
   vi.advanceTimersByTime(750);
   expect([begin?.disabled, begin?.textContent, document.activeElement]).toEqual([false, "Begin", begin]);
 });
+
+test("a button below a long text gets the focus without being scrolled to", async () => {
+  document.body.innerHTML = '<button data-wait="0" data-focus>Continue</button>';
+  const [button] = document.querySelectorAll("button");
+  const focus = vi.spyOn(HTMLElement.prototype, "focus");
+  vi.resetModules();
+  await import("../static/start.js");
+  expect(focus.mock.calls).toEqual([[{ preventScroll: true }]]);
+  expect([document.activeElement, button?.disabled, button?.textContent]).toEqual([button, false, "Continue"]);
+});
