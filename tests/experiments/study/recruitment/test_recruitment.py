@@ -173,7 +173,7 @@ def test_in_a_lab_nothing_leads_back_to_the_person_before(tmp_path):
 
 
 def test_who_never_comes_back_has_timed_out_and_gives_the_place_away(tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.visit.server.background.SWEEP_PERIOD", 0.1)
+    monkeypatch.setattr("experiments.visit.server.background.SWEEP_S", 0.1)
     study = with_recruitment(PROLIFIC, abandoned_after=0.5, timed_out_after=0.5)
     with serving(tmp_path, study) as client:
         link = begin(client, **IDS)
@@ -192,7 +192,7 @@ def test_who_never_comes_back_has_timed_out_and_gives_the_place_away(tmp_path, m
 
 
 def test_a_task_that_was_over_when_its_page_was_closed_is_noted(tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.visit.server.background.SWEEP_PERIOD", 0.1)
+    monkeypatch.setattr("experiments.visit.server.background.SWEEP_S", 0.1)
     study = with_recruitment(PROLIFIC, abandoned_after=3.0, timed_out_after=3.0)
     with serving(tmp_path, study) as client:
         link = begin(client, **IDS)
