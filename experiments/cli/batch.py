@@ -19,7 +19,7 @@ from experiments.cli.options import (
 )
 from experiments.cli.shards import add_shards, run_share
 from experiments.errors import ConfigError
-from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.trials.design import Design, counted, factorial, read_design
 
 OBJECTS = 6

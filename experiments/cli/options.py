@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import CALL_LIMIT, ConfigError
-from experiments.participants import participant_names
 from experiments.participants.distribution import Distributions
+from experiments.participants.registry import participant_names
 from experiments.session.film_config import FilmConfig
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import DEFAULTS, SETTINGS, TrialConfig, episode_settings

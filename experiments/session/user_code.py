@@ -21,8 +21,8 @@ from experiments.errors import (
     shown,
 )
 from experiments.house import House
-from experiments.participants import participant
 from experiments.participants.base import Participant, Percept
+from experiments.participants.registry import participant
 from experiments.session.signals import exit_raised
 from hud.conditions import Condition
 from hud.errors import SchemaError

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.participants import DEFAULT_PARTICIPANT, participant
+from experiments.participants.registry import DEFAULT_PARTICIPANT, participant
 from experiments.record.records import EventLog
 from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode

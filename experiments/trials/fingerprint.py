@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from experiments.participants import participant_names
+from experiments.participants.registry import participant_names
 from experiments.record.phases import STORY
 from experiments.session.familiarise import story_text
 from experiments.trials.trial_config import PATHS, TrialConfig

@@ -7,10 +7,10 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.participants import participant
 from experiments.participants.base import Participant
 from experiments.participants.behaviour import draw
 from experiments.participants.distribution import Distributions
+from experiments.participants.registry import participant
 from experiments.record import records
 from experiments.record.journal import Journal
 from experiments.record.records import EventLog

@@ -9,8 +9,8 @@ from typing import Annotated, Any, cast
 import msgspec
 
 from experiments.errors import ConfigError
-from experiments.participants import DEFAULT_PARTICIPANT
 from experiments.participants.distribution import Distributions
+from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.record.phases import STORY, TASK, TRAINING, phases_of
 from experiments.trials.person import check_person, view_limits
 from mjsim.house.catalogue.house_ref import parse_house

@@ -7,9 +7,9 @@ import pytest
 
 from experiments.errors import ConfigError
 from experiments.house import House
-from experiments.participants import participant
 from experiments.participants.base import Choice
 from experiments.participants.boltzmann import draw
+from experiments.participants.registry import participant
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from planner.plan import Visit, VisitKind

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sessions import prepared
 
-from experiments.participants import DEFAULT_PARTICIPANT
+from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.trials.trial_config import TrialConfig
 
 

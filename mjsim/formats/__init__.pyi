@@ -1,0 +1,1 @@
+from .gltf.export import export_scene as export_scene
