@@ -6,7 +6,7 @@ import pkgutil
 import mujoco
 
 import mjsim
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.house_ref import models_root
 
 PACKAGES = ("mjsim", "planner", "hud", "experiments")
 PRELOAD = "experiments.web.worker.preload"  # does its work when a server of processes imports it

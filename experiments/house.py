@@ -17,8 +17,7 @@ from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import Footprint
 from mjsim.house.compiled.house import compiled_house
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.sampling import house_points, sample_episode
 from mjsim.house.validation.validate import require_usable

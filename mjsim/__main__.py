@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-from mjsim.support.conflicts import hidden_package
+from mjsim.support.environment import hidden_package
 
 
 def main() -> int:

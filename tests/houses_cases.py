@@ -8,7 +8,7 @@ import mujoco
 from mjsim.generator.furniture.look import Look
 from mjsim.generator.furniture.piece import Piece, flattened
 from mjsim.generator.values import Asset, Door, FloorPlan, Palette, Rectangle, Room, Window
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.house_ref import models_root
 
 PALETTE = Palette(
     woods=((0.8, 0.58, 0.36), (0.5, 0.33, 0.22)),

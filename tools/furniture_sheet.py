@@ -22,11 +22,11 @@ from mjsim.generator.furniture.piece import Piece
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.space import Place
 from mjsim.generator.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.generated_names import stream
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.catalogue.model_files import read_model
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose
-from mjsim.support.random_streams import stream
 
 CELL = (112, 84)  # of a picture, px
 COLUMNS = 18

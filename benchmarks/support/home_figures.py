@@ -23,11 +23,10 @@ from mjsim.generator.generated import generate, house_files
 from mjsim.generator.programme import NEEDS
 from mjsim.generator.recipe import RECIPE, read_recipe
 from mjsim.generator.values import WALL, Door, FloorPlan, Window
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.catalogue.house_ref import CATALOGUE
+from mjsim.house.catalogue.house_ref import CATALOGUE, models_root
 from mjsim.house.check import check_house_name
-from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
 
 DRAWN = 10  # one home of so many is exported as the browser's client draws it

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mjsim.house.check import Report
+from mjsim.house.check import CheckReport
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.views import Drawing
@@ -22,7 +22,7 @@ LETTERS = 13.0  # an inch
 COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
 
-def draw_check(path: Path, report: Report) -> None:
+def draw_check(path: Path, report: CheckReport) -> None:
     """Write a PNG with the views of a report and the numbers of its findings, as in its table."""
     views = report.views or (Drawing("nothing could be compiled", (0, 1), ()),)
     listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:LINES], 1)]

@@ -10,7 +10,7 @@ from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
 
 if TYPE_CHECKING:
-    from mjsim.house.check import Report
+    from mjsim.house.check import CheckReport
 
 UNUSABLE = 2
 
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.usable else UNUSABLE
 
 
-def as_json(report: "Report") -> dict[str, Any]:
+def as_json(report: "CheckReport") -> dict[str, Any]:
     """The report without its drawings, as JSON values."""
     return {
         "path": report.path,
@@ -70,7 +70,7 @@ def as_json(report: "Report") -> dict[str, Any]:
     }
 
 
-def _print(report: "Report") -> None:
+def _print(report: "CheckReport") -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -13,7 +13,7 @@ from typing import NoReturn
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
 from experiments.cli.requirements import add_checkout_command
 from experiments.session.signals import exit_code, exit_raised, signal_of, signals_raised
-from mjsim.support.gl_choice import postpone_gl
+from mjsim.support.environment import postpone_gl
 from mjsim.values.errors import brief
 
 COMMANDS = {

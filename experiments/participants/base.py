@@ -18,7 +18,7 @@ from planner.plan import Visit
 
 if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
     from experiments.house import House
-    from mjsim.house.compiled.receptacles import ReceptacleGeometry
+    from mjsim.house.compiled.sites import ReceptacleGeometry
 
 Point = NDArray[np.float64]
 """Position on the floor, m, shape (2,)."""

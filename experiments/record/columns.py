@@ -12,8 +12,7 @@ from experiments.errors import RecordError
 from experiments.record.files import TEXT, Layout
 from mjsim.values.actions import Move, Pick, Place, StepAction
 from mjsim.values.errors import ActionError
-from mjsim.values.observation import ObjectStatus
-from mjsim.values.steps import States
+from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.world.state import WorldState
 
 OBJECTS = -1  # in a shape: the number of objects
@@ -76,7 +75,7 @@ def row_type(objects: int) -> np.dtype[Any]:
     return np.dtype([(name, kind, row_shape(row, objects)) for name, (kind, row) in columns.items()])
 
 
-def state_columns(states: States) -> Iterator[tuple[str, NDArray[Any]]]:
+def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
     """The columns that states determine, shape (n, ...)."""
     columns = states._asdict()
     health = columns.pop("health")

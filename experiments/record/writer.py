@@ -14,9 +14,8 @@ from experiments.record.reader import Record, assemble
 from experiments.record.records import EventLog
 from mjsim.values.actions import Move, Pick, StepAction
 from mjsim.values.episode import Episode
-from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.values.steps import Steps
-from mjsim.world.health.values import HealthSample
+from mjsim.values.observation import ObjectStatus, Observation, Steps
+from mjsim.world.health.monitor import HealthSample
 from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
 from mjsim.world.world import World
 

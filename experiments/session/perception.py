@@ -9,7 +9,7 @@ from experiments.participants.base import Choice, Guidance, Percept, Point, posi
 from experiments.session.assistant import Assistant
 from hud.markers import FLAGPOLE, flagpoles
 from hud.state import HudState
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.house.sight.drawn_state import drawn_state
 from mjsim.house.sight.sight import (
     FieldOfView,

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from experiments.house import House
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.episode import Episode
 
 

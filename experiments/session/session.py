@@ -16,8 +16,7 @@ from experiments.session.viewer import OnProgress, Progress, Viewer
 from hud.state import HudState
 from mjsim.values.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
 from mjsim.values.errors import PhysicsError
-from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.values.steps import Steps
+from mjsim.values.observation import ObjectStatus, Observation, Steps
 from mjsim.world.world import World
 
 FINAL_HOLD = 1.6  # s that the session is shown after the last delivery

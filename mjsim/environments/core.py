@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from mjsim.environments.control import Control
 from mjsim.environments.episodes import CompiledEpisode, EpisodeCache
-from mjsim.environments.observation_layout import ObservationLayout
 from mjsim.environments.rewards import RewardFunction
 from mjsim.environments.sensors import SENSORS, Sensor, SensorInput
+from mjsim.environments.sensors.base import ObservationLayout
 from mjsim.environments.sensors.vision import visible_pixels
 from mjsim.values.actions import EventKind
 from mjsim.values.errors import (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.navigable import NavigablePoints
+from mjsim.house.compiled.house import NavigablePoints
 from mjsim.house.scene.sampling import sample_episode
 from mjsim.house.scene.scene import compose
 from mjsim.render import Labels, Renderer

@@ -10,12 +10,11 @@ from typing import Any, Literal, TypeVar
 from mjsim.environments.control import CONTROLS, Control
 from mjsim.environments.core import Rearrangement
 from mjsim.environments.episodes import EpisodeCache, sample
-from mjsim.environments.observation_layout import CameraOptions, ObservationLayout
 from mjsim.environments.rewards import REWARDS, RewardFunction
 from mjsim.environments.sensors import Sensor, resolve_sensors
+from mjsim.environments.sensors.base import CameraOptions, ObservationLayout
 from mjsim.generator.home_cache import load_catalogue
-from mjsim.house.compiled.house import compiled_house, navigable_floor
-from mjsim.house.compiled.navigable import NavigableBuilder
+from mjsim.house.compiled.house import NavigableBuilder, compiled_house, navigable_floor
 from mjsim.values.episode import POINTS, Episode
 from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.options import WorldOptions

@@ -23,7 +23,7 @@ from mjsim.formats.scene.source_scene import (
 )
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.house.catalogue.model_files import read_model
-from mjsim.house.compiled.rooms import PREFIX, RoomMap
+from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")

@@ -9,7 +9,7 @@ from mjsim.generator.furniture.look import Look
 from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
 from mjsim.generator.space import BLINDS, WALL_GAP, Place, Space
 from mjsim.generator.values import BACK, SIDES, FloorPlan, Side, Window
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import stream
 
 LOW = 1.15  # m: pictures hang over what is lower
 BESIDE_TILES = 0.3  # m between the tiles of a kitchen and a picture

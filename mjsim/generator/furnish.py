@@ -15,7 +15,7 @@ from mjsim.generator.furniture.piece import Piece, flattened, moved
 from mjsim.generator.space import UNUSED, Place, Space
 from mjsim.generator.usual import LITTLE, MOST_PLANTS, MUSTS, OFTEN, PLANTS, ROUNDS, SHARES, USUAL
 from mjsim.generator.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6

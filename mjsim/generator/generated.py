@@ -11,8 +11,7 @@ from mjsim.generator.palette import draw_palette
 from mjsim.generator.plan import draw_rooms
 from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.values import FloorPlan, Furnishing
-from mjsim.house.catalogue.generated_names import VERSION
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import VERSION, stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 40  # plans

@@ -9,11 +9,10 @@ from pathlib import Path
 
 from mjsim.generator.files import STYLE
 from mjsim.generator.recipe import Recipe, read_recipe
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.files import MAX_EXTENDS, base_of
 from mjsim.house.catalogue.generated_names import parse_name
-from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, parse_house
+from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, parse_house
 from mjsim.support.files import digest_of, work_folder
 from mjsim.support.kernels import cache_base
 from mjsim.values.errors import HouseError

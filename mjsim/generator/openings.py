@@ -18,7 +18,7 @@ from mjsim.generator.values import (
     Side,
     Window,
 )
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 CLEAR, CLEAR_FRONT = 0.92, 0.95  # m, width of doors

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from mjsim.generator.values import FloorPlan, Palette, Rgb, Room
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import stream
 
 WET = ("bathroom", "shower_room", "utility")
 _WOODS: tuple[tuple[Rgb, ...], ...] = (  # of one home

@@ -14,7 +14,7 @@ from ortools.sat.python import cp_model
 
 from mjsim.generator.programme import NEEDS, Programme, draw_programme, use_of
 from mjsim.generator.values import WALL, Rectangle, Room
-from mjsim.support.random_streams import stream
+from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 GRID = 0.2  # m

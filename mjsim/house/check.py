@@ -24,7 +24,7 @@ from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, Sampling
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class CheckReport:
     """What a check found."""
 
     kind: str  # `house`, `receptacle`, `object` or `episode`
@@ -46,7 +46,7 @@ class Report:
 Load = Callable[[str], Catalogue]  # from the name of a house
 
 
-def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> Report:
+def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
     """Check a catalogue, its folder, a house by name, an MJCF file, or an episode.
 
     Args:
@@ -64,16 +64,16 @@ def check_path(name: str, house: str | None = None, load: Load = Catalogue.load)
     return check_house_name(str(path / CATALOGUE) if path.is_dir() else name, load)
 
 
-def check_house_name(name: str, load: Load = Catalogue.load) -> Report:
+def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
     """Check a house with its receptacles and objects, and sample it."""
     try:
         catalogue = load(name)
     except AssetError as error:
-        return Report("house", name, (_unreadable("catalogue", error),))
+        return CheckReport("house", name, (_unreadable("catalogue", error),))
     house = compiled_house(catalogue)
     found = house.once("findings", lambda: check_house(house))
     if errors(found):
-        return Report("house", name, tuple(found), views=_partial_view(catalogue))
+        return CheckReport("house", name, tuple(found), views=_partial_view(catalogue))
     fits, more = _check_sampling(house)
     xmin, ymin, xmax, ymax = house.rooms.bounds
     facts = {
@@ -86,7 +86,7 @@ def check_house_name(name: str, load: Load = Catalogue.load) -> Report:
     }
     compiled = Compiled.of("house", catalogue.house_path, house.model)
     view = floor_view(compiled, house.rooms, house.receptacles)
-    return Report("house", name, (*found, *more), facts, (view,))
+    return CheckReport("house", name, (*found, *more), facts, (view,))
 
 
 def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
@@ -117,18 +117,18 @@ def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
     return fits, found
 
 
-def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> Report:
+def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
     """Check an episode against its house, or against another one."""
     try:
         episode = Episode.load(path)
     except EpisodeError as error:
-        return Report("episode", str(path), (_unreadable("episode", error),))
+        return CheckReport("episode", str(path), (_unreadable("episode", error),))
     try:
         catalogue = load(house or episode.house)
         built = compiled_house(catalogue)
         require_usable(built)
     except AssetError as error:
-        return Report("episode", str(path), (_unreadable("house", error),))
+        return CheckReport("episode", str(path), (_unreadable("house", error),))
     found = [*check_fit(episode, catalogue), *check_poses(episode, built.rooms)]
     compiled = Compiled.of("house", catalogue.house_path, built.model)
     view = floor_view(compiled, built.rooms, built.receptacles, episode)
@@ -137,10 +137,10 @@ def check_episode_file(path: Path, house: str | None = None, load: Load = Catalo
         found += check_overlaps(episode, scene.model, scene.index.geom_owner)
         found += check_reach(episode, built.navigable)
     facts = {"house": catalogue.name, "objects": str(len(episode.objects)), "seed": str(episode.seed)}
-    return Report("episode", str(path), tuple(found), facts, (view,))
+    return CheckReport("episode", str(path), tuple(found), facts, (view,))
 
 
-def _check_model(path: Path, load: Load) -> Report:
+def _check_model(path: Path, load: Load) -> CheckReport:
     """Check an MJCF file by the body that it has."""
     if not path.is_file():
         raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
@@ -153,17 +153,17 @@ def _check_model(path: Path, load: Load) -> Report:
         return check_house_name(str(path.with_name(CATALOGUE)), load)
     compiled = compile_model(f"{kind} {path.stem}", path)
     if not isinstance(compiled, Compiled):
-        return Report(kind, str(path), tuple(compiled))
+        return CheckReport(kind, str(path), tuple(compiled))
     findings = rules(compiled)
     if not len(compiled.solid):
-        return Report(kind, str(path), tuple(findings))
+        return CheckReport(kind, str(path), tuple(findings))
     size = np.ptp(compiled.extent(compiled.solid), axis=0)
     facts = {
         "size": " x ".join(f"{s:.3f}" for s in size) + " m",
         "mass": f"{compiled.model.body_mass.sum():.3g} kg",
         "parts": f"{len(compiled.solid)} collide, {len(compiled.shown)} are seen",
     }
-    return Report(kind, str(path), tuple(findings), facts, side_views(compiled))
+    return CheckReport(kind, str(path), tuple(findings), facts, side_views(compiled))
 
 
 def _partial_view(catalogue: Catalogue) -> tuple[Drawing, ...]:

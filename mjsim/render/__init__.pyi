@@ -3,7 +3,7 @@ from .context import GlInfo as GlInfo, gl_info as gl_info
 from .labels import Labels as Labels
 from .markers import MarkerLike as MarkerLike
 from .pictures import (
-    FloorPlan as FloorPlan,
+    FloorPlanPicture as FloorPlanPicture,
     largest_scale as largest_scale,
     render_floorplan as render_floorplan,
     render_house_map as render_house_map,

@@ -1,7 +1,9 @@
 """Camera poses, and the projection that the rasteriser takes."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,6 +16,12 @@ from mjsim.values.person_parameters import PICTURE_ASPECT
 # Nearer than any surface gets to an eye inside a body of radius 0.2 m; farther than any view indoors.
 NEAR = 0.04
 FAR = 100.0
+# Metres; far above rounding in single precision, far below what would cost time.
+_MARGIN = 0.01
+# The rasteriser draws nothing for it.
+_NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)
+# Comparing with the enumeration itself takes ten times as long.
+_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,3 +120,55 @@ def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) 
     if camera == EYE and aspect != PICTURE_ASPECT:
         fovy = 2.0 * float(np.arctan(np.tan(fovy / 2.0) * PICTURE_ASPECT / aspect))
     return CameraPose(data.cam_xpos[index].copy(), rotation, fovy)
+
+
+class Bounds(NamedTuple):
+    """What the geoms of a model fill, each in its own frame."""
+
+    radii: NDArray[np.float64]  # of spheres around their origins, m, (ngeom,); 0 means unbounded
+    boxes: NDArray[np.float64]  # centres and half-sizes of boxes, m, (ngeom, 6)
+
+    @classmethod
+    def of(cls, model: Any) -> "Bounds":
+        """Those of a model. The engine takes all planes for infinite, but draws those with a size as rectangles."""
+        radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
+        plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+        finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
+        half = model.geom_size[finite, :2]
+        radii[finite] = np.hypot(*half.T)
+        boxes[finite] = np.pad(half, ((0, 0), (3, 1)))
+        return cls(radii, boxes)
+
+
+def outside(
+    view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which spheres (n,) are wholly outside a view; a radius of 0 means unbounded. Some near corners are kept."""
+    right, up, backward = ((centres - view.position) @ view.rotation).T
+    ahead, reach = -backward, radii + _MARGIN
+    vertical, horizontal = view.half_height, view.half_height * aspect
+    apart = (ahead + reach < view.near) | (ahead - reach > view.far)
+    for offset, half in ((right, horizontal), (up, vertical)):
+        if view.orthographic:
+            apart |= np.abs(offset) - half > reach
+        else:
+            # Signed distance to the nearer side plane of the pyramid, times the length of its normal.
+            apart |= np.abs(offset) - half * ahead > reach * np.hypot(1.0, half)
+    return np.asarray(apart & (radii > 0.0))
+
+
+@contextmanager
+def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
+    """Draw a scene without the model geoms whose ids `hidden` (ngeom,) marks."""
+    geoms = scene.geoms[: scene.ngeom]
+    # Geoms of other origin index the extra entry at the end.
+    owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]
+    chosen = [geoms[index] for index in np.flatnonzero(np.append(hidden, False)[owners])] if owners else []
+    types = [geom.type for geom in chosen]
+    try:
+        for geom in chosen:
+            geom.type = _NOTHING
+        yield
+    finally:
+        for geom, kept in zip(chosen, types, strict=True):
+            geom.type = kept

@@ -19,7 +19,7 @@ from typing import Any
 
 import mujoco
 
-from mjsim.support.gl_choice import BACKENDS, DEFAULT, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.support.environment import BACKENDS, DEFAULT, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
 from mjsim.values.errors import RenderError
 
 EGL_REMEDY = (

@@ -9,8 +9,16 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjsim.support.conflicts import PACKAGES, hidden_package, shared_names
-from mjsim.support.gl_choice import BACKENDS, DISABLED, EGL_PACKAGES, VARIABLE, chosen_gl
+from mjsim.support.environment import (
+    BACKENDS,
+    DISABLED,
+    EGL_PACKAGES,
+    PACKAGES,
+    VARIABLE,
+    chosen_gl,
+    hidden_package,
+    shared_names,
+)
 from mjsim.values.errors import RenderError
 
 if TYPE_CHECKING:

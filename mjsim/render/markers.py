@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import outside
+from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024

@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import Bounds
+from mjsim.render.cameras import Bounds, ViewVolume
 from mjsim.support.kernels import inlined, kernel
 
 # Both in-plane half-sizes of a box that is worth testing against, m.

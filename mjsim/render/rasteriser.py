@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.render import context
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import Bounds, outside, without
+from mjsim.render.cameras import Bounds, ViewVolume, outside, without
 from mjsim.render.markers import MAX_MARKERS, MarkerLike, add_markers, blend_hidden, in_view
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.profiles import RenderProfile

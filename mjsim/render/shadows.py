@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import outside
+from mjsim.render.cameras import ViewVolume, outside
 from mjsim.render.markers import add_decorative_geom
 
 # Material of the house with a round texture whose alpha fades outwards; without it there are no spots.

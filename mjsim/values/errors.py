@@ -51,7 +51,8 @@ class PhysicsError(MjsimError):
     """MuJoCo warned, or a state is not finite.
 
     Attributes:
-        steps: The control steps of the action (`mjsim.values.steps.Steps`), the last of which failed; None before it.
+        steps: Control steps of the action (`mjsim.values.observation.Steps`), the last of which failed. None if the
+            action had not started.
     """
 
     steps: Any = None

@@ -1,10 +1,16 @@
 """What the augmented-reality system observes: the whole state of the house (PAPER section 1)."""
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mjsim.values.actions import StepAction
+
+_HEALTH = 7  # numbers of a `HealthSample`
 
 
 class ObjectStatus(enum.Enum):
@@ -55,3 +61,58 @@ class Observation:
     def names_with(self, status: ObjectStatus) -> tuple[str, ...]:
         """Instance names of the objects that have `status`, in the episode's order."""
         return tuple(n for n, s in zip(self.object_names, self.object_status, strict=True) if s is status)
+
+
+class StepStates(NamedTuple):
+    """The states that n control steps led to, one per row, for kernels to fill."""
+
+    time: NDArray[np.float64]  # simulated time, s, shape (n,)
+    position: NDArray[np.float64]  # the person's floor positions, m, shape (n, 2)
+    heading: NDArray[np.float64]  # yaw of the body, rad, shape (n,)
+    pitch: NDArray[np.float64]  # pitch of the head, rad, shape (n,)
+    object_position: NDArray[np.float64]  # object origins, m, shape (n, k, 3)
+    object_quaternion: NDArray[np.float64]  # orientations wxyz, shape (n, k, 4)
+    state_hash: NDArray[np.uint64]  # `World.state_hash` after each step, shape (n,)
+    health: NDArray[np.float64]  # rows of `HealthSample` after each step, shape (n, 7)
+
+    @classmethod
+    def empty(cls, steps: int, objects: int) -> "StepStates":
+        """Arrays for `steps` control steps, not yet filled."""
+        return cls(
+            time=np.empty(steps),
+            position=np.empty((steps, 2)),
+            heading=np.empty(steps),
+            pitch=np.empty(steps),
+            object_position=np.empty((steps, objects, 3)),
+            object_quaternion=np.empty((steps, objects, 4)),
+            state_hash=np.empty(steps, np.uint64),
+            health=np.empty((steps, _HEALTH)),
+        )
+
+    @classmethod
+    def of(
+        cls, seen: Sequence[Observation], state_hashes: Sequence[int], health: Sequence[tuple[float, ...]]
+    ) -> "StepStates":
+        """The states that were observed."""
+        return cls(
+            time=np.array([o.time for o in seen]),
+            position=np.array([o.position for o in seen]),
+            heading=np.array([o.heading for o in seen]),
+            pitch=np.array([o.pitch for o in seen]),
+            object_position=np.array([o.object_positions for o in seen]),
+            object_quaternion=np.array([o.object_quaternions for o in seen]),
+            state_hash=np.array(state_hashes, np.uint64),
+            health=np.array(health),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Control steps that were taken."""
+
+    # the action of every step, or their moves: forward, left (m/s), turn and look (rad/s), shape (n, 4)
+    actions: StepAction | NDArray[np.float64]
+    passed: StepStates | None = None  # the states between the steps, n - 1 of them; None for a single step
+
+    def __len__(self) -> int:
+        return 1 if self.passed is None else len(self.passed.time) + 1

@@ -22,11 +22,10 @@ from mjsim.values.actions import (
     WorldEvent,
 )
 from mjsim.values.errors import PhysicsError, StateError
-from mjsim.values.observation import Observation
+from mjsim.values.observation import Observation, Steps
 from mjsim.values.options import WorldOptions
-from mjsim.values.steps import Steps
 from mjsim.world.fidelity import make_tier
-from mjsim.world.health.values import Health, HealthSample
+from mjsim.world.health.monitor import Health, HealthSample
 from mjsim.world.state import WorldState
 from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED
 from mjsim.world.walking.walker import BACK_OFF, Walker

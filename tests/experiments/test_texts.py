@@ -25,8 +25,8 @@ from hud.theme import ITEM
 from mjsim.generator.furnish import _NAMES
 from mjsim.generator.furniture.catalogue import KINDS as FURNITURE
 from mjsim.generator.programme import NEEDS
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.values.errors import AssetError
 
 LANGUAGES = sorted(path.stem for path in TEXTS.glob("*.toml"))

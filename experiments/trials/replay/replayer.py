@@ -19,8 +19,8 @@ from experiments.session.viewer import Viewer
 from experiments.trials.replay.log_source import LogSource
 from mjsim.house.scene.scene import compose
 from mjsim.values.errors import ActionError, PhysicsError, StateError
+from mjsim.values.observation import Steps
 from mjsim.values.options import WorldOptions
-from mjsim.values.steps import Steps
 from mjsim.world.world import World
 from planner.regret import RegretEvaluator
 from planner.service import Planner

@@ -7,8 +7,7 @@ import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
-from mjsim.environments.observation_layout import ObservationLayout
-from mjsim.environments.sensors.base import Sensor, SensorInput, unit_spec
+from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInput, unit_spec
 
 MAP_SIZE = 64
 RAYS = 24

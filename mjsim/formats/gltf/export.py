@@ -21,7 +21,7 @@ from mjsim.formats.gltf.surfaces import Surface, drawn_scene, surfaces
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import RoomMap
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene, assemble
 from mjsim.render import shadows

@@ -8,7 +8,7 @@ import numpy as np
 
 from mjsim.formats.gltf.glb import Look
 from mjsim.formats.gltf.surfaces import Surface
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import RoomMap
 
 _HEAVY = 50_000  # triangles of a look from which it is worth a draw call in every room
 _CELL = 16.0  # m; its positions are quantised to 0.25 mm

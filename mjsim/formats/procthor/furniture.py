@@ -19,9 +19,9 @@ from mjsim.generator.furniture.look import draw_look
 from mjsim.generator.furniture.piece import flattened
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.values import Asset
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.generated_names import stream
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import read_json, read_text
-from mjsim.support.random_streams import stream
 from mjsim.values.errors import AssetError, brief
 
 DATABASE = "asset-database.json"  # of ProcTHOR: types and sizes of its assets

@@ -19,7 +19,7 @@ from mjsim.generator.files import used_materials
 from mjsim.generator.palette import surfaces
 from mjsim.generator.programme import use_of
 from mjsim.generator.values import WALL, FloorPlan, Rectangle, Room
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.validation.object_rules import SIZE
 
 SUFFIXES = (".json",)

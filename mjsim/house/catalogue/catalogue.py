@@ -7,10 +7,8 @@ from typing import Annotated, Any, TypeVar
 
 import msgspec
 
-from mjsim.house.catalogue.assets import models_root
-from mjsim.house.catalogue.files import catalogue_file, read_tables
-from mjsim.house.catalogue.house_ref import HouseRef, parse_house
-from mjsim.house.catalogue.labels import Label, read_labels
+from mjsim.house.catalogue.files import Label, catalogue_file, read_labels, read_tables
+from mjsim.house.catalogue.house_ref import HouseRef, models_root, parse_house
 from mjsim.house.catalogue.model_files import content_hash
 from mjsim.support.files import is_file
 from mjsim.values.episode import POINTS
@@ -141,7 +139,7 @@ class Catalogue:
                 or used twice; the message names the culprit.
         """
         tables, text = read_tables(house)
-        return _Reader(catalogue_file(house), tables).catalogue(house, text)
+        return _CatalogueReader(catalogue_file(house), tables).catalogue(house, text)
 
 
 _Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
@@ -182,7 +180,7 @@ class _CategoryEntry(msgspec.Struct):
     objects: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)]
 
 
-class _Reader:
+class _CatalogueReader:
     """The tables of a catalogue; every error names the file and the entry."""
 
     def __init__(self, path: Path, raw: dict[str, Any]) -> None:

@@ -1,12 +1,17 @@
 """Names of generated homes: a seed, a number of rooms, and the version of the generator."""
 
+import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlencode
 
-from mjsim.support.random_streams import stream
 from mjsim.values.errors import HouseError
+
+if TYPE_CHECKING:
+    import numpy as np
+
 
 PREFIX = "generated:"
 VERSION = 3  # of the generator; raise it with every change that alters the home of a seed
@@ -97,3 +102,12 @@ def check_version(version: int, subject: str) -> None:
 
 def _default_rooms(seed: int) -> int:
     return 1 + int(stream(seed, "rooms").choice(len(_SHARES), p=_SHARES))
+
+
+def stream(seed: int, *purpose: str) -> "np.random.Generator":
+    """The generator of a purpose, such as `stream(7, "furniture", "bedroom")`: the same in every process and order."""
+    import numpy as np  # here, as names of houses are read before anything is simulated: --help starts fast
+
+    digest = hashlib.sha256("/".join(purpose).encode()).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.generated_names import is_generated, parse_name
 from mjsim.support.files import is_file
+from mjsim.values.errors import AssetError
 
 CATALOGUE = "catalogue.toml"
 
@@ -55,3 +55,17 @@ def parse_house(house: str, folder: Path = Path()) -> HouseRef:
         if not house or not (is_path or (is_file(path) and not is_file(shipped))):
             return HouseRef("shipped", house, shipped)
     return HouseRef("folder", str(path), path)
+
+
+def models_root() -> Path:
+    """Folder that holds `houses/`, `receptacles/` and `objects/`; `AssetError` where there is none.
+
+    An installed wheel carries it inside the package; a checkout has it beside the package.
+    """
+    package = Path(__file__).resolve().parents[2]
+    candidates = (package / "models", package.parent / "models")
+    for candidate in candidates:
+        if (candidate / "houses").is_dir():
+            return candidate
+    looked = " or ".join(str(c) for c in candidates)
+    raise AssetError(f"no models folder at {looked}; reinstall mjsim, or run it from a full checkout")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import mujoco
 
-from mjsim.house.catalogue.assets import models_root
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import is_file, read_bytes
 from mjsim.values.errors import AssetError
 

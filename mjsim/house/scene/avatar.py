@@ -21,13 +21,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.house.scene.hand_look import draw_hand
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
 STATIC_BIT = 1
 OBJECT_BIT = 4
-
 PREFIX = "avatar/"
 BASE = "avatar/base"  # slides along x and y
 SOLE = "avatar/sole"  # fixed to the base; collides with objects
@@ -39,7 +37,6 @@ FOOT = "avatar/foot"
 HANDS = ("left", "right")
 GRIPS = (0, 1)
 GENTLE, FIRM = "gentle", "firm"  # how a hand holds
-
 SIDES = 64  # of the prisms of trunk and foot
 # Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
 # of the object's weight, so that a person steps over an object which a wall holds back. The high damping ties the
@@ -55,13 +52,14 @@ TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
 HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
-
 # Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object
 # upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by less
 # than 2 degrees even when the object brushes a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
-
 _TORQUESCALE = 10  # index in a weld's data
+_VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
+_GLOVE = (0.93, 0.74, 0.22, 1.0)
+_SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
@@ -269,3 +267,34 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
                 solimp=[low, high, 0.001, 0.5, 2.0],
             )
             weld.data[_TORQUESCALE] = torque
+
+
+def draw_hand(node: Any, name: str, side: float) -> None:
+    """A cleaning glove and a sleeve, which collide with nothing; `side` is 1 for the left, -1 for the right hand."""
+
+    def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
+        node.add_geom(
+            name=f"{name}_{part}",
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            size=[radius, 0, 0],
+            fromto=list(ends),
+            rgba=list(rgba),
+            **_VISUAL,
+        )
+
+    node.add_geom(
+        name=f"{name}_palm",
+        type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+        size=[0.046, 0.040, 0.019],
+        pos=[-0.012, 0, 0.030],
+        rgba=list(_GLOVE),
+        **_VISUAL,
+    )
+    for i in range(4):
+        y = side * (0.030 - 0.020 * i)
+        x = 0.052 - 0.006 * abs(i - 1)
+        capsule(f"finger_{i}", _GLOVE, 0.0095, 0.02, y, 0.030, x, y, 0.008)
+        capsule(f"tip_{i}", _GLOVE, 0.0088, x, y, 0.008, x - 0.004, y, -0.022)
+    capsule("thumb", _GLOVE, 0.0105, -0.03, -side * 0.030, 0.024, 0.012, -side * 0.048, -0.012)
+    capsule("cuff", _GLOVE, 0.033, -0.045, 0, 0.034, -0.080, side * 0.012, 0.034)
+    capsule("sleeve", _SLEEVE, 0.036, -0.080, side * 0.012, 0.034, -0.150, side * 0.040, 0.030)

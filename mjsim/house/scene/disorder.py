@@ -21,7 +21,7 @@ class _Count(msgspec.Struct):
     episodes: Annotated[int, msgspec.Meta(ge=1)]
 
 
-class _File(msgspec.Struct):
+class _DisorderFile(msgspec.Struct):
     misplaced: list[_Count]
     distances: list[Annotated[float, msgspec.Meta(ge=0.0)]]
 
@@ -42,7 +42,7 @@ class Disorder:
     def load(cls, path: Path) -> "Disorder":
         """Read the `disorder.json` of `mjsim import episodes`; `EpisodeError` where it cannot be read."""
         try:
-            found = msgspec.json.decode(read_text(path), type=_File)
+            found = msgspec.json.decode(read_text(path), type=_DisorderFile)
         except (OSError, UnicodeDecodeError, msgspec.MsgspecError) as error:
             raise EpisodeError(brief(f"cannot read disorder {path}: {error}")) from error
         counts = tuple(c.objects for c in found.misplaced for _ in range(c.episodes))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.navigable import NavigablePoints
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.house import NavigablePoints
+from mjsim.house.compiled.sites import RoomMap
 from mjsim.house.scene.avatar import PREFIX, TRUNK
 from mjsim.house.validation.findings import Finding
 from mjsim.values.episode import Episode, PlacedObject

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.compiled.house import compiled_house, navigable_floor
-from mjsim.house.compiled.navigable import NavigablePoints
+from mjsim.house.compiled.house import NavigablePoints, compiled_house, navigable_floor
 from mjsim.house.scene.disorder import Disorder
 from mjsim.house.scene.settling import settle
 from mjsim.house.validation.validate import require_usable

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.bounding_volumes import tighten
 from mjsim.house.compiled.house import compile_errors, compiled_house
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.scene.avatar import attach_avatar
 from mjsim.house.scene.episode_rules import check_fit, check_overlaps, check_poses
 from mjsim.house.validation.findings import Finding, errors, one_line

@@ -25,7 +25,7 @@ _OPAQUE = 0.99  # alpha
 _MARGIN = 1e-6  # m
 
 
-class _Walls(NamedTuple):
+class _WallSegments(NamedTuple):
     """Opaque boxes that never move, the largest first: centres, axes as columns, and half extents, m."""
 
     centers: Floats  # (w, 3)
@@ -33,7 +33,7 @@ class _Walls(NamedTuple):
     half_sizes: Floats  # (w, 3)
 
 
-class _Grid(NamedTuple):
+class _VisibilityGrid(NamedTuple):
     """What can be seen from where, as far as it is known."""
 
     origin: Floats  # corner of the first cell, and the height of the eyes, m, (3,)
@@ -58,7 +58,7 @@ class Foresight:
         self._width = math.tan((field_of_view or person.field_of_view) / 2.0)
         low, high = _extent(self._walls, self._stride + 1.0)
         rows, columns = (math.ceil(length / CELL) for length in high - low)
-        self._grid = _Grid(
+        self._grid = _VisibilityGrid(
             np.array([*low, person.eye_height]),
             np.full((rows, columns, len(self._radii)), _UNKNOWN, np.int8),
         )
@@ -102,12 +102,12 @@ def _balls(scene: Scene) -> tuple[Floats, Floats]:
     return offsets, radii
 
 
-def _opaque_walls(scene: Scene) -> _Walls:
+def _opaque_walls(scene: Scene) -> _WallSegments:
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
-    return _Walls(*large_boxes(scene, _OPAQUE))
+    return _WallSegments(*large_boxes(scene, _OPAQUE))
 
 
-def _extent(walls: _Walls, margin: float) -> tuple[Floats, Floats]:
+def _extent(walls: _WallSegments, margin: float) -> tuple[Floats, Floats]:
     """Corners of the floor that the walls cover, with a margin, m, each (2,)."""
     if not len(walls.centers):
         return np.full(2, -margin), np.full(2, margin)
@@ -138,8 +138,8 @@ def _may_see(
     stride: float,
     centers: Floats,
     radii: Floats,
-    walls: _Walls,
-    grid: _Grid,
+    walls: _WallSegments,
+    grid: _VisibilityGrid,
 ) -> Mask:
     """Which objects are within an angle, rad, of the gaze, and in sight from a cell that the eye can get to.
 
@@ -177,7 +177,7 @@ def _may_see(
 
 
 @kernel
-def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _Walls) -> int:
+def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
     """`_OPEN` if no wall hides the middle of a ball, or its left, right, upper or lower end; else `_HIDDEN`."""
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
@@ -196,7 +196,7 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _Walls) ->
 
 
 @kernel
-def _is_blocked(start: Floats, end: Floats, reach: float, walls: _Walls) -> bool:
+def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
     """Whether the first share `reach` of the way between two points (3,), m, leads into a wall."""
     for w in range(len(walls.centers)):
         enter, leave = 0.0, reach

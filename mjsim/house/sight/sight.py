@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mjsim.house.compiled.rays import DRAWN, RIM, Floats, Mask, first_hit, moving_geoms
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.house.scene.scene import Scene
 from mjsim.house.sight.drawn_state import drawn_state
 from mjsim.support.kernels import kernel

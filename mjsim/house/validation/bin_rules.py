@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from mjsim.house.compiled.rays import first_hit, receptacle_in_sight
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import WalkableFloor

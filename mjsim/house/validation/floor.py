@@ -7,10 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.clearance import ClearanceField
-from mjsim.house.compiled.navigable import NavigableFloor
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.footprint import ClearanceField
+from mjsim.house.compiled.house import NavigableFloor
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.validation.checked_model import Compiled
 
 BODY_BAND = (0.05, 1.8)  # m, heights in which a person bumps into things

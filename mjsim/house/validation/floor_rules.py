@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
-from mjsim.house.compiled.clearance import ClearanceField
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.footprint import ClearanceField
+from mjsim.house.compiled.sites import RoomMap
 from mjsim.house.validation.bin_rules import check_bins
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.house.validation.findings import Finding

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import TIMESTEP
-from mjsim.house.compiled.rooms import PREFIX, RoomMap
+from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.house.validation.checked_model import (
     Compiled,
     check_contact_bits,

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from mjsim.house.compiled.footprint import outline_points
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.values.episode import Episode
 from mjsim.values.errors import AssetError

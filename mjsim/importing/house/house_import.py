@@ -31,7 +31,7 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.formats.sdf import SUFFIXES as SDF
 from mjsim.formats.sdf import read_sdf
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.check import Report, check_house_name
+from mjsim.house.check import CheckReport, check_house_name
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.importing.house.bins import place_bins
 from mjsim.importing.house.look import make_looks
@@ -53,7 +53,7 @@ _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height
 
 def import_house(
     source: Path, out: Path, options: HouseOptions, *, label: str | None = None, force: bool = False
-) -> tuple[tuple[ImportDecision, ...], Report]:
+) -> tuple[tuple[ImportDecision, ...], CheckReport]:
     """Make a house of a scene, in a new folder; returns what was decided and the report of the check.
 
     Raises:

@@ -12,9 +12,8 @@ import trimesh
 
 from mjsim.formats.scene.source_scene import Bin
 from mjsim.formats.scene.surface import Floats
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.catalogue.house_ref import CATALOGUE
+from mjsim.house.catalogue.house_ref import CATALOGUE, models_root
 from mjsim.importing.house.look import DrawnMesh, picture_key
 from mjsim.importing.house.plan import Plan
 from mjsim.importing.house.rooms import Rooms

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene

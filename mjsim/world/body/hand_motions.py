@@ -10,10 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.support.kernels import kernel
 from mjsim.values.options import REST_STEPS
-from mjsim.world.body.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
+from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.person import Motion, Person, Steps, wrap
 from mjsim.world.body.slots import Slot, best_slot, load_extent, object_corners
 

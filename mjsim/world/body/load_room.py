@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.clearance import ClearanceField, clearance_at
+from mjsim.house.compiled.footprint import ClearanceField, clearance_at
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
 

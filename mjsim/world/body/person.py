@@ -17,9 +17,8 @@ from mjsim.values.motion_parameters import MotionParameters
 from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.body.grips import Grips
-from mjsim.world.body.hand_path import point_between
+from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, change_velocity, point_between
 from mjsim.world.body.postures import move_hand, posture_pace
-from mjsim.world.body.rate_limits import change_pitch, change_turn_rate, change_velocity
 from mjsim.world.body.rig import Rig
 
 # A motion sets the servos, yields once per control step, and returns whether it succeeded.

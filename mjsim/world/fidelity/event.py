@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 
 from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal, StepAction
-from mjsim.values.observation import Observation
+from mjsim.values.observation import Observation, Steps, StepStates
 from mjsim.values.options import WorldOptions
-from mjsim.values.steps import States, Steps
 from mjsim.world.fidelity.body_state import PITCH, VX, VY, X
 from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import TIME
 from mjsim.world.fidelity.kinematic_world import MAX_ROWS, KinematicWorld
 from mjsim.world.fidelity.motion_planner import MotionPlanner, PlannedMotion
 from mjsim.world.fidelity.tier import Tier
-from mjsim.world.health.values import Health, HealthSample
+from mjsim.world.health.monitor import Health, HealthSample
 from mjsim.world.state import WorldState
 from mjsim.world.walking.path_following import Walk
 
@@ -168,7 +167,7 @@ class Event(Tier):
             self._motion = ActiveMotion(self._planner.plan(result, hand, item), result, hand, item)
         return result
 
-    def _play(self, motion: ActiveMotion, until: int) -> States | None:
+    def _play(self, motion: ActiveMotion, until: int) -> StepStates | None:
         """Play a motion up to control step `until`, and report the events of the last one."""
         plan, state, item = motion.plan, self.episode_state, motion.item
         before = float(plan.trajectory.vectors[until - 2, TIME]) if until > 1 else self.time

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.actions import EventKind
 from mjsim.values.options import REST_STEPS
 from mjsim.world.body.rig import RigState

@@ -25,10 +25,8 @@ from mjsim.world.body.grips import Grips
 from mjsim.world.body.hand_motions import pick, place
 from mjsim.world.body.person import Motion, Person
 from mjsim.world.body.rig import Rig
-from mjsim.world.fidelity.episode_state import EpisodeState
-from mjsim.world.fidelity.tier import Tier
-from mjsim.world.health.monitor import HealthMonitor
-from mjsim.world.health.values import Health, HealthSample
+from mjsim.world.fidelity.tier import EpisodeState, Tier
+from mjsim.world.health.monitor import Health, HealthMonitor, HealthSample
 from mjsim.world.state import PersonState, StateHash, WorldState, set_physics, take_physics
 
 # The next object may push a delivered one a little; farther out than this it has left its receptacle.

@@ -6,11 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.clearance import ClearanceField
-from mjsim.house.compiled.footprint import Floor
+from mjsim.house.compiled.footprint import ClearanceField, Floor
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import CarryingParameters
-from mjsim.values.steps import States
+from mjsim.values.observation import StepStates
 from mjsim.world.body.load_room import BodyMotion
 from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
 from mjsim.world.fidelity import kinematics
@@ -61,7 +60,7 @@ class KinematicModel(NamedTuple):
 
 
 @kernel
-def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: States) -> None:
+def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: StepStates) -> None:
     """One control step per row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
     body = state.vector[BODY:HANDS]
     for row in range(len(moves)):
@@ -72,7 +71,12 @@ def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows:
 
 @kernel
 def follow_rows(
-    walk: Walk, progress: Floats, state: KinematicState, model: KinematicModel, moves: Floats, rows: States
+    walk: Walk,
+    progress: Floats,
+    state: KinematicState,
+    model: KinematicModel,
+    moves: Floats,
+    rows: StepStates,
 ) -> tuple[int, int]:
     """Walk along a path until the walk has to stop; fills moves (n, 4) and rows.
 
@@ -161,7 +165,7 @@ def carry(state: KinematicState, model: KinematicModel) -> None:
 
 
 @kernel
-def write_row(row: int, state: KinematicState, rows: States) -> None:
+def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
     """Write the present state into a row."""
     vector = state.vector
     rows.time[row] = vector[TIME]

@@ -10,8 +10,8 @@ from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.values.errors import StateError
 from mjsim.values.inventory import LEFT
+from mjsim.values.observation import StepStates
 from mjsim.values.options import WorldOptions
-from mjsim.values.steps import States
 from mjsim.world.body.grips import AWAKE
 from mjsim.world.fidelity.body_state import LOOK
 from mjsim.world.fidelity.full import Full
@@ -71,7 +71,7 @@ class KinematicWorld:
             goals=np.zeros((2, 3)),
         )
         self._body = self.state.vector[BODY:HANDS]
-        self._rows = States.empty(MAX_ROWS, len(scene.index.names))
+        self._rows = StepStates.empty(MAX_ROWS, len(scene.index.names))
 
     @property
     def time(self) -> float:
@@ -143,27 +143,27 @@ class KinematicWorld:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
 
-    def walk(self, moves: NDArray[np.float64]) -> States | None:
+    def walk(self, moves: NDArray[np.float64]) -> StepStates | None:
         """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s; the states between them."""
         walk_rows(moves, self.state, self.model, self._rows)
         return self._passed(len(moves))
 
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int
-    ) -> tuple[int, NDArray[np.float64], States | None]:
+    ) -> tuple[int, NDArray[np.float64], StepStates | None]:
         """Walk along a path: the latest phase, the moves made, shape (n, 4), and the states between them."""
         moves = np.empty((min(limit, MAX_ROWS), 4))
         count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
         return phase, moves[:count], self._passed(count)
 
-    def play(self, trajectory: MotionTrajectory, start: int, end: int) -> States | None:
+    def play(self, trajectory: MotionTrajectory, start: int, end: int) -> StepStates | None:
         """Go through the control steps `start` to `end` of a trajectory; the states between them."""
         play_rows(trajectory, start, end, self.state, self._rows)
         return self._passed(end - start)
 
-    def _passed(self, count: int) -> States | None:
+    def _passed(self, count: int) -> StepStates | None:
         """The states between `count` control steps that were just taken."""
-        return None if count < 2 else States._make(column[: count - 1].copy() for column in self._rows)
+        return None if count < 2 else StepStates._make(column[: count - 1].copy() for column in self._rows)
 
     def state_hash(self) -> int:
         """64 bits that differ whenever the state differs (up to chance)."""

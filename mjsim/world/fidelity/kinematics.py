@@ -18,7 +18,7 @@ from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.options import WorldOptions
-from mjsim.world.body import rate_limits
+from mjsim.world.body import motion_profiles
 from mjsim.world.fidelity.body_state import (
     FORWARD,
     HEADING,
@@ -113,17 +113,17 @@ def command(
     `advance` carries them out. The body has the shape (BODY_SIZE,).
     """
     motion = body[FORWARD:SERVO]
-    rate_limits.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
-    rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
-    rate_limits.change_pitch(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
+    motion_profiles.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
+    motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    motion_profiles.change_pitch(motion, look, gait.max_look, gait.lowest, gait.highest, gait.dt)
 
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
     """Slew the walk of a body, shape (BODY_SIZE,), to a stand and its yaw rate towards `turn`, rad/s."""
     motion = body[FORWARD:SERVO]
-    rate_limits.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
-    rate_limits.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
+    motion_profiles.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
+    motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
 
 
 @kernel

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.actions import ActionResult, EventKind, Place
 from mjsim.world.body.hand_motions import hover_height, square_heading
-from mjsim.world.body.hand_path import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.load_room import BodyMotion
+from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.slots import LoadExtent, Slot, best_slot, object_corners
 from mjsim.world.fidelity import motion_primitives
 from mjsim.world.fidelity.body_state import FORWARD, HEADING, X, Y

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import MotionParameters
-from mjsim.values.steps import States
-from mjsim.world.body.hand_path import progress
+from mjsim.values.observation import StepStates
+from mjsim.world.body.motion_profiles import progress
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity.body_state import (
     FORWARD,
@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 
 
 class MotionTrajectory(NamedTuple):
-    """States of a motion that was worked out before it is played, one per control step."""
+    """StepStates of a motion that was worked out before it is played, one per control step."""
 
     vectors: Floats  # `KinematicState.vector` after each step, shape (max, STATE_SIZE)
     poses: Floats  # poses of the objects, m and wxyz, shape (max, n, 7)
@@ -72,7 +72,7 @@ class HandMovement(NamedTuple):
     goal: Floats  # where it ends, m, shape (3,)
     in_house: bool  # whether the goal is in the frame of the house, else in that of the body
     steps: int  # control steps that it takes
-    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.world.body.hand_path`
+    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.world.body.motion_profiles`
     gaze: Floats  # point of the house to glance at, m, shape (3,); or NaN, NaN and the pitch to look to, rad
 
 
@@ -86,7 +86,7 @@ def _append(trajectory: MotionTrajectory, state: KinematicState) -> None:
 
 @kernel
 def play_rows(
-    trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: States
+    trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: StepStates
 ) -> None:
     """Take the state through the control steps `start` to `end` of a trajectory."""
     for row in range(start, end):

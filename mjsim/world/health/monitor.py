@@ -7,6 +7,7 @@ counted, and reported as an event.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -21,11 +22,63 @@ from mjsim.world.body.rig import Rig
 from mjsim.world.health.anomalies import CHECK_DISTANCE, AnomalyDetector, AnomalyState
 from mjsim.world.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
 from mjsim.world.health.settle_times import SettleTimer, SettleTimerState
-from mjsim.world.health.values import QUIET, Health, HealthSample
 
 _KICK = 2.0  # times the walking speed: a light object that bounces off a walking person
 _FALL = 5.6  # m/s, from the height at which objects are carried
 _NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
+Pair = tuple[float, float]
+NOTHING: Pair = (math.nan, math.nan)
+
+
+class HealthSample(NamedTuple):
+    """The physics at the end of one control step.
+
+    Attributes:
+        penetration_m: Deepest overlap of an object with anything but the person, m. The person's foot is left out
+            because it is soft on purpose: it pushes and never launches.
+        trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
+        weld_error_m: Distance between each hand and the grip that it carries, m; NaN where it carries nothing.
+        weld_error_rad: Angle between each hand and the grip that it carries, rad; NaN where it carries nothing.
+        settle_s: Time from release to rest of an object that has come to rest in this step, the longest if there
+            are several, s; NaN if there is none.
+    """
+
+    penetration_m: float = 0.0
+    trunk_penetration_m: float = 0.0
+    weld_error_m: Pair = NOTHING
+    weld_error_rad: Pair = NOTHING
+    settle_s: float = math.nan
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Seven numbers in the order of the attributes, left hand before right."""
+        overlaps = (self.penetration_m, self.trunk_penetration_m)
+        return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
+
+
+@dataclass(frozen=True)
+class Health:
+    """Extremes and counts since the last reset.
+
+    Attributes:
+        max_penetration_m: Largest `HealthSample.penetration_m`.
+        max_trunk_penetration_m: Largest `HealthSample.trunk_penetration_m`.
+        max_weld_error_m: Largest `HealthSample.weld_error_m`; 0 if nothing was carried.
+        max_weld_error_rad: Largest `HealthSample.weld_error_rad`; 0 if nothing was carried.
+        settle_times: Seconds from each release to rest, in order.
+        ejections: Objects that flew off, out of the house, or faster than anything can fall or be kicked.
+        tunnellings: Objects that passed through something solid.
+        warnings: Number of MuJoCo warnings; any one ends the simulation with a `PhysicsError`.
+    """
+
+    max_penetration_m: float = 0.0
+    max_trunk_penetration_m: float = 0.0
+    max_weld_error_m: float = 0.0
+    max_weld_error_rad: float = 0.0
+    settle_times: tuple[float, ...] = ()
+    ejections: int = 0
+    tunnellings: int = 0
+    warnings: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,3 +228,6 @@ def _not_finite_text(model: mujoco.MjModel, data: mujoco.MjData) -> str:
         f"the state is not finite at t = {data.time:.3f} s, first at {where!r}; reset the world, and replay the "
         "recorded actions up to this time to look at the cause"
     )
+
+
+QUIET = HealthSample()

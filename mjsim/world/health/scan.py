@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.house.compiled.house import compiled_house
-from mjsim.house.compiled.rooms import nearest_rectangle
+from mjsim.house.compiled.sites import nearest_rectangle
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.world.body.grips import site_angle, site_gap

@@ -20,9 +20,8 @@ from experiments.record.run_directory import run_directory
 from experiments.record.writer import RecordWriter
 from mjsim.values.actions import Move, Pick, Place
 from mjsim.values.episode import Episode, PlacedObject, StartPose
-from mjsim.values.observation import ObjectStatus, Observation
-from mjsim.values.steps import States, Steps
-from mjsim.world.health.values import HealthSample
+from mjsim.values.observation import ObjectStatus, Observation, Steps, StepStates
+from mjsim.world.health.monitor import HealthSample
 
 
 def observation(time=0.0, hands=(None, "b")):
@@ -130,7 +129,7 @@ def test_steps_taken_at_once_are_recorded_as_single_ones():
         for step in range(7)
     ]
     healths = [HealthSample(penetration_m=0.001 * step, weld_error_m=(math.nan, 0.1)) for step in range(7)]
-    passed = States.of(seen[2:6], range(2, 6), [h.row for h in healths[2:6]])
+    passed = StepStates.of(seen[2:6], range(2, 6), [h.row for h in healths[2:6]])
     single, at_once = new_writer(), new_writer()
     for writer in (single, at_once):
         writer.append(seen[0], healths[0], 0, Steps(Pick("b")))

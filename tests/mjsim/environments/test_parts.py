@@ -16,8 +16,8 @@ from mjsim.environments.control import MOVES, Continuous, Discrete
 from mjsim.environments.episodes import EpisodeCache, sample
 from mjsim.environments.options import EnvironmentOptions, build
 from mjsim.environments.rewards import TimeReward, potential
-from mjsim.house.compiled import navigable
-from mjsim.house.compiled.navigable import installed_builder
+from mjsim.house.compiled import house
+from mjsim.house.compiled.house import installed_builder
 from mjsim.values.actions import IDLE, Move, Pick, Place
 from mjsim.values.errors import ActionError, EnvironmentConfigError, PhysicsError, SamplingError
 from mjsim.values.options import WorldOptions
@@ -216,7 +216,7 @@ def test_the_number_of_objects_is_drawn_by_the_seed(catalogue, navmesh):
 
 def test_given_episodes_need_no_navigable_floor(open_floor, monkeypatch):
     core_of(open_floor).reset(5)  # the house is checked, which needs one, and only once
-    monkeypatch.setattr(navigable, "entry_points", lambda **_: ())
+    monkeypatch.setattr(house, "entry_points", lambda **_: ())
     core = core_of(open_floor)
     core.reset(5)
     assert core.world.scene.episode is open_floor
@@ -250,12 +250,12 @@ def test_the_installed_builder_is_the_planners():
     ("offers", "said"),
     [
         ([], "no installed package"),
-        ([EntryPoint("broken", "mjsim_nowhere:build", navigable.GROUP)], "mjsim_nowhere"),
-        ([EntryPoint("broken", "math:tangent", navigable.GROUP)], "tangent"),
+        ([EntryPoint("broken", "mjsim_nowhere:build", house.GROUP)], "mjsim_nowhere"),
+        ([EntryPoint("broken", "math:tangent", house.GROUP)], "tangent"),
     ],
 )
 def test_a_missing_builder_is_named(offers, said, monkeypatch):
-    monkeypatch.setattr(navigable, "entry_points", lambda **_: offers)
+    monkeypatch.setattr(house, "entry_points", lambda **_: offers)
     with pytest.raises(SamplingError, match=said):
         installed_builder()
 

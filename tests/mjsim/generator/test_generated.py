@@ -12,8 +12,8 @@ from experiments.trials.design import read_design
 from mjsim.generator.generated import generate, house_files
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import read_recipe
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.generated_names import VERSION, generated_names, parse_name, split_of
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.check import check_path
 from mjsim.house.scene.sampling import sample_episode
 from mjsim.values.errors import HouseError

@@ -95,7 +95,7 @@ def test_another_number_of_rooms_is_refused() -> None:
 
 
 def programmes() -> Iterator[frozenset[str]]:
-    from mjsim.support.random_streams import stream
+    from mjsim.house.catalogue.generated_names import stream
 
     for seed in range(60):
         yield frozenset(draw_programme(8, stream(seed, "programme")).areas)

@@ -8,9 +8,9 @@ import pytest
 
 from experiments.analysis.check_picture import draw_check
 from experiments.cli.main import main
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.check import Report
+from mjsim.house.catalogue.house_ref import models_root
+from mjsim.house.check import CheckReport
 from mjsim.house.scene.sampling import sample_episode
 from mjsim.house.validation.findings import Finding
 
@@ -73,7 +73,7 @@ def test_a_picture_cuts_no_finding_off(tmp_path):
     )
     heights = []
     for count in (1, 30):
-        draw_check(tmp_path / "faults.png", Report("house", "own", findings[:count]))
+        draw_check(tmp_path / "faults.png", CheckReport("house", "own", findings[:count]))
         image = cv2.imread(str(tmp_path / "faults.png"))
         heights.append(image.shape[0])
         assert (image[:, -15:] == 255).all() and (image[-10:] == 255).all()

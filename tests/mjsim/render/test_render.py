@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjsim.render import PROFILES, CameraPose, Renderer, RenderProfile, context
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import outside
+from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 # A room seen along +x: back wall at x = 4, a low partition at x = 2 on the right (y < 0), a tilted camera as well.

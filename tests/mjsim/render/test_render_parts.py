@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from mjsim.render import FAST, CameraPose, Renderer, RenderProfile
-from mjsim.render.cameras import ViewVolume
-from mjsim.render.culling import Bounds, outside
+from mjsim.render.cameras import Bounds, ViewVolume, outside
 from mjsim.render.occlusion import BoxOccluders
 from mjsim.render.rasteriser import Rasteriser, reduced
 

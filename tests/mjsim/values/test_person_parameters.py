@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from small_worlds import scene_of, world_of
 
 from experiments.house import WALL_GAP
-from mjsim.house.compiled.clearance import ClearanceField
+from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.scene import avatar
 from mjsim.house.sight.sight import FieldOfView, visible_objects
 from mjsim.render.cameras import camera_pose

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 
-import mjsim.house.catalogue.assets
+import mjsim.house.catalogue.house_ref
 from experiments.trials.trial_config import TrialConfig
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.house.catalogue.house_ref import models_root, parse_house
 from mjsim.values.errors import AssetError
 
 SHIPPED = models_root() / "houses" / "apartment" / "catalogue.toml"
@@ -112,14 +111,14 @@ def test_an_installed_package_prefers_the_models_it_carries(tmp_path, monkeypatc
     (tmp_path / "models" / "houses").mkdir(parents=True)
     (package / "models" / "houses").mkdir(parents=True)
     monkeypatch.setattr(
-        mjsim.house.catalogue.assets, "__file__", str(package / "house" / "catalogue" / "assets.py")
+        mjsim.house.catalogue.house_ref, "__file__", str(package / "house" / "catalogue" / "assets.py")
     )
     assert models_root() == (package / "models").resolve()
 
 
 def test_a_package_without_models_says_where_it_looked(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        mjsim.house.catalogue.assets,
+        mjsim.house.catalogue.house_ref,
         "__file__",
         str(tmp_path / "mjsim" / "house" / "catalogue" / "assets.py"),
     )

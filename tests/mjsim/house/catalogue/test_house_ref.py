@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from mjsim.generator.home_cache import ensured, load_catalogue
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
-from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.house.catalogue.house_ref import models_root, parse_house
 from mjsim.values.errors import AssetError, HouseError
 
 # name -> kind, name in records, which must never change

@@ -10,8 +10,7 @@ from shapely import affinity
 from small_worlds import edited, scene_of
 
 from mjsim.house.compiled.house import compiled_house
-from mjsim.house.compiled.receptacles import ReceptacleGeometry
-from mjsim.house.compiled.rooms import RoomMap
+from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.scene import avatar
 from mjsim.house.scene.scene import SceneIndex, compose
 from mjsim.values.errors import AssetError, EpisodeError

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_worlds import FLOOR, dropped, loose
 
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.validation.object_rules import check_object
 from mjsim.house.validation.receptacle_rules import check_receptacle
 from tools.authoring.objects import build_meshes

@@ -13,8 +13,8 @@ from house_scenes import write_glb, write_habitat, write_mjcf, write_obj, write_
 
 from experiments.cli import main as cli
 from mjsim.formats.scene.source_scene import HouseOptions
-from mjsim.house.catalogue.assets import models_root
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.checked_model import Compiled
 from mjsim.importing.house.house_import import import_house

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from small_worlds import do, scene_of, world_of
 
-from mjsim.house.compiled.clearance import ClearanceField, clearance_at
+from mjsim.house.compiled.footprint import ClearanceField, clearance_at
 from mjsim.house.compiled.house import compiled_house
 from mjsim.values.actions import IDLE, EventKind, Move, Pick, Place
 from mjsim.values.observation import ObjectStatus
-from mjsim.world.body.hand_path import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
+from mjsim.world.body.motion_profiles import ACROSS_FIRST, UP_FIRST, minimum_jerk, point_between
 from mjsim.world.body.slots import object_corners
 
 

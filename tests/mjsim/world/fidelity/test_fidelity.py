@@ -18,10 +18,9 @@ from mjsim.house.scene import avatar
 from mjsim.house.sight.sight import visible_objects
 from mjsim.values.actions import WAIT, EventKind, FollowPath, Move, Pick, Place, Stop, Wait
 from mjsim.values.errors import StateError
-from mjsim.values.observation import ObjectStatus
+from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.values.person_parameters import PersonParameters
-from mjsim.values.steps import States
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity import trunk_contact as trunk
 from mjsim.world.fidelity.body_state import X, Y, standing
@@ -63,7 +62,7 @@ def walk(world, moves):
         seen.append(world.step(Move(*row)).observation)
         hashes.append(world.state_hash())
         health.append(world.health_sample.row)
-    return States.of(seen, hashes, health)
+    return StepStates.of(seen, hashes, health)
 
 
 def face(world, x, y):
