@@ -1,15 +1,24 @@
-from .base import (
-    Choice as Choice,
-    Guidance as Guidance,
-    Participant as Participant,
-    ParticipantFactory as ParticipantFactory,
-    Percept as Percept,
-    Point as Point,
-    positions_of as positions_of,
-)
-from .behaviour import Parameter as Parameter
-from .follower import Follower as Follower
-from .looking import FullTurn as FullTurn
-from .nearest import Nearest as Nearest
-from .registry import participant as participant, participant_names as participant_names
-from .visit_executor import VisitExecutor as VisitExecutor
+from .base import Choice, Guidance, Participant, ParticipantFactory, Percept, Point, positions_of
+from .behaviour import Parameter
+from .follower import Follower
+from .looking import FullTurn
+from .nearest import Nearest
+from .registry import participant, participant_names
+from .visit_executor import VisitExecutor
+
+__all__ = [
+    "Choice",
+    "Follower",
+    "FullTurn",
+    "Guidance",
+    "Nearest",
+    "Parameter",
+    "Participant",
+    "ParticipantFactory",
+    "Percept",
+    "Point",
+    "VisitExecutor",
+    "participant",
+    "participant_names",
+    "positions_of",
+]

@@ -1,10 +1,4 @@
-from .phases.base import (
-    Again as Again,
-    Done as Done,
-    FormData as FormData,
-    FormPhase as FormPhase,
-    Page as Page,
-    Phase as Phase,
-    Visitor as Visitor,
-)
-from .plan import VisitPlan as VisitPlan
+from .phases.base import Again, Done, FormData, FormPhase, Page, Phase, Visitor
+from .plan import VisitPlan
+
+__all__ = ["Again", "Done", "FormData", "FormPhase", "Page", "Phase", "VisitPlan", "Visitor"]

@@ -1,6 +1,19 @@
-from .control import Continuous as Continuous, Discrete as Discrete
-from .core import ObservationDict as ObservationDict, Rearrangement as Rearrangement
-from .gymnasium_environment import RearrangeEnv as RearrangeEnv
-from .options import EnvironmentOptions as EnvironmentOptions
-from .rewards import TimeReward as TimeReward
-from .sensors.base import Sensor as Sensor, SensorInput as SensorInput, unit_spec as unit_spec
+from .control import Continuous, Discrete
+from .core import ObservationDict, Rearrangement
+from .gymnasium_environment import RearrangeEnv
+from .options import EnvironmentOptions
+from .rewards import TimeReward
+from .sensors.base import Sensor, SensorInput, unit_spec
+
+__all__ = [
+    "Continuous",
+    "Discrete",
+    "EnvironmentOptions",
+    "ObservationDict",
+    "RearrangeEnv",
+    "Rearrangement",
+    "Sensor",
+    "SensorInput",
+    "TimeReward",
+    "unit_spec",
+]

@@ -1,1 +1,3 @@
-from .gltf.export import export_scene as export_scene
+from .gltf.export import export_scene
+
+__all__ = ["export_scene"]

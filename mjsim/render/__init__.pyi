@@ -1,20 +1,36 @@
-from .cameras import CameraPose as CameraPose
-from .context import GlInfo as GlInfo, gl_info as gl_info
-from .labels import Labels as Labels
-from .markers import MarkerLike as MarkerLike
+from .cameras import CameraPose
+from .context import GlInfo, gl_info
+from .labels import Labels
+from .markers import MarkerLike
 from .pictures import (
-    FloorPlanPicture as FloorPlanPicture,
-    largest_scale as largest_scale,
-    render_floorplan as render_floorplan,
-    render_house_map as render_house_map,
-    render_picture as render_picture,
-    render_pictures as render_pictures,
+    FloorPlanPicture,
+    largest_scale,
+    render_floorplan,
+    render_house_map,
+    render_picture,
+    render_pictures,
 )
-from .profiles import (
-    DRAFT as DRAFT,
-    FAST as FAST,
-    PROFILES as PROFILES,
-    QUALITY as QUALITY,
-    RenderProfile as RenderProfile,
-)
-from .renderer import Frame as Frame, LayeredRenderer as LayeredRenderer, Renderer as Renderer
+from .profiles import DRAFT, FAST, PROFILES, QUALITY, RenderProfile
+from .renderer import Frame, LayeredRenderer, Renderer
+
+__all__ = [
+    "DRAFT",
+    "FAST",
+    "PROFILES",
+    "QUALITY",
+    "CameraPose",
+    "FloorPlanPicture",
+    "Frame",
+    "GlInfo",
+    "Labels",
+    "LayeredRenderer",
+    "MarkerLike",
+    "RenderProfile",
+    "Renderer",
+    "gl_info",
+    "largest_scale",
+    "render_floorplan",
+    "render_house_map",
+    "render_picture",
+    "render_pictures",
+]
