@@ -188,22 +188,26 @@ def firefox(profile, screen=None):
         log.open("wb") as output,
         subprocess.Popen([str(FIREFOX), *words], stdout=output, stderr=output, env=variables) as process,
     ):
-        until = time.monotonic() + PATIENCE
-        while not (address := re.search(r"BiDi listening on (ws://\S+)", log.read_text())):
-            assert process.poll() is None and time.monotonic() < until, log.read_text()
-            time.sleep(0.1)
-        with connect(f"{address[1]}/session", max_size=None) as socket:
-            yield Firefox(socket)
-            process.terminate()
+        try:
+            until = time.monotonic() + PATIENCE
+            while not (address := re.search(r"BiDi listening on (ws://\S+)", log.read_text())):
+                assert process.poll() is None and time.monotonic() < until, log.read_text()
+                time.sleep(0.1)
+            with connect(f"{address[1]}/session", max_size=None) as socket:
+                yield Firefox(socket)
+        finally:  # a failed test must not wait for its browser
+            process.kill()
 
 
 @contextmanager
 def virtual_screen():
-    """A display that nobody sees; its name."""
+    """Start an off-screen display and yield its name."""
     reading, writing = os.pipe()
     words = [XVFB, "-displayfd", str(writing), "-screen", "0", "1600x1000x24", "-nolisten", "tcp"]
     with subprocess.Popen(words, pass_fds=[writing], stderr=subprocess.DEVNULL) as process:
         os.close(writing)
-        with os.fdopen(reading) as numbers:
-            yield f":{numbers.readline().strip()}"
-        process.terminate()
+        try:
+            with os.fdopen(reading) as numbers:
+                yield f":{numbers.readline().strip()}"
+        finally:
+            process.terminate()
