@@ -51,7 +51,7 @@ constraints: $(READY) ## Renew constraints.txt: the newest version of everything
 assets: $(READY) ## Make textures and meshes under models/ anew
 	$(BIN)/python -m tools.authoring
 
-pictures: $(READY) ## Make the pictures of the README and of docs/rendering.md anew
+pictures: $(READY) ## Make the pictures of the README and of the documentation anew
 	$(BIN)/mjsim gallery --force --out docs/pictures
 	$(BIN)/python -m tools.drawn_pairs docs/pictures/browser.webp
 	$(BIN)/python -m tools.furniture_sheet docs/pictures/furniture.webp

@@ -1,9 +1,9 @@
-"""The house of docs/bring-your-house.md, written from the page itself."""
+"""The house of docs/build-a-house.md, written from the page itself."""
 
 import re
 from pathlib import Path
 
-PAGE = Path(__file__).parents[1] / "docs" / "bring-your-house.md"
+PAGE = Path(__file__).parents[1] / "docs" / "build-a-house.md"
 FILES = dict(
     re.findall(
         r"^`([\w.]+)`: .*?^```(?:xml|toml)\n(.*?)^```", PAGE.read_text("utf-8"), re.DOTALL | re.MULTILINE

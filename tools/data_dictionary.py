@@ -18,8 +18,7 @@ radians, z is up.
 ## metrics.json
 
 One object per run. All but the last three rows follow from event log and trajectory; `mjsim metrics` computes them
-anew and `mjsim replay` checks them. [metrics.md](metrics.md) defines the metrics, [health.md](health.md) the health of
-the physics.
+anew and `mjsim replay` checks them. [metrics.md](metrics.md) defines the metrics and the health of the physics.
 """
 _TABLES = """\
 ## trials.parquet, trials.csv
@@ -29,7 +28,7 @@ nothing) where a value is not known. CSV leaves out columns that are null throug
 
 ## trials/*.sqlar
 
-Packed trials ([designs.md](designs.md#packed-trials)): SQLite databases with one table, `sqlar`, and one row per file.
+Packed trials ([batches.md](batches.md#packed-trials)): SQLite databases with one table, `sqlar`, and one row per file.
 
 | column | type | what |
 |---|---|---|

@@ -1,6 +1,6 @@
 """A contact sheet of all kinds of furniture, three pieces of each.
 
-`python -m tools.furniture_sheet docs/pictures/furniture.webp` makes the sheet of docs/houses.md.
+`python -m tools.furniture_sheet docs/pictures/furniture.webp` makes the sheet of docs/generated-houses.md.
 """
 
 import argparse

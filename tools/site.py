@@ -1,7 +1,33 @@
-"""Hooks of mkdocs.yml: links that are right on GitHub are right in the site."""
+"""Hooks of mkdocs.yml: a run on the front page, diagrams without scripts, and links that also work on GitHub."""
 
+import contextlib
+import io
 import re
+import tempfile
+from pathlib import Path
 from typing import Any
+
+from mkdocs.structure.files import File
+
+from experiments.cli.main import main
+
+RUN = "mjsim run --objects 6 --assistance guided --seed 0 --fidelity event --no-video --no-floor-plan"
+PAGE = "demo.html"  # page of the run; docs/index.md embeds it
+
+
+def on_files(files: Any, config: Any, **_: Any) -> Any:
+    """Add the page of a run, unless the tutorial is not run either."""
+    if not config.plugins["mkdocs-jupyter"].config["execute"]:
+        return files
+    with tempfile.TemporaryDirectory() as folder:
+        run, page = f"{folder}/run", Path(folder, PAGE)
+        for command in ([*RUN.split()[1:], "--out", run], ["view", run, "--out", str(page)]):
+            with contextlib.redirect_stdout(io.StringIO()):
+                status = main(command)
+            if status:
+                raise RuntimeError(f"mjsim {command[0]} failed: the front page has no run")
+        files.append(File.generated(config, PAGE, content=page.read_bytes()))
+    return files
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
@@ -13,4 +39,4 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Let the links of a notebook lead to pages; MkDocs does that for Markdown alone."""
     if not page.file.src_uri.endswith(".ipynb"):
         return html
-    return re.sub(r'href="([\w-]+)\.md"', r'href="../\1/"', html)
+    return re.sub(r'href="([\w-]+)\.md(#[^"]*)?"', r'href="../\1/\2"', html)

@@ -45,7 +45,7 @@ def add_parser(commands: Any) -> None:
         nargs="?",
         type=Path,
         metavar="DESIGN.toml",
-        help="design with its own cells (docs/designs.md)",
+        help="design with its own cells (docs/batches.md)",
     )
     numbers = f"numbers of misplaced objects, such as 6,12,18,24 (default: {OBJECTS})"
     add_setting(parser, "objects", type=int_list, metavar="N,..", help=numbers)

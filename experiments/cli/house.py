@@ -19,14 +19,14 @@ names:
 
   .xml  self-contained MJCF, with meshes and textures in a folder beside it. Stock MuJoCo loads it:
         python -m mujoco.viewer --mjcf=house.xml
-  .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/scene-files.md)
+  .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/import.md)
 
 With `generate`: make the house of the seed --seed as the folder --out, with MJCF, textures, catalogue.toml, recipe, a
-floor plan and a picture of each room. It is the one that --house generated:SEED?rooms=N names (docs/houses.md).
+floor plan and a picture of each room. --house generated:SEED?rooms=N names the same house (docs/generated-houses.md).
 
 With `export`: write the house --house for another simulator. --format habitat makes a scene dataset in the folder
 --out, with --episodes episodes of rearrangement from --seed on; --format procthor makes a file of the floor plan.
-`mjsim import house` reads both back (docs/houses.md).
+`mjsim import house` reads both back (docs/generated-houses.md).
 
 With `gallery SOURCE...`: draw homes into the folder --out: contact sheets of ten homes each (sheet_1.png, ...) with a
 floor plan and two views at eye height, and index.html, which lists them by rooms and area and opens each in three

@@ -47,7 +47,7 @@ Every input is kept in --out at once: after a reload, a lost connection, or a cr
 resumes in the same state. A finished trial leaves a run directory as `mjsim run` does, DIR/<visit>/task and
 DIR/<visit>/training, which `mjsim replay` verifies and films.
 
-The server is reached from this machine alone unless --host is given; docs/play.md explains how to host it for others.
+The server is reached from this machine alone unless --host is given; docs/deploy.md explains how to host it for others.
 Ctrl-C ends it; the same command resumes."""
 
 
@@ -89,13 +89,13 @@ def add_parser(commands: Any) -> None:
         type=_minimum,
         default={},
         metavar="PHASE=S,..",
-        help="seconds before which story, flythrough and training cannot be ended (docs/play.md)",
+        help="seconds before which story, flythrough and training cannot be ended (docs/browser.md)",
     )
     group.add_argument(
         "--questions",
         type=Path,
         metavar="FILE",
-        help="TOML file of questions about the story, which have to be answered correctly (docs/play.md)",
+        help="TOML file of questions about the story, which have to be answered correctly (docs/browser.md)",
     )
 
 

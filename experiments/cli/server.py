@@ -28,14 +28,14 @@ def add_server_options(group: Any) -> None:
     group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port; 0 for any that is free")
     group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
     group.add_argument(
-        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/play.md)"
+        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/deploy.md)"
     )
     group.add_argument(
         "--trusted-proxy",
         type=_networks,
         default=(),
         metavar="ADDRESS,..",
-        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/play.md)",
+        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/deploy.md)",
     )
     group.add_argument("--log-json", action="store_true", help="write the log as a JSON object a line")
     group.add_argument("--no-open", action="store_true", help="open no browser")

@@ -1,4 +1,4 @@
-"""Options `--shard` and `--merge`: a design shared by the tasks of an array job (docs/clusters.md)."""
+"""Options `--shard` and `--merge`: a design shared by the tasks of an array job (docs/batches.md)."""
 
 import argparse
 import os
@@ -20,7 +20,7 @@ def add_shards(parser: argparse.ArgumentParser) -> None:
         type=_shard,
         metavar="K/N",
         help="run only the K-th of N equal shares, counted from 1, and write no tables; all shards may share OUT "
-        "(docs/clusters.md)",
+        "(docs/batches.md)",
     )
     modes.add_argument(
         "--merge",

@@ -28,8 +28,8 @@ OUTCOMES = {
     EventKind.PLACE_FAILED: "a place started, but the object did not end up in the receptacle",
     EventKind.GRIP_LOST: "a carried object slipped out of a hand",
     EventKind.DISLODGED: "a delivered object left its receptacle again",
-    EventKind.EJECTED: "an object was faster than anything could throw it (docs/health.md)",
-    EventKind.TUNNELLED: "an object went through something solid (docs/health.md)",
+    EventKind.EJECTED: "an object was faster than anything could throw it (docs/metrics.md)",
+    EventKind.TUNNELLED: "an object went through something solid (docs/metrics.md)",
 }
 _OUTCOME_TYPES = [
     msgspec.defstruct(kind.name, [], bases=(OutcomeEvent,), frozen=True, tag_field="event", tag=kind.value)

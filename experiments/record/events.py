@@ -70,7 +70,7 @@ class ParticipantEvent(LoggedEvent, frozen=True):
 
     Attributes:
         user: The simulated participant.
-        person: Every value of the person that was drawn, by name; those of the hands under `motion` (docs/people.md).
+        person: Every value of the person that was drawn, by name (docs/participants.md); hands under `motion`.
         behaviour: Every value of the participant model that was drawn, by name; absent for models without any.
     """
 

@@ -1,4 +1,4 @@
-"""The health of the physics over one trial, from the event log and the trajectory alone (docs/health.md)."""
+"""The health of the physics over one trial, from the event log and the trajectory alone (docs/metrics.md)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""The file of a study with people: a design (docs/designs.md) with a table `[study]`. Errors name its lines."""
+"""The file of a study with people: a design (docs/batches.md) with a table `[study]`. Errors name its lines."""
 
 import hashlib
 import itertools

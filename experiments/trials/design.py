@@ -1,4 +1,4 @@
-"""Which trials a batch consists of: a full factorial of options, or the cells of a TOML file (docs/designs.md)."""
+"""Which trials a batch consists of: a full factorial of options, or the cells of a TOML file (docs/batches.md)."""
 
 import itertools
 import math
@@ -165,7 +165,7 @@ def read_exclusions(path: Path) -> Exclusions:
     try:
         return msgspec.convert(content, Exclusions)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{path}: {error}; docs/study.md says how rules are written") from error
+        raise ConfigError(f"{path}: {error}; docs/analysis.md says how rules are written") from error
 
 
 def _content(path: Path, what: str) -> dict[str, Any]:
@@ -188,7 +188,7 @@ def _located(message: str, cell: int | None) -> str:
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     """The trials of one cell; paths are relative to `folder`."""
     if unknown := sorted(set(values) - _IN_A_CELL):
-        raise ConfigError(f"unknown field `{unknown[0]}`; docs/designs.md lists what a design may hold")
+        raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists what a design may hold")
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for seeds in people if "houses" in values else ():

@@ -1,4 +1,4 @@
-"""Who is left out of a study and why: rules over the columns of its table, and people by name (docs/study.md)."""
+"""Who is left out of a study and why: rules over the columns of its table, and people by name (docs/analysis.md)."""
 
 import difflib
 import math

@@ -49,7 +49,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         str,
         _about(
             "Name of a house, path of its catalogue.toml or folder, or a seed of a generated one: `generated:7`, "
-            "`generated:7?rooms=5` (docs/houses.md).",
+            "`generated:7?rooms=5` (docs/generated-houses.md).",
             metavar="NAME",
             path=True,
         ),
@@ -71,7 +71,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     fidelity: Annotated[
         str,
         _about(
-            "How much of the world is physics: `full`, everything; `event`, only what falls (docs/fidelity.md).",
+            "How much of the world is physics: `full`, everything; `event`, only what falls (docs/simulation.md).",
             choices=FIDELITIES,
         ),
     ] = WorldOptions.fidelity
@@ -101,7 +101,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         int,
         _about(
             "Which of the person's trials it is, from 1; `trials_per_person` of a design counts them "
-            "(docs/designs.md).",
+            "(docs/batches.md).",
             metavar="N",
         ),
     ] = 1
@@ -120,7 +120,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         str,
         _about(
             "Phases of the trial, in order, joined by commas: `story`, `flythrough` and `training` may come before the "
-            "`task` (docs/procedure.md).",
+            "`task` (docs/trials.md).",
             metavar="NAME,..",
         ),
     ] = TASK
@@ -143,7 +143,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         str,
         _about(
             "Who draws the picture of a person in a browser: `browser`, `server`, or `auto`, the browser where it can "
-            "(docs/play.md).",
+            "(docs/browser.md).",
             choices=DRAWN_BY,
         ),
     ] = DRAWN_BY[0]
@@ -151,14 +151,14 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         str | None,
         _about(
             "Within which angles, rad, a person whose browser draws may choose the horizontal field of view of the "
-            "picture; otherwise it is the person's (docs/play.md).",
+            "picture; otherwise it is the person's (docs/browser.md).",
             metavar="LOW,HIGH",
         ),
     ] = None
     person: Annotated[
         Distributions,
         _about(
-            "Distributions of the person's values, drawn by the person's seed (docs/people.md).",
+            "Distributions of the person's values, drawn by the person's seed (docs/participants.md).",
             metavar="SPEC",
         ),
     ] = Distributions()

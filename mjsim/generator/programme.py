@@ -11,7 +11,7 @@ from mjsim.values.errors import HouseError
 
 @dataclass(frozen=True)
 class RoomNeeds:
-    """What a room of some use needs; docs/houses.md names the sources."""
+    """What a room of some use needs; docs/generated-houses.md names the sources."""
 
     label: str
     area: tuple[float, float]  # m2, least and most

@@ -185,7 +185,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """What happened in the physics: outcome of a motion, object lost or dislodged, or an anomaly (docs/health.md)."""
+    """What happened in the physics: outcome of a motion, object lost or dislodged, or an anomaly (docs/metrics.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"

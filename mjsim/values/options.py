@@ -25,7 +25,7 @@ class WorldOptions:
         settle_speed: Slower than this is at rest, m/s.
         volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
         fidelity: `full`, everything in physics; `event`, kinematic except for the fall of released objects
-            (docs/fidelity.md).
+            (docs/simulation.md).
         capacity: How many objects are carried at most: 2, or 1 with the right hand alone.
 
     Raises:

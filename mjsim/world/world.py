@@ -63,7 +63,7 @@ class World:
 
     Attributes:
         scene: The composed episode; its model is never modified.
-        options: The rules, and how much of the world is physics (docs/fidelity.md).
+        options: The rules, and how much of the world is physics (docs/simulation.md).
 
     Example:
         >>> import mjsim

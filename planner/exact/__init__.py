@@ -1,7 +1,7 @@
 """Proven optimal tours for a person with one or two hands, and how close to optimal the best tour is until then.
 
 It serves the planners of sessions and `mjsim plan`, which reach it through `solver.ExactSolver`. The equations are in
-`table`, the measurements in docs/planner.md, "How the proof works".
+`table`, the measurements in docs/planners.md, "How the proof works".
 
     solver        ExactSolver: up to 18 objects the full table, beyond it the search; OR-Tools for other problems
     task_table    a full table for the successive states of a task

@@ -25,7 +25,7 @@ are nearest to the published one (approximate Bayesian computation). Writes
 Where a study with that population does not come out as the surrogate has it, calibrate again with the folder of that
 study named as well: its people at 6 objects are learnt from, too, and nothing else of it is looked at.
 
-What fits is not therefore true; docs/study.md says what may be concluded."""
+What fits is not therefore true; docs/paper.md says what may be concluded."""
 
 
 def add_parser(commands: Any) -> None:

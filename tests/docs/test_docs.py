@@ -160,7 +160,7 @@ def short(number):
 
 @pytest.mark.parametrize(
     ("name", "parameters"),
-    [("participants.md", PARAMETERS), ("people.md", {name: PERSON[name] for name in RANGES})],
+    [("participants.md", PARAMETERS), ("participants.md", {name: PERSON[name] for name in RANGES})],
 )
 def test_the_table_of_a_page_lists_every_parameter_with_its_range(name, parameters):
     for key, parameter in parameters.items():
@@ -172,7 +172,7 @@ def test_the_table_of_a_page_lists_every_parameter_with_its_range(name, paramete
 
 def test_the_examples_of_the_pages_describe_behaviour_and_people():
     behaviour = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[0])["cells"][0]["behaviour"])
-    people = Distributions.of(tomllib.loads(blocks("people.md", "toml")[0]))
+    people = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[1]))
     assert (len(behaviour), len(people)) == (2, 5)
     assert behaviour.keys() <= PARAMETERS.keys()
     check_person(people)
@@ -182,7 +182,7 @@ def test_the_examples_of_the_pages_describe_behaviour_and_people():
 def test_every_command_of_the_page_on_houses_works(tmp_path, monkeypatch, capsys):
     write_example_house(tmp_path / "my_house")
     monkeypatch.chdir(tmp_path)
-    for line in "".join(blocks("bring-your-house.md", "sh")).splitlines():
+    for line in "".join(blocks("build-a-house.md", "sh")).splitlines():
         command = shlex.split(line)[1:]
         assert main(command) == 0, line
         said = capsys.readouterr().out

@@ -15,7 +15,7 @@ import pyarrow.parquet
 import trimesh
 
 FAST = ["--fidelity", "event", "--no-regret", "--no-video", "--no-floor-plan"]
-HOUSE_PAGE = Path(__file__).parents[2] / "docs" / "bring-your-house.md"
+HOUSE_PAGE = Path(__file__).parents[2] / "docs" / "build-a-house.md"
 HOUSE_FILES = re.compile(r"^`([\w.]+)`: .*?^```(?:xml|toml)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PROBLEM = {
     "capacity": 2,

@@ -20,7 +20,7 @@ People who did not finish are left out, and so are those that --exclude selects 
 report lists them, the reasons, and how results change without each rule.
 
 Which column stands for which measure, and what the items of the survey are called, is fixed in
-experiments/trials/designs/metrics.toml, or in a file of your own. docs/study.md explains how to read it. All output
+experiments/trials/designs/metrics.toml, or in a file of your own. docs/analysis.md explains how to read it. All output
 from simulated people is marked as such."""
 
 

@@ -147,7 +147,7 @@ def _print_power(study: "Study", arguments: argparse.Namespace) -> None:
         )
     if arguments.pool is None:
         print(
-            "power     for a measure: mjsim study simulate, then mjsim study check --pool DIR (docs/study.md)"
+            "power     for a measure: mjsim study simulate, then mjsim study check --pool DIR (docs/analysis.md)"
         )
         return
     from experiments.analysis.planning.cost import StudyCost

@@ -14,15 +14,14 @@ much people differ comes from a pool: a folder of simulated people in the same c
 more; 200 make the interval narrow.
 
 The wanted effect is a difference of means (--difference), a partial eta squared (--eta-squared), or, with neither, the
-effect that the pool shows. Whether simulated people differ as much as real ones is not known; docs/study.md says what
-follows."""
+effect that the pool shows. Whether simulated people differ as much as real ones is not known (docs/analysis.md)."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
         commands, "power", run, summary="how many people a study needs", description=DESCRIPTION
     )
-    parser.add_argument("study", metavar="STUDY.toml", help="the study: its cells (docs/designs.md)")
+    parser.add_argument("study", metavar="STUDY.toml", help="the study: its cells (docs/batches.md)")
     parser.add_argument("--pool", type=Path, required=True, metavar="DIR", help="folder of simulated people")
     parser.add_argument(
         "--measure", default="deviations", metavar="NAME", help="deviations, ipl, distance or time"

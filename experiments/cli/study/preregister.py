@@ -8,9 +8,10 @@ from experiments.cli.options import add_command, add_force
 from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
-Freeze a study before there are data: its design, measures, exclusions ([exclusions] in STUDY.toml, docs/study.md), the
-code of the analysis and all versions, as one ZIP. Equal studies give equal bytes. Deposit the file, or the SHA-256 that
-is printed; `mjsim study analyze DIR --preregistration FILE` applies its exclusions and reports what departs from it."""
+Freeze a study before there are data, as one ZIP: its design, measures, exclusions ([exclusions] in STUDY.toml,
+docs/analysis.md), the code of the analysis and all versions. Equal studies give equal bytes. Deposit the file, or the
+SHA-256 that is printed. `mjsim study analyze DIR --preregistration FILE` applies its exclusions and reports what
+departs from it."""
 
 
 def add_parser(commands: Any) -> None:

@@ -33,7 +33,7 @@ SECRET = "MJSIM_STUDY_SECRET"
 DESCRIPTION = f"""\
 Serve a study with people: consent, a check of the computer, the story, a film of the house, questions about the task,
 training, task, survey, and the way back to where people came from. STUDY.toml is a design with a table [study]
-(docs/study-with-people.md); `paper` is the published study. Prints the URL on a separate line and opens it.
+(docs/study.md); `paper` is the published study. Prints the URL on a separate line and opens it.
 
 Everything is kept in --out: the database, run directories and journals of trials, the film, and the secret from
 which people who come from a platform are recognised ({SECRET} sets another one). Ctrl-C ends the server; the same

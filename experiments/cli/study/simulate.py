@@ -10,7 +10,7 @@ from experiments.cli.shards import add_shards, run_share
 from experiments.trials.design import counted
 
 DESCRIPTION = """\
-Simulate the people of a study. The file is a design of `mjsim batch` (docs/designs.md) with a participant model and its
+Simulate the people of a study. The file is a design of `mjsim batch` (docs/batches.md) with a participant model and its
 parameters; `paper` is the published study, 447 people. Each person is a run directory under OUT/trials, and a row of
 OUT/trials.parquet and OUT/trials.csv. Rerun the command to resume; no participant is lost or duplicated. Results do
 not depend on --workers. All data are simulated; nothing is evidence about people."""

@@ -1,7 +1,7 @@
 """A simulated person who was shown the house once: notices, remembers, chooses, complies or not, takes time.
 
 Each part of the model is a module with its parameters, their distributions over people, units and sources.
-`docs/participants.md` lists them, `docs/study.md` names those that are fitted.
+`docs/participants.md` lists them, `docs/paper.md` names those that are fitted.
 """
 
 import dataclasses

@@ -15,7 +15,7 @@ class Perception:
 
     Conspicuity predicts search time (Toet et al., Optical Engineering 37, 1998). A probability
     that is logistic in the distance, and its half distance, are assumptions. Field of view
-    and sight range are those of the body (docs/people.md), and occlusion is computed from the geometry of the scene.
+    and sight range are those of the body (docs/participants.md). Occlusion follows from the geometry of the scene.
     """
 
     # distance at which half of the objects in full view are noticed, m

@@ -1,4 +1,4 @@
-"""The two tiers of fidelity: `full` physics, and `event`, which simulates only what falls (docs/fidelity.md).
+"""The two tiers of fidelity: `full` physics, and `event`, which simulates only what falls (docs/simulation.md).
 
 Serves `mjsim.world.world.World`, which hides the tier behind one interface.
 """

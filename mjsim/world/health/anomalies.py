@@ -1,4 +1,4 @@
-"""Objects that move as nothing should: ejections and tunnelling, which `docs/health.md` defines."""
+"""Objects that move as nothing should: ejections and tunnelling, which `docs/metrics.md` defines."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

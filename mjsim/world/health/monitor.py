@@ -1,6 +1,6 @@
 """Checks the physics after every control step: warnings, penetration, weld errors, settling times and anomalies.
 
-`docs/health.md` defines every term. A state that cannot be trusted any further is a `PhysicsError`; anything less is
+`docs/metrics.md` defines every term. A state that cannot be trusted any further is a `PhysicsError`; anything less is
 counted, and reported as an event.
 """
 

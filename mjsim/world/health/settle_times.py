@@ -1,4 +1,4 @@
-"""Released objects, until they are at rest; `docs/health.md` defines release, rest and settle time."""
+"""Released objects, until they are at rest; `docs/metrics.md` defines release, rest and settle time."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace

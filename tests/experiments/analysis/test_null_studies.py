@@ -43,7 +43,7 @@ def p_values(values, rng):
 
 @pytest.mark.slow
 def test_without_effects_every_test_finds_one_in_4_to_6_percent():
-    """Holm's correction finds fewer by construction (docs/study.md)."""
+    """Holm's correction finds fewer by construction (docs/analysis.md)."""
     hits = {}
     for seed in range(STUDIES):
         rng = np.random.default_rng(seed)

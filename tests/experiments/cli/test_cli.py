@@ -157,7 +157,7 @@ def test_the_help_names_the_phases_that_are_usual(command, phases, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
     text = " ".join(capsys.readouterr().out.split())
-    assert f"(docs/procedure.md) (default: {phases})" in text
+    assert f"(docs/trials.md) (default: {phases})" in text
 
 
 async def _nothing(*_, **__):

@@ -25,7 +25,7 @@ from experiments.web.protocol import MAX_INPUTS
 
 HOSTILE, OTHER = "127.0.0.66", "127.0.0.2"  # addresses of the hostile machine, and of who opens new visits
 SPOOFED = 60  # visits that the hostile machine begins in the names of others
-DOCUMENT = Path(__file__).parents[3] / "docs" / "play.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "browser.md"
 MAIN = """daemon off; pid {folder}/pid; error_log {folder}/error.log; worker_rlimit_nofile 16384;
 events {{ worker_connections 8192; }}
 http {{ access_log off; client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy;
@@ -56,7 +56,7 @@ def measure_hostile(folder: Path, number: int, seconds: float, *words: str, ngin
 
 @contextmanager
 def _nginx(folder: Path, port: int, server: int) -> Iterator[None]:
-    """NGINX with the configuration of docs/play.md."""
+    """NGINX with the configuration of docs/browser.md."""
     folder.mkdir()
     location = DOCUMENT.read_text().split("```nginx\n")[1].split("```")[0].replace(":8000", f":{server}")
     (folder / "nginx.conf").write_text(MAIN.format(folder=folder, port=port, location=location))

@@ -41,7 +41,7 @@ HISTORIES = st.lists(st.lists(STANDING, min_size=DECISIONS, max_size=DECISIONS),
 
 
 def oracle(pay, status, phase, delivered):
-    """Cents by kind, from the documented rules, exactly: docs/study-with-people.md."""
+    """Cents by kind, from the documented rules, exactly: docs/study.md."""
     reward, screen_out = Fraction(str(pay.reward)), Fraction(str(pay.screen_out))
     share, found = reward * PHASES.index(phase) / len(PHASES), {}
     if status == "finished":
