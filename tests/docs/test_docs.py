@@ -171,8 +171,8 @@ def test_the_table_of_a_page_lists_every_parameter_with_its_range(name, paramete
 
 
 def test_the_examples_of_the_pages_describe_behaviour_and_people():
-    behaviour = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[0])["cells"][0]["behaviour"])
-    people = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[1]))
+    behaviour = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[1])["cells"][0]["behaviour"])
+    people = Distributions.of(tomllib.loads(blocks("participants.md", "toml")[0]))
     assert (len(behaviour), len(people)) == (2, 5)
     assert behaviour.keys() <= PARAMETERS.keys()
     check_person(people)
