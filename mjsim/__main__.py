@@ -1,4 +1,4 @@
-"""The command line, as `mjsim` or `python -m mjsim`."""
+"""Entry point of the `mjsim` command."""
 
 import importlib
 import sys
@@ -7,7 +7,7 @@ from mjsim.support.environment import hidden_package
 
 
 def main() -> int:
-    """Run the command line; say so if other software hides the package that it lives in."""
+    """Run the command line. Exit with a hint if other software hides the `experiments` package."""
     if hidden := hidden_package("experiments"):
         print(f"mjsim: {hidden}", file=sys.stderr)
         return 1

@@ -1,4 +1,1 @@
-"""The house as data and as a compiled model: assets, catalogue, scene, sampling, sight, validation.
-
-Serves the world, which steps the model, and every command that needs a house or an episode.
-"""
+"""Houses as data and as compiled models: catalogue, scene, sampling, sight, validation."""

@@ -1,4 +1,4 @@
-"""The report that `mjsim check` gives of a house, a receptacle, an object or an episode."""
+"""The report of `mjsim check` about a house, a receptacle, an object or an episode."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -25,13 +25,13 @@ from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, Sampling
 
 @dataclass(frozen=True, eq=False)
 class CheckReport:
-    """What a check found."""
+    """Result of a check."""
 
     kind: str  # `house`, `receptacle`, `object` or `episode`
-    path: str  # what was checked
-    findings: tuple[Finding, ...]  # every fault, errors first
-    facts: Mapping[str, str] = field(default_factory=dict)  # what is good to know: name -> text
-    views: tuple[Drawing, ...] = ()  # drawings, for a picture; empty where nothing could be compiled
+    path: str  # the checked name or path
+    findings: tuple[Finding, ...]  # errors first
+    facts: Mapping[str, str] = field(default_factory=dict)  # name -> text
+    views: tuple[Drawing, ...] = ()  # drawings for a picture; empty if nothing could be compiled
 
     def __post_init__(self) -> None:
         ordered = sorted(self.findings, key=lambda f: f.severity != "error")
@@ -39,20 +39,19 @@ class CheckReport:
 
     @property
     def usable(self) -> bool:
-        """Whether there is no error."""
         return not errors(self.findings)
 
 
-Load = Callable[[str], Catalogue]  # from the name of a house
+Load = Callable[[str], Catalogue]  # loads a house by name
 
 
 def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
     """Check a catalogue, its folder, a house by name, an MJCF file, or an episode.
 
     Args:
-        name: What to check.
-        house: Name of an episode's house, if not its own.
-        load: Loads the house; `mjsim.load_catalogue` also generates it.
+        name: Name or path to check.
+        house: Name of a house to check an episode with, instead of its own.
+        load: Loader of houses. `mjsim.load_catalogue` also generates them.
     """
     path = Path(name)
     if path.suffix == ".json":
@@ -65,7 +64,7 @@ def check_path(name: str, house: str | None = None, load: Load = Catalogue.load)
 
 
 def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
-    """Check a house with its receptacles and objects, and sample it."""
+    """Check a house, its receptacles and objects, and whether episodes can be sampled in it."""
     try:
         catalogue = load(name)
     except AssetError as error:
@@ -90,7 +89,6 @@ def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
 
 
 def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
-    """How many points fit, and what goes wrong when objects are dropped there."""
     keep_away = np.array([r.center[:2] for r in house.receptacles.values()])
     meant = house.catalogue.points or POINTS
     fits = points_that_fit(house.navigable, keep_away, meant)
@@ -112,13 +110,15 @@ def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
             sample_episode(house.catalogue, house.navigable, objects=objects, seed=0, points=pool)
         except (SamplingError, PhysicsError) as error:
             found.append(
-                Finding("sampling", "house", f"{objects} objects cannot be dropped: {error}", "see there")
+                Finding(
+                    "sampling", "house", f"{objects} objects cannot be dropped: {error}", "see the message"
+                )
             )
     return fits, found
 
 
 def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
-    """Check an episode against its house, or against another one."""
+    """Check an episode against its own house, or another one."""
     try:
         episode = Episode.load(path)
     except EpisodeError as error:
@@ -141,7 +141,6 @@ def check_episode_file(path: Path, house: str | None = None, load: Load = Catalo
 
 
 def _check_model(path: Path, load: Load) -> CheckReport:
-    """Check an MJCF file by the body that it has."""
     if not path.is_file():
         raise AssetError(f"no file {path}; give a {CATALOGUE}, an object's .xml or an episode's .json")
     bodies = {e.get("name") for e in elements(path) if e.tag == "body"}

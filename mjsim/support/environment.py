@@ -1,4 +1,4 @@
-"""Other software that hides, or installs over, the packages beside mjsim: their names are common words."""
+"""State of the Python environment: name conflicts of installed packages, and the choice of an OpenGL backend."""
 
 import importlib.util
 import os
@@ -8,16 +8,16 @@ from pathlib import Path
 
 PACKAGES = ("planner", "hud", "experiments")
 VARIABLE = "MUJOCO_GL"
-POSTPONED = "MJSIM_GL"  # what `VARIABLE` was
+POSTPONED = "MJSIM_GL"  # holds the value that `VARIABLE` had before `postpone_gl`
 BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 EGL_PACKAGES = ("libegl1", "libgl1", "libgles2", "libegl-mesa0", "libgl1-mesa-dri")
 DISABLED = ("disable", "disabled", "off", "false", "0")
-ENABLED = ("enable", "enabled", "on", "true", "1")  # MuJoCo's words for: choose one
+ENABLED = ("enable", "enabled", "on", "true", "1")  # values by which MuJoCo chooses a backend itself
 DEFAULT = "egl"
 
 
 def hidden_package(name: str) -> str | None:
-    """What to do about a package that Python would not import from beside mjsim; None if all is well."""
+    """Return a hint if Python cannot import one of our packages, or imports another one of that name; else None."""
     own = Path(__file__).resolve().parents[2] / name
     spec = importlib.util.find_spec(name)
     folders = list(spec.submodule_search_locations or ()) if spec else []
@@ -33,7 +33,7 @@ def hidden_package(name: str) -> str | None:
 
 
 def shared_names() -> tuple[str, ...]:
-    """What to do about other distributions that install a package of one of our names."""
+    """Return a hint for each other distribution that installs a package with one of our names."""
     installed = metadata.packages_distributions()
     return tuple(
         f"the distribution {other} installs a package {name} too: pip uninstall {other}, or install mjsim in an "
@@ -44,9 +44,9 @@ def shared_names() -> tuple[str, ...]:
 
 
 def postpone_gl() -> None:
-    """Keep MuJoCo, in this process and its children, from loading OpenGL before something is drawn.
+    """Prevent MuJoCo from loading OpenGL at import, in this process and its children. Rendering loads it later.
 
-    Without a choice it would load GLFW, which starts another Python to look at its library.
+    Without `MUJOCO_GL`, MuJoCo would load GLFW, which starts another Python process to inspect its library.
     """
     choice = os.environ.get(VARIABLE, "") or DEFAULT
     if choice.lower().strip() not in DISABLED and "mujoco" not in sys.modules:
@@ -54,6 +54,6 @@ def postpone_gl() -> None:
 
 
 def chosen_gl() -> str:
-    """The backend that was asked for, in lower case."""
+    """Return the requested backend in lower case, as it was before `postpone_gl`."""
     choice = (os.environ.get(POSTPONED) or os.environ.get(VARIABLE) or DEFAULT).lower().strip()
     return DEFAULT if choice in ENABLED else choice

@@ -1,7 +1,7 @@
-"""Reading files to an end and values strictly; writing files and folders atomically; digests of source code.
+"""Reading files with limits, writing files and folders atomically, and digests of source code.
 
-Work in progress has a name that begins with `WORK`, in the folder of its final place. The work of killed processes is
-removed, once it is a day old, by the next process that writes into the same folder.
+Temporary files and folders are created next to their final path, with names that begin with `WORK`. Those of killed
+processes are removed once they are a day old, by the next process that writes into the same folder.
 """
 
 import contextlib
@@ -21,34 +21,37 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-MAX_INPUT = 256_000_000  # bytes of a file that is read
-MAX_SILENCE, MAX_WAIT = 8.0, 60.0  # s to wait for the next part of a stream, and for all of it
+MAX_INPUT = 256_000_000  # largest file that is read, in bytes
+MAX_SILENCE, MAX_WAIT = (
+    8.0,
+    60.0,
+)  # timeouts for the next part of a stream and for the whole stream, in seconds
 WORK = ".mjsim-work-"
-MAX_AGE = 24 * 3600  # s since the last change of a leftover, after which it is removed
+MAX_AGE = 24 * 3600  # age at which temporary files of killed processes are removed, in seconds
 
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux's renameat2
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # constants of Linux's renameat2
 ROOT = Path(__file__).parents[2]  # folder of the packages
 PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 
 def check_input(path: Path) -> None:
-    """Raise an OSError where reading would not end (a pipe, a device), or has over `MAX_INPUT` bytes to read."""
+    """Raise an OSError for a pipe or device, which could be read forever, and for a file larger than `MAX_INPUT`."""
     found = path.stat()
-    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # opening says it of a folder
+    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # a folder fails when it is opened
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     if found.st_size > MAX_INPUT:
         raise OSError(errno.EFBIG, f"larger than {MAX_INPUT // 10**6} MB", str(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file; an OSError as of `check_input`."""
+    """Read a file. Raise an OSError if it is missing or fails `check_input`."""
     check_input(path)
     with path.open("rb") as file:
         return file.read(MAX_INPUT)
 
 
 def read_stream(stream: int) -> bytes:
-    """What a pipe or another stream holds, to its end; an OSError where it has too much or stops sending."""
+    """Read a file descriptor, such as a pipe, to its end. Raise an OSError if it is too large or times out."""
     text, ends = bytearray(), time.monotonic() + MAX_WAIT
     while True:
         silence = min(MAX_SILENCE, ends - time.monotonic())
@@ -62,12 +65,12 @@ def read_stream(stream: int) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """The content of a UTF-8 file, with or without a byte order mark; an OSError as of `check_input`."""
+    """Read a UTF-8 file, with or without a byte order mark. Raise an OSError like `read_bytes`."""
     return read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
 
 
 def read_json(text: str) -> Any:
-    """Values of strict JSON; a ValueError where a key is there twice, or a number is NaN or infinite."""
+    """Parse strict JSON. Raise a ValueError for a repeated key, NaN or infinity."""
     return json.loads(text, object_pairs_hook=_once, parse_constant=_refuse)
 
 
@@ -80,14 +83,14 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number of JSON")
+    raise ValueError(f"{constant} is not a JSON number")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path in the folder of `path`; rename it over `path` on success, else remove it.
+    """Yield a temporary path next to `path`. Rename it to `path` on success, otherwise remove it.
 
-    The temporary name keeps the suffix, because encoders choose the container by it. A symbolic link is followed.
+    The temporary name keeps the suffix, because encoders choose the format by it. Symbolic links are followed.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -102,7 +105,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # of a write: a full disk
+        if error.errno is not None and error.filename is None:  # a failed write, such as to a full disk
             error.filename = str(path)
         raise
     finally:
@@ -111,22 +114,21 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def work_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new folder in the existing folder `parent`; it is removed afterwards unless it was moved."""
+    """Yield a new folder inside `parent`. Remove it afterwards unless it was moved."""
     _tidy(parent, _today())
     folder = Path(tempfile.mkdtemp(dir=parent, prefix=f"{WORK}{os.getpid()}-"))
     try:
         yield folder
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # of a write: a full disk
+        if error.errno is not None and error.filename is None:  # a failed write, such as to a full disk
             error.filename = str(parent)
         raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=64)  # once a day per process, because a batch writes many trials into one folder
 def _tidy(folder: Path, _day: int) -> None:
-    """Remove the leftovers in a folder; once a day per process, as a batch writes many trials into one folder."""
     remove_leftovers(folder)
 
 
@@ -135,11 +137,11 @@ def _today() -> int:
 
 
 def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK) -> None:
-    """Remove from `folder` the work of killed processes: all that has not changed for `max_age` seconds."""
+    """Remove temporary files and folders that have not changed for `max_age` seconds."""
     with os.scandir(folder) as entries:
         paths = [Path(entry) for entry in entries if entry.name.startswith(prefix)]
     for path in paths:
-        with contextlib.suppress(OSError):  # removed by another process
+        with contextlib.suppress(OSError):  # another process may remove it first
             changed = max(part.lstat().st_mtime for part in (path, *path.rglob("*")))
             if time.time() - changed < max_age:
                 continue
@@ -150,18 +152,17 @@ def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK)
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Write UTF-8 `text` to `path`, whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Swap two paths of one file system; both exist at every moment, on file systems that support it."""
+    """Swap two paths of one file system, atomically where the file system supports it."""
     libc, names = ctypes.CDLL(None, use_errno=True), (os.fsencode(one), os.fsencode(other))
     if libc.renameat2(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
         return
     error = ctypes.get_errno()
-    if error not in (errno.EINVAL, errno.ENOSYS):  # the answers of file systems without exchange
+    if error not in (errno.EINVAL, errno.ENOSYS):  # the file system cannot exchange
         raise OSError(error, os.strerror(error), str(one), None, str(other))
     with work_folder(one.parent) as aside:
         other.rename(aside / "other")
@@ -170,7 +171,7 @@ def exchange(one: Path, other: Path) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; False for names that no file can have (too long, a null character)."""
+    """Return True for an existing file, False even for names that no file can have (too long, a null character)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -179,12 +180,12 @@ def is_file(path: Path) -> bool:
 
 @functools.cache
 def source_digest(*places: str) -> str:
-    """16 hex digits over Python sources, given by modules and folders in that of the packages; all if none is given."""
+    """Return a digest, 16 hex digits, of Python modules and folders relative to `ROOT`. By default, of all packages."""
     return digest_of(*(ROOT / place for place in places or PACKAGES))
 
 
 def digest_of(*places: Path) -> str:
-    """16 hex digits over Python files and the names under which they lie in `places`, which are files or folders."""
+    """Return a digest, 16 hex digits, of the relative paths and contents of Python files in files and folders."""
     digest = hashlib.sha256()
     for place in places:
         for path in [place] if place.is_file() else sorted(place.rglob("*.py")):

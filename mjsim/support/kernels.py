@@ -1,6 +1,6 @@
-"""Compilation of numeric kernels with numba, cached on disk where a folder is writable; for all four packages.
+"""Compilation of numeric kernels with numba, cached on disk. Used by all four packages.
 
-It imports numba only once a kernel is declared.
+numba is imported when the first kernel is declared.
 """
 
 import functools
@@ -19,17 +19,17 @@ from mjsim.support.files import ROOT, digest_of
 F = TypeVar("F", bound=Callable[..., Any])
 
 MARK = b"@kernel\n"
-UNUSED = 30 * 24 * 3600  # s after which machine code that no process has asked for is deleted
+UNUSED = 30 * 24 * 3600  # age at which unused machine code is deleted, in seconds
 
-# A division by zero gives infinity or NaN, as in numpy: the check for it would cost a tenth of a trial's time.
+# Division by zero gives infinity or NaN, as in NumPy. Checking for it would cost a tenth of a trial's time.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 
 
 def kernel(function: F) -> F:
-    """Compile a function at its first call; a later process loads the machine code from disk.
+    """Compile a function at its first call, or load its machine code from the disk cache.
 
-    Where no cache folder is writable (no home, a full disk), each process compiles again.
+    If no cache folder is writable (no home folder, a full disk), each process compiles it again.
     """
     import numba
 
@@ -37,16 +37,16 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a function as a part of each kernel that calls it: for small ones that take many arrays."""
+    """Compile a function into each kernel that calls it. For small functions that take many arrays."""
     import numba
 
     return cast(F, numba.njit(forceinline=True, **_OPTIONS)(function))
 
 
 def c_function(signature: str, function: Callable[..., Any]) -> Any:
-    """Compile a function of numbers for callers in C, with types such as `float64(int64)`.
+    """Compile a function of numbers to a C function pointer. The signature is like `float64(int64)`.
 
-    The `ctypes` of the result is a pointer that is valid for as long as the result exists.
+    The pointer, `ctypes` of the result, is valid as long as the result exists.
     """
     import numba
 
@@ -54,7 +54,6 @@ def c_function(signature: str, function: Callable[..., Any]) -> Any:
 
 
 def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
-    """Compile a function, with the machine code on disk where that is possible."""
     from numba import config
 
     folder, chosen = cache_folder(Path(function.__code__.co_filename)), config.CACHE_DIR
@@ -70,17 +69,17 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
 
 def cache_base() -> Path:
-    """Folder of all that can be computed again: `NUMBA_CACHE_DIR`, else the user's cache folder."""
+    """Return the folder of all caches: `NUMBA_CACHE_DIR` if set, otherwise the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
 
 
 @functools.cache
 def cache_folder(source: Path) -> Path | None:
-    """Folder for the machine code of a module's kernels, None where none is writable.
+    """Return the folder for the machine code of a module's kernels, or None if it is not writable.
 
-    Its name holds a digest of all that is compiled in: numba itself notices a change in a kernel's own file only, not
-    in the kernels that it calls.
+    Its name holds a digest of all modules whose code is compiled in. numba alone would notice changes of the kernel's
+    own file, but not of kernels that it calls.
     """
     base = cache_base()
     try:
@@ -88,14 +87,13 @@ def cache_folder(source: Path) -> Path | None:
         if not folder.is_dir():
             _delete_unused(base)
             folder.mkdir(parents=True, exist_ok=True)
-        os.utime(folder)  # in use; fails where the folder is not writable
+        os.utime(folder)  # marks the folder as used, and fails if it is not writable
     except OSError:
         return None
     return folder
 
 
 def _compiled_in(source: Path) -> set[Path]:
-    """The module, the modules whose kernels or constants it imports, and those that they import."""
     found, new = set(), {source}
     while new:
         path = new.pop()

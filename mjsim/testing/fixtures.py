@@ -1,4 +1,4 @@
-"""Pytest fixtures. Import them into your `conftest.py`; this module alone needs pytest."""
+"""Pytest fixtures, to be imported into a `conftest.py`. Only this module needs pytest."""
 
 import re
 from collections.abc import Callable
@@ -15,10 +15,10 @@ GoldenFrame = Callable[..., Comparison]
 
 @pytest.fixture
 def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
-    """Compares a frame with `golden/<name>.png` beside the test file, or in the nearest folder above it that has one.
+    """Compare frames with `golden/<name>.png` in the folder of the test file, or in the nearest one above it.
 
-    `golden_frame(frame)` takes the test's own name, `golden_frame(frame, "hall")` another; other arguments are those
-    of `mjsim.testing.compare_frame`. Images of a failure go to `tmp_path`.
+    `golden_frame(frame)` uses the name of the test, `golden_frame(frame, "hall")` another one. Keyword arguments are
+    those of `mjsim.testing.compare_frame`. Images of a failed comparison are written to `tmp_path`.
     """
 
     def compare(frame: NDArray[np.uint8], name: str | None = None, **options: object) -> Comparison:

@@ -1,7 +1,7 @@
-"""Golden frames: exact on a driver that is known, close on any other.
+"""Golden frames: compared exactly on known drivers, approximately on others.
 
-Beside `name.png` lies `name.json`: the SHA-256 of the frame for each driver on which it was looked at and accepted. On
-such a driver every pixel must be the same. On another the frame must come within a PSNR of the picture.
+`name.json` next to `name.png` holds the SHA-256 of the frame for each driver whose frame was reviewed. On such a driver
+all pixels must be equal. On others, the PSNR must exceed a limit.
 """
 
 import hashlib
@@ -22,8 +22,8 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import MjsimError
 
 UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
-CLOSE_ENOUGH = 45.0  # dB
-_GAIN = 4  # of the difference image, so that small differences can be seen
+CLOSE_ENOUGH = 45.0  # default PSNR limit, dB
+_GAIN = 4  # amplification of the difference image, to make small differences visible
 
 Image = NDArray[np.uint8]
 
@@ -34,13 +34,13 @@ class FrameMismatchError(MjsimError, AssertionError):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How a frame compares with its golden frame.
+    """Result of comparing a frame with its golden frame.
 
     Attributes:
-        exact: Every pixel is the same.
-        known_driver: A hash is stored for this driver.
-        psnr: Peak signal-to-noise ratio, dB; inf where exact.
-        updated: The frame was stored as the golden one.
+        exact: True if all pixels are equal.
+        known_driver: True if a hash is stored for this driver.
+        psnr: Peak signal-to-noise ratio, dB. inf if all pixels are equal.
+        updated: True if the frame was stored as the golden frame.
     """
 
     exact: bool
@@ -62,12 +62,13 @@ def compare_frame(
 
     Args:
         frame: RGB, uint8, shape (height, width, 3).
-        golden: PNG file; the hashes lie beside it as JSON.
-        key: What drew the frame; by default `driver_key()`, for frames without OpenGL `drawing_key()`.
-        update: Whether to store the frame as the golden one; by default whether the environment variable
-            `MJSIM_UPDATE_GOLDEN` is set and not 0. Look at what was stored before you commit it.
-        output: Folder for actual, expected and difference image on failure; by default a new temporary one.
-        close_enough: PSNR that suffices where no hash is stored for `key`, dB.
+        golden: PNG file. Its hashes are stored next to it as JSON.
+        key: Identifier of what drew the frame. By default `driver_key()`; use `drawing_key()` for frames that were
+            drawn without OpenGL.
+        update: True to store the frame as the golden frame. By default, True if the environment variable
+            `MJSIM_UPDATE_GOLDEN` is set and not 0. Review stored frames before you commit them.
+        output: Folder for the actual, expected and difference images of a failure. By default a temporary folder.
+        close_enough: PSNR limit if no hash is stored for `key`, dB.
 
     Raises:
         FrameMismatchError: The frame differs, or there is no golden frame; the message names the images.
@@ -97,18 +98,18 @@ def compare_frame(
 
 
 def driver_key() -> str:
-    """What a frame's pixels depend on besides its content: the OpenGL driver, and what `drawing_key` names."""
+    """Identify everything besides its content that a frame's pixels depend on: the OpenGL driver, and `drawing_key`."""
     gl = gl_info()
     return f"{gl.renderer} | {gl.version} | {drawing_key()}"
 
 
 def drawing_key() -> str:
-    """What text and scaling depend on: OpenCV and the vector instructions that it uses, which round differently."""
+    """Identify OpenCV and the CPU's vector instructions, which affect the rounding of text and scaled images."""
     return f"OpenCV {cv2.__version__} | {platform.machine()} {cv2.getCPUFeaturesLine()}"
 
 
 def psnr(a: Image, b: Image) -> float:
-    """Peak signal-to-noise ratio of two images, dB; inf where they are equal, -inf where their shapes differ."""
+    """Peak signal-to-noise ratio of two images, dB. inf if they are equal, -inf if their shapes differ."""
     if a.shape != b.shape:
         return float("-inf")
     error = float(np.mean((a.astype(np.float64) - b) ** 2))
@@ -116,7 +117,7 @@ def psnr(a: Image, b: Image) -> float:
 
 
 def difference_image(a: Image, b: Image) -> Image:
-    """Absolute difference of two images of equal shape, four times as strong."""
+    """Return the absolute difference of two images of equal shape, multiplied by four."""
     apart = np.abs(a.astype(np.int16) - b)
     return np.asarray(np.minimum(_GAIN * apart, 255), dtype=np.uint8)
 
@@ -161,8 +162,9 @@ def _hashes(golden: Path) -> Mapping[str, str]:
 
 
 def _store(frame: Image, path: Path, key: str) -> None:
-    """Write picture and hash; hashes of other drivers stay only while the picture does."""
-    same = path.is_file() and np.array_equal(_read(path), frame)
+    same = path.is_file() and np.array_equal(
+        _read(path), frame
+    )  # hashes of other drivers become invalid otherwise
     hashes = {**(_hashes(path) if same else {}), key: _digest(frame)}
     if not same:
         _write(path, frame)
@@ -173,7 +175,7 @@ def _store(frame: Image, path: Path, key: str) -> None:
 def _read(path: Path) -> Image:
     image = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
     if image is None:
-        raise FrameMismatchError(f"{path} is no picture; store it again with {UPDATE_VARIABLE}=1")
+        raise FrameMismatchError(f"cannot read the image {path}; store it again with {UPDATE_VARIABLE}=1")
     return np.asarray(image, dtype=np.uint8)
 
 

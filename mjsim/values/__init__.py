@@ -1,1 +1,1 @@
-"""Frozen values that cross the borders of packages, and errors."""
+"""Frozen values that packages exchange, and the errors of `mjsim`."""

@@ -1,4 +1,4 @@
-"""Actions of the person, and the answer of the world to them."""
+"""Actions of the person, their results, and the events that they cause."""
 
 import enum
 import math
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from mjsim.values.errors import ActionError
 
-TIME_TOLERANCE = 1e-6  # s; times are sums of many steps, and no decision may depend on their rounding
+TIME_TOLERANCE = 1e-6  # tolerance for comparing times, which are rounded sums of many steps, in seconds
 
 
 @dataclass(frozen=True)
 class Move:
-    """Walk, turn and look for one control step, in the person's own frame.
+    """Walk, turn and look for one control step. Velocities are in the person's own frame.
 
     Attributes:
         forward: Velocity along the heading, m/s.
@@ -43,10 +43,10 @@ class Pick:
     """Reach for an object and take it into a free hand.
 
     Attributes:
-        object: Instance name, or None for the nearest object in reach.
+        object: Instance name. None for the nearest object in reach.
 
     Raises:
-        ActionError: The name is no text.
+        ActionError: The name is not printable text.
     """
 
     object: str | None = None
@@ -60,10 +60,10 @@ class Place:
     """Put a carried object into its receptacle.
 
     Attributes:
-        object: Instance name, or None for the carried object whose receptacle is nearest.
+        object: Instance name. None for the carried object with the nearest receptacle.
 
     Raises:
-        ActionError: The name is no text.
+        ActionError: The name is not printable text.
     """
 
     object: str | None = None
@@ -79,19 +79,19 @@ def _check_name(name: str | None) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FollowPath:
-    """Walk along a path, pass objects on the floor, face the goal at its end, and pick or place there.
+    """Walk along a path around objects on the floor, then face the goal and pick or place there.
 
     Attributes:
         points: Floor polyline, m, shape (k, 2), k >= 1.
-        goal: Where the walk leads, m, shape (2,): an object or a receptacle may be beside the end of the path.
-        stop_distance: How near to the goal the walk ends, m; it also ends with the path.
-        then: The action at the end, once the person faces the goal; None to do nothing and face nothing.
-        until: Simulated time at which to stop, s; None for the end of the walk.
-        shown: Whether the path is shown by the HUD, which cuts off the part behind the person.
-        tolerance: Distance from the path at which to stop, m.
+        goal: Position of the object or receptacle that the path leads to, m, shape (2,). It may be off the path.
+        stop_distance: The walk ends at this distance from the goal, m, or at the end of the path.
+        then: Action at the end, once the person faces the goal. None to neither act nor turn.
+        until: Simulated time at which to stop, s. None to walk to the end.
+        shown: True if the HUD shows the path. It removes the part behind the person.
+        tolerance: Distance from the path at which the walk stops, m.
 
     Raises:
-        ActionError: The points or the goal have another shape, or a number is not finite.
+        ActionError: The points or the goal have a wrong shape, or a number is not finite.
     """
 
     points: NDArray[np.float64]
@@ -103,7 +103,7 @@ class FollowPath:
     tolerance: float = 0.4
 
     def __post_init__(self) -> None:
-        try:  # kernels take arrays of floats alone
+        try:  # kernels accept only float arrays
             for name in ("points", "goal"):
                 object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), np.float64))
         except (TypeError, ValueError) as error:
@@ -120,10 +120,10 @@ class FollowPath:
 
 @dataclass(frozen=True)
 class Wait:
-    """Stand still until the pick or place under way has ended; without one, for a time.
+    """Stand still until the current pick or place has ended, or until a time if there is none.
 
     Attributes:
-        until: Simulated time at which to stop, s; None for one control step.
+        until: Simulated time at which to stop, s. None for one control step.
 
     Raises:
         ActionError: The time is not a number.
@@ -143,11 +143,11 @@ Action = StepAction | FollowPath | Wait
 IDLE = Move()
 """Stand still."""
 WAIT = Wait()
-"""Wait for the end of a pick or place, or for one control step."""
+"""Wait for the end of a pick or place, or for one control step if there is none."""
 
 
 class Refusal(enum.Enum):
-    """Why an attempt is infeasible; a refusal changes nothing in the world (PAPER section 3.2)."""
+    """Reason why a pick or place is infeasible. A refused action does not change the world (PAPER section 3.2)."""
 
     BUSY = "busy"
     NOTHING_IN_REACH = "nothing_in_reach"
@@ -164,13 +164,13 @@ class Refusal(enum.Enum):
 
 @dataclass(frozen=True)
 class ActionResult:
-    """Answer to a `Pick` or `Place` at the control step that asked for it.
+    """Answer to a `Pick` or `Place`, given in its first control step.
 
     Attributes:
-        action: What was asked.
-        refusal: None when the motion was begun, else why it was not.
-        object: Instance name that the action resolved to, if any.
-        receptacle: Receptacle that is involved, if any.
+        action: The requested action.
+        refusal: None if the motion has started, otherwise the reason why it has not.
+        object: Instance name of the object concerned, if any.
+        receptacle: Key of the receptacle concerned, if any.
     """
 
     action: Pick | Place
@@ -180,12 +180,11 @@ class ActionResult:
 
     @property
     def applied(self) -> bool:
-        """Whether the motion was started."""
         return self.refusal is None
 
 
 class EventKind(enum.Enum):
-    """What happened in the physics: outcome of a motion, object lost or dislodged, or an anomaly (docs/metrics.md)."""
+    """Kind of an event: outcome of a motion, lost or dislodged object, or anomaly (docs/health.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"
@@ -198,21 +197,21 @@ class EventKind(enum.Enum):
 
 
 class Stop(enum.Enum):
-    """Why an action stopped."""
+    """Reason why an action of several control steps stopped."""
 
-    DONE = "done"  # complete: the control step, the wait, or the motion that was waited for
-    ARRIVED = "arrived"  # at the end of the path; the next step does what is to be done there
+    DONE = "done"  # complete
+    ARRIVED = "arrived"  # at the end of the path; the following step executes `FollowPath.then`
     BLOCKED = "blocked"  # the walk makes no progress
     CHANGED = "changed"  # the person has left the path, or an object has moved
-    EVENT = "event"  # something happened
-    DUE = "due"  # the time is up, or the limit of control steps is reached
+    EVENT = "event"  # a `WorldEvent` occurred
+    DUE = "due"  # the time or the limit of control steps is reached
 
 
 @dataclass(frozen=True)
 class WorldEvent:
-    """One physical outcome."""
+    """A physical event."""
 
     time: float  # simulated time, s
-    kind: EventKind  # what happened
+    kind: EventKind
     object: str  # instance name of the object concerned
     receptacle: str | None = None  # receptacle concerned, if any

@@ -1,4 +1,4 @@
-"""An episode: one disorganized house, ready to be tidied, as a value that round-trips through JSON."""
+"""Episodes: a disorganized house with a start pose, stored as JSON."""
 
 import dataclasses
 import json
@@ -13,13 +13,13 @@ from mjsim.support.files import read_json, read_text, write_text_atomically
 from mjsim.values.errors import EpisodeError, brief
 
 FORMAT_VERSION = 1
-CAPACITY = 2  # PAPER section 2: the knapsack of the study
-POINTS = 40  # of a house where objects may lie
+CAPACITY = 2  # objects that a person carries at most (PAPER section 2)
+POINTS = 40  # default number of points of a house where objects may be dropped
 
 
 @dataclass(frozen=True)
 class StartPose:
-    """Where the person stands at the start: x and y in m, heading in rad."""
+    """Initial pose of the person: x and y in m, heading in rad."""
 
     x: float
     y: float
@@ -33,7 +33,7 @@ class PlacedObject:
     name: str  # instance name, unique in the episode (`object_07`)
     category: str  # category key in the catalogue (`dishes`)
     model: str  # object model key in the catalogue (`mug`)
-    point: tuple[float, float]  # the sampled navigable point (x, y), m, where it was dropped
+    point: tuple[float, float]  # sampled navigable point (x, y), m, above which it was dropped
     position: tuple[float, float, float]  # settled origin, m
     quaternion: tuple[float, float, float, float]  # settled orientation, wxyz
 
@@ -44,9 +44,10 @@ class Episode:
 
     Attributes:
         house: Name of the house, or the path of its catalogue.
-        seed: Seed the episode was sampled with.
+        house: Name of the house, or the path of its catalogue.
+        seed: Seed of the sampling.
         start: Start pose of the person.
-        objects: Misplaced objects; level N holds the first N sampled points.
+        objects: Misplaced objects. An episode with N objects has the first N sampled points.
         receptacles: Receptacle keys of the house.
         targets: Object instance name -> receptacle key.
     """
@@ -82,15 +83,15 @@ class Episode:
                 )
 
     def to_json(self) -> str:
-        """Serialise with full float precision, keys in a fixed order."""
+        """Serialize with full float precision and a fixed order of keys."""
         return json.dumps({"format": FORMAT_VERSION, **dataclasses.asdict(self)}, indent=2) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> "Episode":
-        """Parse what `to_json` wrote.
+        """Parse the JSON of `to_json`.
 
         Raises:
-            EpisodeError: Not JSON, an unknown format version, or missing or ill-typed fields.
+            EpisodeError: The text is not JSON, its format version is unknown, or fields are missing or ill-typed.
         """
         try:
             found = msgspec.json.decode(text, type=_Header).format
@@ -107,7 +108,7 @@ class Episode:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 
     def save(self, path: Path) -> None:
-        """Write the JSON to `path`, whole or not at all."""
+        """Write the JSON to `path` atomically."""
         write_text_atomically(path, self.to_json())
 
     @classmethod
@@ -134,7 +135,6 @@ class _Header(msgspec.Struct):
 
 
 def _check_fields(raw: dict[str, Any]) -> None:
-    """Raise an EpisodeError if the JSON of an episode has an unknown field."""
     tables = [(Episode, "episode", raw), (StartPose, "start", raw["start"])]
     tables += [(PlacedObject, f"objects[{k}]", table) for k, table in enumerate(raw["objects"])]
     for kind, place, table in tables:

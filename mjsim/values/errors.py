@@ -3,17 +3,17 @@
     MjsimError
     ├── AssetError        a model, texture or catalogue entry is missing or malformed
     ├── EpisodeError      an episode file does not describe a valid episode
-    ├── HouseError        no house can be generated of this seed or recipe
+    ├── HouseError        no house can be generated from this seed or recipe
     ├── SamplingError     no disorganized house satisfies the constraints
-    ├── ActionError       an action's numbers are unusable (a refusal is not an error)
-    ├── PersonError       a value of a person is out of range
+    ├── ActionError       an action has invalid numbers (a refused action is not an error)
+    ├── PersonError       a parameter of a person is out of range
     ├── PhysicsError      MuJoCo warned, or a state is not finite
-    ├── StateError        a saved state does not fit the world, or the world is in the middle of a motion
+    ├── StateError        a saved state does not fit the world, or a motion is under way
     ├── RenderError       no GL context, or a frame cannot be drawn
-    ├── EnvironmentConfigError, EnvironmentStateError   an option, or a call at this moment, is unusable
+    ├── EnvironmentConfigError, EnvironmentStateError   an option is invalid, or a call is not possible now
     └── ViewerError       no window could be opened, or dm-control is not installed
 
-Every message names the offending value and what to do about it.
+Every message names the invalid value and how to correct it.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ class EpisodeError(MjsimError):
 
 
 class HouseError(MjsimError):
-    """No house can be generated as asked, or a recipe is of another generator."""
+    """No house can be generated as requested, or a recipe belongs to another version of the generator."""
 
 
 class SamplingError(MjsimError):
@@ -40,11 +40,11 @@ class SamplingError(MjsimError):
 
 
 class ActionError(MjsimError):
-    """An action's numbers are unusable."""
+    """An action has invalid numbers."""
 
 
 class PersonError(MjsimError):
-    """A value of a person is out of range."""
+    """A parameter of a person is out of range."""
 
 
 class PhysicsError(MjsimError):
@@ -59,7 +59,7 @@ class PhysicsError(MjsimError):
 
 
 class StateError(MjsimError):
-    """A saved state does not fit the world, or the world is in the middle of a motion."""
+    """A saved state does not fit the world, or a motion is under way."""
 
 
 class RenderError(MjsimError):
@@ -67,7 +67,7 @@ class RenderError(MjsimError):
 
 
 class EnvironmentConfigError(MjsimError):
-    """An option of the environment is unknown or unusable."""
+    """An option of the environment is unknown or invalid."""
 
 
 class EnvironmentStateError(MjsimError):
@@ -79,6 +79,6 @@ class ViewerError(MjsimError):
 
 
 def brief(text: str, limit: int = 600) -> str:
-    """A message as one line of at most `limit` characters: whatever a file holds, its error can be read."""
+    """Shorten a message, which may quote a file, to one line of at most `limit` characters."""
     line = " ".join(text.split())
     return line if len(line) <= limit else f"{line[: limit // 2]} ... {line[-limit // 2 :]}"

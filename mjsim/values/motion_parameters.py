@@ -1,36 +1,36 @@
-"""How a body moves: picking and placing, carrying, walking. Named tuples, so that kernels can take them."""
+"""Parameters of a person's motions, as named tuples because kernels accept those."""
 
 from typing import NamedTuple
 
 
 class MotionParameters(NamedTuple):
-    """How the person turns, looks, reaches, lifts, travels with a load, lowers it and withdraws; also for kernels.
+    """Parameters of picking and placing: turning, looking, reaching, lifting, lowering and withdrawing.
 
     Attributes:
         turn_gain: Yaw rate per heading error while turning to an object or receptacle, 1/s.
-        turn_timeout: Longest time that the turn may take, s.
-        object_tolerance: Heading error that is good enough for reaching, rad.
-        receptacle_tolerance: Heading error that is good enough for placing, rad.
-        standing_speed: Slower than this the person stands, m/s.
-        standing_turn_rate: Turning slower than this the person stands, rad/s.
-        look_gain: Share of a pitch error by which the head moves in one control step.
-        look_speed: Fastest pitch of the head during a motion, rad/s.
-        reach_time: From the hand's posture to the grip, s.
-        align_time: At the grip before the lift, s.
-        lift_time: From the floor to the carrying posture, s.
-        lead: Share of a reach or lift by which one of its parts (across, up) leads the other.
-        start_time: Added to distance over speed for a hand to start and stop, s.
-        least_travel: A hand does not travel over less than this, m.
-        travel_speed: Speed of a hand that carries a load over a receptacle, m/s.
+        turn_timeout: Longest time for that turn, s.
+        object_tolerance: Heading error at which reaching may start, rad.
+        receptacle_tolerance: Heading error at which placing may start, rad.
+        standing_speed: A slower person counts as standing, m/s.
+        standing_turn_rate: A person who turns more slowly counts as standing, rad/s.
+        look_gain: Share of the pitch error that the head corrects in one control step.
+        look_speed: Fastest pitch rate of the head during a motion, rad/s.
+        reach_time: Time from the hand's posture to the grip, s.
+        align_time: Pause at the grip before the lift, s.
+        lift_time: Time from the floor to the carrying posture, s.
+        lead: Head start of the horizontal or the vertical part of a reach or lift, as a share of its time.
+        start_time: Time for a hand to start and stop, added to distance over speed, s.
+        least_travel: Shorter horizontal hand movements are skipped, m.
+        travel_speed: Speed of a loaded hand above a receptacle, m/s.
         descent_speed: Speed of a hand that lowers a load, m/s.
-        hover_gap: From a travelling load to whatever it passes over, m.
-        hover_time: Above the slot before the descent, s.
-        release_gap: From a load to what is below it when the hand opens, m.
-        withdraw_steps: Control steps in which the opened hand goes straight up.
-        withdraw_step: By how much in each of them, m.
-        posture_gain: Speed of a hand on its way to a posture per distance left, 1/s.
-        posture_speed: Its fastest, m/s.
-        posture_acceleration: How fast that speed changes, m/s^2.
+        hover_gap: Gap between a moving load and everything below it, m.
+        hover_time: Pause above the slot before the descent, s.
+        release_gap: Gap between a load and what is below it when the hand opens, m.
+        withdraw_steps: Number of control steps in which the open hand moves straight up.
+        withdraw_step: Distance per such step, m.
+        posture_gain: Speed of a hand that returns to a posture, per remaining distance, 1/s.
+        posture_speed: Upper limit of that speed, m/s.
+        posture_acceleration: Acceleration limit of that speed, m/s^2.
     """
 
     turn_gain: float = 6.0
@@ -60,19 +60,19 @@ class MotionParameters(NamedTuple):
 
 
 class CarryingParameters(NamedTuple):
-    """How the hands carry: how high, and how they keep a load clear of the house and of the other hand's.
+    """Parameters of carrying: the height of loads, and how they avoid the house and each other.
 
     Attributes:
-        least_height: Of the underside of what is carried, m: above counters.
-        margin: Kept between a load and the house, m.
-        near: How far ahead a hand looks for room first, s.
-        far: How far ahead it looks at most, s.
-        most_shift: Farthest that a hand moves aside before it is drawn in, m.
-        stacking_gap: Between two loads one above the other, m.
+        least_height: Lowest height of a load's underside, above counters, m.
+        margin: Gap between a load and the house, m.
+        near: Shortest time that a hand looks ahead for free space, s.
+        far: Longest time that it looks ahead, s.
+        most_shift: Farthest that a hand moves sideways before it is drawn in, m.
+        stacking_gap: Gap between two loads, one above the other, m.
         stacking_distance: Distance over which the right load rises above the left one as they approach, m.
-        push_back: Speed, beyond that of the approach, at which a hand gives way to what its load touches, m/s.
-        return_rate: Share of that offset which it takes back in a second, 1/s.
-        most_compliance: Farthest that it gives way, m.
+        push_back: Speed at which a hand yields to what its load touches, in addition to that of the approach, m/s.
+        return_rate: Share of that displacement that is undone per second, 1/s.
+        most_compliance: Largest such displacement, m.
     """
 
     least_height: float = 0.97
@@ -88,18 +88,19 @@ class CarryingParameters(NamedTuple):
 
 
 class WalkingParameters(NamedTuple):
-    """How simulated participants walk along a path.
+    """Parameters of simulated participants who walk along a path.
 
     Attributes:
-        look_ahead: Where on the path the body heads for, m; longer cuts corners into walls, shorter wobbles.
-        look_beyond: Where on the path it looks for what is in the way, m; farther than `sidestep_range`.
-        sidestep_range: How far ahead an object on the floor is walked around, m.
-        object_clearance: Kept between the body and the middle of such an object, m.
-        sidestep_room: Room ahead per metre aside for passing on the far side, m/m; with less one would dither.
-        braking_share: Share of the acceleration that a person plans to brake with.
+        look_ahead: Distance along the path of the point to walk to, m. More cuts corners, less wobbles.
+        look_beyond: Distance along the path that is searched for obstacles, m. It exceeds `sidestep_range`.
+        sidestep_range: Distance at which the person starts to walk around an object on the floor, m.
+        object_clearance: Gap between the body and the middle of such an object, m.
+        sidestep_room: Distance ahead per sideways distance that is needed to pass on the far side, m/m. It prevents
+            changing sides back and forth.
+        braking_share: Share of the acceleration limit that is planned for braking.
         turn_gain: Yaw rate per heading error, 1/s.
-        facing_tolerance: Heading error that is good enough at the end of a walk, rad.
-        least_progress: A walk that gets on by less within the person's patience is blocked, m.
+        facing_tolerance: Heading error at which the person faces the goal, rad.
+        least_progress: A walk that progresses less than this within `PersonParameters.patience` is blocked, m.
     """
 
     look_ahead: float = 0.25
@@ -113,14 +114,14 @@ class WalkingParameters(NamedTuple):
     least_progress: float = 0.05
 
 
-# Groups of a person's values, by name.
+# Field of `PersonParameters` -> its type.
 GROUPS: dict[str, type[MotionParameters] | type[CarryingParameters] | type[WalkingParameters]] = {
     "motion": MotionParameters,
     "carrying": CarryingParameters,
     "walking": WalkingParameters,
 }
 
-# A person of these ranges has picked or placed within 30 s.
+# Ranges in which a pick or place ends within 30 s.
 GROUP_RANGES: dict[str, tuple[float, float]] = {
     "motion.turn_timeout": (0.04, 4.0),
     "motion.look_gain": (0.01, 1.0),

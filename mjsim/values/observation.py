@@ -1,4 +1,4 @@
-"""What the augmented-reality system observes: the whole state of the house (PAPER section 1)."""
+"""Observations of the whole state of a house (PAPER section 1), and series of control steps."""
 
 import enum
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ _HEALTH = 7  # numbers of a `HealthSample`
 
 
 class ObjectStatus(enum.Enum):
-    """Whether an object is on the floor, in a hand or in its receptacle."""
+    """Location of an object: on the floor, in a hand or in its receptacle."""
 
     LOOSE = "loose"
     CARRIED = "carried"
@@ -27,7 +27,7 @@ class Observation:
 
     Attributes:
         time: Simulated time since reset, s.
-        position: Floor position (x, y) of the person's body axis, m, shape (2,).
+        position: Position of the body axis on the floor, (x, y), m, shape (2,).
         heading: Yaw of the body, rad, 0 along +x, counter-clockwise.
         pitch: Pitch of the head, rad, positive upwards.
         eye: Position of the eye camera, m, shape (3,).
@@ -35,9 +35,9 @@ class Observation:
         object_names: Instance names, in the episode's order.
         object_positions: Object origins, m, shape (n, 3).
         object_quaternions: Orientations wxyz, shape (n, 4).
-        object_status: Status per object.
-        hands: Instance name carried by the left and the right hand, or None.
-        busy: Whether a pick or place motion is under way.
+        object_status: Status of each object.
+        hands: Instance names in the left and the right hand, or None.
+        busy: True while a pick or place is under way.
     """
 
     time: float
@@ -55,16 +55,14 @@ class Observation:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Instance names in the hands, left before right."""
         return tuple(name for name in self.hands if name is not None)
 
     def names_with(self, status: ObjectStatus) -> tuple[str, ...]:
-        """Instance names of the objects that have `status`, in the episode's order."""
         return tuple(n for n, s in zip(self.object_names, self.object_status, strict=True) if s is status)
 
 
 class StepStates(NamedTuple):
-    """The states that n control steps led to, one per row, for kernels to fill."""
+    """States after n control steps, one per row. Kernels fill the arrays in place."""
 
     time: NDArray[np.float64]  # simulated time, s, shape (n,)
     position: NDArray[np.float64]  # the person's floor positions, m, shape (n, 2)
@@ -77,7 +75,7 @@ class StepStates(NamedTuple):
 
     @classmethod
     def empty(cls, steps: int, objects: int) -> "StepStates":
-        """Arrays for `steps` control steps, not yet filled."""
+        """Allocate uninitialized arrays."""
         return cls(
             time=np.empty(steps),
             position=np.empty((steps, 2)),
@@ -93,7 +91,6 @@ class StepStates(NamedTuple):
     def of(
         cls, seen: Sequence[Observation], state_hashes: Sequence[int], health: Sequence[tuple[float, ...]]
     ) -> "StepStates":
-        """The states that were observed."""
         return cls(
             time=np.array([o.time for o in seen]),
             position=np.array([o.position for o in seen]),
@@ -108,11 +105,11 @@ class StepStates(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Control steps that were taken."""
+    """Control steps that were executed."""
 
-    # the action of every step, or their moves: forward, left (m/s), turn and look (rad/s), shape (n, 4)
+    # the action of a single step, or all moves: forward, left (m/s), turn and look (rad/s), shape (n, 4)
     actions: StepAction | NDArray[np.float64]
-    passed: StepStates | None = None  # the states between the steps, n - 1 of them; None for a single step
+    passed: StepStates | None = None  # the n - 1 states between the steps, or None for a single step
 
     def __len__(self) -> int:
         return 1 if self.passed is None else len(self.passed.time) + 1

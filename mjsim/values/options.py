@@ -1,4 +1,4 @@
-"""Rules of the world that a study may change."""
+"""Options of the simulated world."""
 
 import dataclasses
 import math
@@ -9,27 +9,27 @@ from mjsim.values.errors import ActionError
 
 FIDELITIES = ("full", "event")
 CAPACITIES = (1, 2)
-REST_STEPS = 4  # control steps in a row below `settle_speed`, after which an object is at rest
+REST_STEPS = 4  # consecutive control steps below `settle_speed` after which an object is at rest
 
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Time step, grip, rest and the tier of fidelity; what differs from person to person is in `PersonParameters`.
+    """Options of a world that are the same for every person: time step, grip, rest, tier of fidelity.
 
     Attributes:
-        control_timestep: Duration of one `World.step`, s; a multiple of the model's timestep.
-        grip_distance: A hand grips only within this distance of the grip site, m.
-        grip_error: A weld stretched farther than this slips, m.
-        grip_patience: For how long it may stay stretched, s.
-        settle_time: How long a released object may take to come to rest, s.
-        settle_speed: Slower than this is at rest, m/s.
-        volume_margin: How far outside of a receptacle's volume a centre still counts as inside, m.
-        fidelity: `full`, everything in physics; `event`, kinematic except for the fall of released objects
-            (docs/simulation.md).
-        capacity: How many objects are carried at most: 2, or 1 with the right hand alone.
+        control_timestep: Duration of one `World.step`, s. A multiple of the model's timestep.
+        grip_distance: Farthest distance of a hand from the grip site at which it can grip, m.
+        grip_error: A weld that is stretched farther than this slips, m.
+        grip_patience: Time for which a weld may be stretched farther, s.
+        settle_time: Longest time for a released object to come to rest, s.
+        settle_speed: Slower objects are at rest, m/s.
+        volume_margin: A centre this far outside a receptacle's volume still counts as inside, m.
+        fidelity: `full`, everything in physics, or `event`, kinematic except for the fall of released objects
+            (docs/fidelity.md).
+        capacity: Number of objects that can be carried: 2, or 1 with only the right hand.
 
     Raises:
-        ActionError: A value is not a positive finite number, there is no such fidelity, or the capacity is not 1 or 2.
+        ActionError: A number is not positive and finite, the fidelity is unknown, or the capacity is not 1 or 2.
     """
 
     control_timestep: float = 0.04

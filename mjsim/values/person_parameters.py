@@ -1,4 +1,4 @@
-"""What differs from person to person: speeds, reach, size, eyes and hands. Every tier of fidelity takes them."""
+"""Parameters of a person: speeds, reach, size, eyes and hands. All tiers of fidelity use them."""
 
 import dataclasses
 import math
@@ -15,50 +15,50 @@ from mjsim.values.motion_parameters import (
     WalkingParameters,
 )
 
-PICTURE_ASPECT = 4 / 3  # width over height of the picture whose whole height a person sees
+PICTURE_ASPECT = 4 / 3  # aspect ratio (width over height) of the picture that fills a person's field of view
 
 
 def _number(default: float, low: float, high: float, unit: str) -> Any:
-    """A field with a valid range, both ends included."""
     return field(default=default, metadata={"range": (low, high), "unit": unit})
 
 
 @dataclass(frozen=True)
 class PersonParameters:
-    """One person. The world, the planner, the picture and simulated participants all take their numbers from here.
+    """One person. The world, the planner, pictures and simulated participants all use these parameters.
 
-    Where no source is given, a value is this project's choice.
+    Values without a source are choices of this project.
 
     Example:
         >>> round(PersonParameters(walking_speed=1.0).fastest_walk, 3)
         1.077
 
     Attributes:
-        walking_speed: Usual walk, m/s, at which simulated participants walk; healthy adults walk comfortably at 0.94 to
+        walking_speed: Preferred speed, m/s, at which simulated participants walk. Healthy adults prefer 0.94 to
             1.43 m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.
-        walking_acceleration: How fast the walking velocity changes, m/s^2.
+        walking_acceleration: Limit of the walking acceleration, m/s^2.
         turning_speed: Fastest turn of the body, rad/s.
-        turning_acceleration: How fast the turning rate changes, rad/s^2.
-        looking_speed: Fastest pitch of the head while walking, rad/s.
-        reach: Farthest that an object's centre or a receptacle's volume may be from the body's axis, horizontally,
-            to pick or place, m: an arm's length and a step of bending forward.
-        body_radius: Radius of the trunk, m. Planned paths keep 0.05 m more from walls. Houses are sampled for a person
-            of the default radius, so that one house serves all.
-        eye_height: m; standing adults have it at 1.4 to 1.75 m (Pheasant and Haslegrave, Bodyspace, 2006).
-        field_of_view: Horizontal field of view of the picture and of what a participant perceives, rad. Vertically, a
-            participant sees what a picture of 4:3 shows; the default is 70 degrees high there.
-        viewing_distance: How far away an object is noticed, m.
+        turning_acceleration: Limit of the angular acceleration of the body, rad/s^2.
+        looking_speed: Fastest pitch rate of the head while walking, rad/s.
+        reach: Farthest horizontal distance from the body's axis to an object's centre or a receptacle's volume for
+            picking or placing, m. It is an arm's length and a step of bending forward.
+        body_radius: Radius of the trunk, m. Planned paths keep 0.05 m more from walls. Houses are sampled for the
+            default radius, so that everybody can use the same house.
+        eye_height: Height of the eyes, m. Those of standing adults are at 1.4 to 1.75 m (Pheasant and Haslegrave,
+            Bodyspace, 2006).
+        field_of_view: Horizontal field of view of pictures and of perception, rad. Vertically, a participant sees what
+            a 4:3 picture shows, which is 70 degrees by default.
+        viewing_distance: Distance at which an object is noticed, m.
         looking_interval: Time between two looks for objects while walking, s.
-        reading_time: For how long a participant stands and reads the HUD before each visit, s. The default takes no
-            time; preparing a step mentally takes 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read 238
-            words a minute (Brysbaert, Journal of Memory and Language 109, 2019).
-        patience: For how long a walk may make no progress before the person steps back or looks for another way, s.
-        motion: How the hands pick and place.
-        carrying: How they carry.
-        walking: How a simulated participant walks along a path.
+        reading_time: Time for which a participant stands and reads the HUD before each visit, s. By default 0.
+            Preparing a step mentally takes 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read 238
+            words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
+        patience: Time without progress after which a walking person steps back or looks for another way, s.
+        motion: Picking and placing.
+        carrying: Carrying.
+        walking: Walking of simulated participants.
 
     Raises:
-        PersonError: A value is no number of its range.
+        PersonError: A value is not a number, or is out of range.
     """
 
     walking_speed: float = _number(1.3, 0.1, 8.0, "m/s")
@@ -72,7 +72,7 @@ class PersonParameters:
     field_of_view: float = _number(
         2.0 * math.atan(PICTURE_ASPECT * math.tan(math.radians(35.0))),
         math.radians(20.0),
-        2.618,  # 150 degrees, as it is printed
+        2.618,  # 150 degrees, rounded as in messages
         "rad",
     )
     viewing_distance: float = _number(8.0, 0.5, 100.0, "m")
@@ -92,21 +92,21 @@ class PersonParameters:
 
     @property
     def fastest_walk(self) -> float:
-        """Fastest walk, m/s: `Move` asks for no more."""
+        """Fastest walking speed, m/s, to which `Move` is limited."""
         return self.walking_speed * 14 / 13
 
     @property
     def vertical_field(self) -> float:
-        """Vertical field of view, rad: that of a picture of 4:3."""
+        """Vertical field of view of a 4:3 picture, rad."""
         return 2.0 * math.atan(math.tan(self.field_of_view / 2.0) / PICTURE_ASPECT)
 
     def as_dict(self) -> dict[str, Any]:
-        """Every value by name, JSON-ready; those of `GROUPS` under the group's name."""
+        """Return all parameters as JSON-ready values. Those of `GROUPS` are nested."""
         values: dict[str, Any] = {name: getattr(self, name) for name in RANGES}
         return values | {group: getattr(self, group)._asdict() for group in GROUPS}
 
     def unusual(self) -> str:
-        """The values that differ from the default person's, in words; empty if none does."""
+        """Describe the parameters that differ from the defaults. Empty if there are none."""
         default = PersonParameters()
         others = [
             (name, unit)
@@ -121,10 +121,10 @@ class PersonParameters:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "PersonParameters":
-        """The person whose `as_dict` this is.
+        """Restore the parameters that `as_dict` returned.
 
         Raises:
-            PersonError: A name is unknown or missing, or a value is unusable.
+            PersonError: A name is unknown or missing, or a value is invalid.
         """
         expected = {*RANGES, *GROUPS}
         if set(values) != expected:
@@ -138,7 +138,7 @@ class PersonParameters:
         return cls(**{**values, **groups})
 
 
-# Name of every number of a person -> lowest and highest value, and its unit.
+# Parameter -> lowest value, highest value and unit.
 RANGES: dict[str, tuple[float, float, str]] = {
     f.name: (*f.metadata["range"], f.metadata["unit"])
     for f in dataclasses.fields(PersonParameters)

@@ -1,1 +1,1 @@
-"""The house as files: how it is named, its catalogue, and the models that the catalogue leads to."""
+"""Houses as files: names, catalogues and model files."""

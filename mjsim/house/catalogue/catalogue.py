@@ -1,4 +1,4 @@
-"""What a house offers: its rooms, categories, receptacles and object models, read from `catalogue.toml`."""
+"""Catalogues of houses: rooms, categories, receptacles and object models, read from `catalogue.toml`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class Receptacle:
 
     key: str  # catalogue key (`dish_bin`); the house has a site `mount:<key>`
     label: str  # name shown to the person (`Dish bin`)
-    place: str  # semantic location within the room (`on the counter, beside the sink`)
+    place: str  # location within the room (`on the counter, beside the sink`)
     room: str  # room key
     category: str  # category key it takes
     path: Path  # its MJCF file
@@ -41,7 +41,7 @@ class Receptacle:
 
 @dataclass(frozen=True)
 class Category:
-    """Objects that belong into the same receptacle (PAPER section 4)."""
+    """A category of objects that belong in the same receptacle (PAPER section 4)."""
 
     key: str  # catalogue key (`dishes`)
     label: str  # name shown to the person (`Dishes`)
@@ -51,21 +51,21 @@ class Category:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """Everything a house can be furnished and cluttered with; mappings keep the file's order.
+    """The contents of a house's catalogue. Mappings keep the order of the file.
 
-    Two catalogues are equal when the contents of all their files are.
+    Two catalogues are equal if the contents of all their files are equal.
 
     Attributes:
-        ref: How the house was named.
+        ref: Reference by which the house was loaded.
         label: Name of the house shown to the person.
         house_path: MJCF file of the house.
         rooms: Room key -> label.
         categories: Category key -> category.
         receptacles: Receptacle key -> receptacle.
         objects: Object model key -> object model.
-        points: How many points for objects the house is meant to have at most; None where it does not say.
-        content: Hash over the catalogue and every model, mesh and texture file that it leads to.
+        content: Hash of the catalogue and of all model, mesh and texture files that it refers to.
         folder: Folder of the catalogue.
+        points: Number of points for objects that the house is designed for, or None if not given.
     """
 
     ref: HouseRef
@@ -87,38 +87,38 @@ class Catalogue:
 
     @property
     def name(self) -> str:
-        """Name of the house in records."""
         return self.ref.name
 
     def in_language(self, language: str) -> "Catalogue":
-        """The same catalogue with labels and places in a language, in English where there is no translation.
+        """Translate labels and places. Those without a translation stay in English.
 
         Raises:
-            AssetError: A file of labels cannot be used.
+            AssetError: A file of labels cannot be read.
         """
         labels = read_labels(language, (models_root(), self.folder))
 
-        def said(text: str) -> str:
+        def translated(text: str) -> str:
             return labels.get(text, text)
 
         return replace(
             self,
-            label=said(self.label),
-            rooms={key: said(label) for key, label in self.rooms.items()},
-            categories={k: replace(c, label=said(c.label)) for k, c in self.categories.items()},
+            label=translated(self.label),
+            rooms={key: translated(label) for key, label in self.rooms.items()},
+            categories={k: replace(c, label=translated(c.label)) for k, c in self.categories.items()},
             receptacles={
-                k: replace(r, label=said(r.label), place=said(r.place)) for k, r in self.receptacles.items()
+                k: replace(r, label=translated(r.label), place=translated(r.place))
+                for k, r in self.receptacles.items()
             },
-            objects={k: replace(o, label=said(o.label)) for k, o in self.objects.items()},
+            objects={k: replace(o, label=translated(o.label)) for k, o in self.objects.items()},
         )
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
-        """Read and check the catalogue of a house that need not be generated.
+        """Read and check the catalogue of a house on disk.
 
         Args:
-            house: Name of a folder under `models/houses`, or the path of a `catalogue.toml` or its folder.
-                `mjsim.load_catalogue` takes generated houses, too.
+            house: Name of a folder under `models/houses`, or path of a `catalogue.toml` or its folder. For generated
+                houses, use `mjsim.load_catalogue`.
 
         Raises:
             AssetError: As by `read`.
@@ -132,11 +132,11 @@ class Catalogue:
 
     @classmethod
     def read(cls, house: HouseRef) -> "Catalogue":
-        """Read and check the catalogue of a house. Nothing is generated.
+        """Read and check a catalogue. This never generates a home.
 
         Raises:
-            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused
-                or used twice; the message names the culprit.
+            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or
+                used twice. The message names the entry.
         """
         tables, text = read_tables(house)
         return _CatalogueReader(catalogue_file(house), tables).catalogue(house, text)
@@ -155,8 +155,6 @@ class _Tables(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _ModelEntry(msgspec.Struct):
-    """An entry that names a model, such as [house]."""
-
     label: Label
     model: _Text
 
@@ -166,7 +164,7 @@ class _HouseEntry(_ModelEntry):
 
 
 class _ObjectEntry(_ModelEntry):
-    category: _Text | None = None  # instead of being listed there
+    category: _Text | None = None  # alternative to being listed in the category
 
 
 class _ReceptacleEntry(_ModelEntry):
@@ -181,8 +179,6 @@ class _CategoryEntry(msgspec.Struct):
 
 
 class _CatalogueReader:
-    """The tables of a catalogue; every error names the file and the entry."""
-
     def __init__(self, path: Path, raw: dict[str, Any]) -> None:
         self._path = path
         tables = self._convert(raw, _Tables, "catalogue")
@@ -193,11 +189,9 @@ class _CatalogueReader:
         self._objects = self._entries(tables.objects, _ObjectEntry, "objects")
 
     def catalogue(self, house: HouseRef, text: str) -> Catalogue:
-        categories, receptacles, objects = (
-            self._checked_categories(),
-            self._checked_receptacles(),
-            self._checked_objects(),
-        )
+        categories = self._checked_categories()
+        receptacles = self._checked_receptacles()
+        objects = self._checked_objects()
         house_path = self._file(self._house, "house")
         models = [house_path, *(r.path for r in receptacles.values()), *(o.path for o in objects.values())]
         return Catalogue(
@@ -232,7 +226,6 @@ class _CatalogueReader:
         return {key: self._convert(entry, kind, f"{name}.{key}") for key, entry in table.items()}
 
     def _file(self, entry: _ModelEntry, where: str) -> Path:
-        """The model's file, relative to the catalogue, else to the models that come with the package."""
         for folder in (self._path.parent, models_root()):
             if is_file(folder / entry.model):
                 return folder / entry.model
@@ -259,7 +252,6 @@ class _CatalogueReader:
         return {k: Category(k, e.label, e.receptacle, self._members(k)) for k, e in self._categories.items()}
 
     def _members(self, category: str) -> tuple[str, ...]:
-        """Objects that a category lists, then those that name it themselves."""
         listed = self._categories[category].objects
         return (
             *listed,

@@ -1,4 +1,4 @@
-"""Finding and reading the files of catalogues; one may extend another."""
+"""Finding and reading files of catalogues and of labels."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -11,14 +11,14 @@ from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, pa
 from mjsim.support.files import is_file, read_text
 from mjsim.values.errors import AssetError, brief
 
-MAX_EXTENDS = 20  # catalogues, each of which extends the next
+MAX_EXTENDS = 20  # longest chain of catalogues that extend each other
 _SHOWN = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]*"
-# A line of text, not blank
+# One line of text that is not blank
 Label = Annotated[str, msgspec.Meta(pattern=rf"^{_SHOWN}\S{_SHOWN}\Z", max_length=80)]
 
 
 def base_of(house: HouseRef) -> HouseRef | None:
-    """The house that a catalogue extends. None if it extends none, or cannot be read."""
+    """Return the house that a catalogue extends. None if it extends none, or if it cannot be read."""
     if house.file is None:
         return None
     try:
@@ -29,10 +29,10 @@ def base_of(house: HouseRef) -> HouseRef | None:
 
 
 def catalogue_file(house: HouseRef) -> Path:
-    """Absolute path of a catalogue.
+    """Return the absolute path of a catalogue.
 
     Raises:
-        AssetError: There is none, or the home has yet to be generated.
+        AssetError: There is no such catalogue, or the home has not been generated yet.
     """
     if house.file is None:
         raise AssetError(
@@ -48,9 +48,9 @@ def catalogue_file(house: HouseRef) -> Path:
 
 
 def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
-    """Read the tables of a catalogue and its text, each with those of the catalogue that it extends.
+    """Read a catalogue's tables and text, including those of the catalogues that it extends.
 
-    An entry replaces the one of the same key in the extended catalogue.
+    An entry replaces the entry of the same key in an extended catalogue.
     """
     path = catalogue_file(house)
     try:
@@ -75,7 +75,6 @@ def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[
 
 
 def _name_models(tables: dict[str, Any], folder: Path) -> None:
-    """Name the model files that lie beside a catalogue absolutely, in place, for use in another folder."""
     entries = [tables.get("house")]
     for table in ("receptacles", "objects"):
         if isinstance(tables.get(table), dict):
@@ -88,10 +87,12 @@ def _name_models(tables: dict[str, Any], folder: Path) -> None:
 
 
 def read_labels(language: str, folders: Iterable[Path]) -> Mapping[str, str]:
-    """English label -> label in a language; later folders take precedence, and a folder may have no file.
+    """Read the files `labels.LANGUAGE.toml`, which map English labels to translations.
+
+    Later folders take precedence. A folder may have no such file.
 
     Raises:
-        AssetError: A file cannot be read, or holds something other than labels.
+        AssetError: A file cannot be read, or has values that are not labels.
     """
     found: dict[str, str] = {}
     for path in (folder / f"labels.{language}.toml" for folder in folders):

@@ -1,4 +1,4 @@
-"""Names of generated homes: a seed, a number of rooms, and the version of the generator."""
+"""Names of generated homes (`generated:SEED?rooms=N&version=V`), and random generators derived from their seeds."""
 
 import hashlib
 import re
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 
 PREFIX = "generated:"
-VERSION = 3  # of the generator; raise it with every change that alters the home of a seed
-ROOMS = (1, 10)  # least and most rooms of a home
+VERSION = 3  # version of the generator; increase it with every change that alters the home of a seed
+ROOMS = (1, 10)  # smallest and largest number of rooms
 MAX_SEED = 2**63 - 1
-MAX_HOUSES = 100_000  # in a range
-# Shares of homes with 1 to 10 rooms, including bathrooms and halls, if no number is asked for.
+MAX_HOUSES = 100_000  # longest range of seeds
+# Probabilities of 1 to 10 rooms, including bathrooms and halls, if the name does not give their number.
 _SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
 _SPLITS: Mapping[str, float] = {"train": 0.8, "validation": 0.9, "test": 1.0}
 
 
 @dataclass(frozen=True)
 class GeneratedName:
-    """The home that `generated:7?rooms=5` names."""
+    """Parsed name of a generated home. `str()` returns the name in full."""
 
     seed: int
     rooms: int
@@ -35,7 +35,6 @@ class GeneratedName:
 
 
 def is_generated(house: str) -> bool:
-    """True if a text names a house by its seed."""
     return house.startswith(PREFIX)
 
 
@@ -43,7 +42,7 @@ def parse_name(house: str) -> GeneratedName:
     """Parse `generated:SEED`, `generated:SEED?rooms=N` or a recorded name.
 
     Raises:
-        HouseError: It is malformed, or was recorded by another version of the generator.
+        HouseError: The name is malformed, or belongs to another version of the generator.
     """
     found = re.fullmatch(rf"{PREFIX}(\d{{1,19}})(?:\?(.*))?", house, re.ASCII)
     values = dict(parse_qsl(found[2], keep_blank_values=True)) if found and found[2] else {}
@@ -59,10 +58,9 @@ def parse_name(house: str) -> GeneratedName:
 
 
 def generated_names(houses: str) -> list[str]:
-    """Names of the home `generated:7`, or of a range of seeds such as `generated:0:200`, whose end is excluded.
+    """List the names of the home `generated:7`, or of a range such as `generated:0:200`, whose end is excluded.
 
-    Both take `?rooms=5` and `?split=train`, which leaves out the seeds of the other splits.
-
+    Both accept `?rooms=5`, and `?split=train` to keep only the seeds of one split.
     Raises:
         HouseError: The range is malformed or empty.
     """
@@ -86,17 +84,17 @@ def generated_names(houses: str) -> list[str]:
 
 
 def split_of(seed: int) -> str:
-    """`train`, `validation` or `test`: 80, 10 and 10 % of all seeds, by a hash."""
+    """Return the split of a seed, by a hash: `train` (80 %), `validation` (10 %) or `test` (10 %)."""
     share = stream(seed, "split").random()
     return next(name for name, end in _SPLITS.items() if share < end)
 
 
 def check_version(version: int, subject: str) -> None:
-    """Raise a HouseError, which names the subject, unless `version` is that of this generator."""
+    """Raise a HouseError about `subject` unless `version` is that of this generator."""
     if version != VERSION:
         raise HouseError(
-            f"{subject} is of version {version} of the generator of houses, and this is version {VERSION}; "
-            f"install the mjsim of then, or generate it anew without the version"
+            f"{subject} has version {version} of the house generator, but this mjsim has version {VERSION}; "
+            f"install the older mjsim, or generate the home again without the version"
         )
 
 
@@ -105,8 +103,11 @@ def _default_rooms(seed: int) -> int:
 
 
 def stream(seed: int, *purpose: str) -> "np.random.Generator":
-    """The generator of a purpose, such as `stream(7, "furniture", "bedroom")`: the same in every process and order."""
-    import numpy as np  # here, as names of houses are read before anything is simulated: --help starts fast
+    """Return the random generator of a purpose, such as `stream(7, "furniture", "bedroom")`.
+
+    Purposes have independent generators, so drawing more for one does not change the others.
+    """
+    import numpy as np  # imported here because names of houses are parsed by every command, even for --help
 
     digest = hashlib.sha256("/".join(purpose).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]

@@ -1,4 +1,4 @@
-"""References to houses: shipped, in a folder, generated from a seed, or given by a recipe."""
+"""References to houses, and the folder of the models that come with the package."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +13,14 @@ CATALOGUE = "catalogue.toml"
 
 @dataclass(frozen=True)
 class HouseRef:
-    """A house as it was named, parsed once.
+    """A parsed reference to a house.
 
     Attributes:
-        kind: How it was named.
-        name: Its name in records: a path for a folder or a recipe.
-        file: Its `catalogue.toml`; None for a home that has yet to be generated (`mjsim.generator.home_cache.ensured`).
-        base: The house that its catalogue extends, if that is a generated one.
+        kind: Shipped with the package, in a folder, generated from a seed, or generated from a recipe.
+        name: Name of the house in records. A path for folders and recipes.
+        file: Path of its `catalogue.toml`. None for a home that has not been generated yet
+            (`mjsim.generator.home_cache.ensured`).
+        base: Generated house that its catalogue extends, if any.
     """
 
     kind: Literal["shipped", "folder", "generated", "recipe"]
@@ -29,20 +30,20 @@ class HouseRef:
 
     @property
     def is_path(self) -> bool:
-        """True if the name is the path of a catalogue or a recipe."""
+        """True if `name` is a path."""
         return self.kind in ("folder", "recipe")
 
 
 def parse_house(house: str, folder: Path = Path()) -> HouseRef:
-    """Parse the name of a house. Files need not exist.
+    """Parse a reference to a house. Its files need not exist.
 
     Args:
-        house: Name of a folder under `models/houses`, seed of a generated home (`generated:7`), path of a
-            `catalogue.toml`, of the folder that holds one, or of a recipe.
-        folder: Folder that relative paths start from.
+        house: Name of a folder under `models/houses`, seed of a generated home (`generated:7`), or path of a
+            `catalogue.toml`, of the folder that contains one, or of a recipe.
+        folder: Base of relative paths.
 
     Raises:
-        HouseError: The name of a generated home is malformed, or of another version of the generator.
+        HouseError: The name of a generated home is malformed, or belongs to another version of the generator.
     """
     if is_generated(house):
         return HouseRef("generated", str(parse_name(house)), None)
@@ -58,9 +59,9 @@ def parse_house(house: str, folder: Path = Path()) -> HouseRef:
 
 
 def models_root() -> Path:
-    """Folder that holds `houses/`, `receptacles/` and `objects/`; `AssetError` where there is none.
+    """Return the folder with `houses/`, `receptacles/` and `objects/`. Raise an AssetError if it is missing.
 
-    An installed wheel carries it inside the package; a checkout has it beside the package.
+    An installed wheel contains it inside the package, a checkout next to the package.
     """
     package = Path(__file__).resolve().parents[2]
     candidates = (package / "models", package.parent / "models")

@@ -1,4 +1,4 @@
-"""Reading MJCF files, and telling by a hash whether any file of a house has changed."""
+"""Reading of MJCF files, and hashing of all files of a house."""
 
 import hashlib
 import shutil
@@ -16,11 +16,11 @@ from mjsim.values.errors import AssetError
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """An MJCF file, read with everything that it includes or refers to.
+    """An MJCF file that was read with all files that it includes or refers to.
 
     Attributes:
-        path: The file.
-        elements: Its elements and those of the files that it includes; none of files that are not XML.
+        path: Path of the file.
+        elements: Its XML elements and those of included files. Included files that are not XML have none.
     """
 
     path: Path
@@ -28,12 +28,12 @@ class ModelFile:
 
     @classmethod
     def read(cls, path: Path) -> "ModelFile":
-        """Read a file, and check that it and the files that it leads to can be read.
+        """Read a file, and check that all files that it refers to can be read.
 
         Raises:
             OSError: The file cannot be read.
-            UnicodeDecodeError: It is not UTF-8.
-            AssetError: A file that it leads to cannot be read. One that is missing is reported by `spec`.
+            UnicodeDecodeError: The file is not UTF-8.
+            AssetError: A file that it refers to cannot be read. Missing files are reported by `spec` instead.
         """
         content = read_bytes(path)
         content.decode("utf-8-sig")
@@ -43,14 +43,18 @@ class ModelFile:
         return cls(path, elements)
 
     def spec(self) -> mujoco.MjSpec:
-        """An editable model with absolute names of asset files; MuJoCo's ValueError if it refuses the file."""
+        """Return an editable model whose asset files have absolute paths, or raise MuJoCo's ValueError."""
         spec = mujoco.MjSpec.from_file(str(self.path))
         _name_files(spec, self.path.parent)
         return spec
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
-    """Read an MJCF file that has a top-level body, with asset files named absolutely, since attaching mixes folders."""
+    """Read an MJCF file as an editable model whose asset files have absolute paths, so that it can be attached.
+
+    Raises:
+        AssetError: The file is invalid, or has no top-level body of the name `body`.
+    """
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
@@ -62,7 +66,6 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
 
 
 def _name_files(spec: mujoco.MjSpec, folder: Path) -> None:
-    """Name the asset files of a spec absolutely, in place; `folder` is that of its file."""
     for mesh in spec.meshes:
         mesh.file = _absolute(folder, spec.compiler.meshdir, mesh.file)
     for texture in spec.textures:
@@ -72,7 +75,7 @@ def _name_files(spec: mujoco.MjSpec, folder: Path) -> None:
 
 
 def copy_house(path: Path, folder: Path) -> None:
-    """Copy the folder of a house into another, with the textures of the package that it uses, for stock MuJoCo."""
+    """Copy the folder of a house, and the package's textures that it uses, so that stock MuJoCo can load it."""
     shutil.copytree(path.parent, folder, dirs_exist_ok=True)
     found = list(elements(path))
     directory = next((e.get("texturedir", "") for e in found if e.tag == "compiler"), "")
@@ -84,31 +87,31 @@ def copy_house(path: Path, folder: Path) -> None:
 
 
 def elements(path: Path) -> Iterator[ET.Element]:
-    """All elements of an MJCF file and of the files that it includes; of files that are not XML, none."""
+    """Yield all XML elements of an MJCF file and of files that it includes. Files that are not XML yield none."""
     yield from _elements(str(path), str(path.parent), {})
 
 
 def content_hash(text: str, models: Iterable[Path]) -> str:
-    """64 hex digits over a text and the bytes of MJCF files, with every file that they include or refer to.
+    """Hash a text and MJCF files with all files that they include or refer to. Return 64 hex digits.
 
-    A file that is missing or cannot be parsed is no error here: reading the model reports it.
+    Files that are missing or cannot be parsed raise no error, because reading the model reports them.
     """
     files: dict[str, bytes] = {}
     for model in models:
         _read_assets(model.parent, list(_elements(str(model), str(model.parent), files)), files)
-    # In the order in which they are referred to: two files that swap their contents are another house.
+    # In the order of references: swapping the contents of two files makes a different house.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 
 
 def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
-    """All elements of an MJCF file in a folder and of the files that it includes; adds these to `files`."""
+    """Yield the elements of an MJCF file and of files that it includes, and add their contents to `files`."""
     if path not in files and _read(path, files):
         yield from _parsed(files[path], folder, files)
 
 
 def _parsed(content: bytes, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
-    """Like `_elements`, for the content of a file in a folder."""
+    """Like `_elements`, for the content of a file in `folder`."""
     try:
         root = ET.fromstring(content)
     except ET.ParseError:
@@ -120,7 +123,6 @@ def _parsed(content: bytes, folder: str, files: dict[str, bytes]) -> Iterator[ET
 
 
 def _read_assets(folder: Path, elements: Sequence[ET.Element], files: dict[str, bytes]) -> None:
-    """Add the files that the elements of a model in a folder refer to."""
     settings = {name: value for e in elements if e.tag == "compiler" for name, value in e.items()}
     for element in elements:
         for name in [name for name in element.attrib if name.startswith("file")]:
@@ -143,7 +145,6 @@ def _read(path: str, files: dict[str, bytes]) -> bool:
 
 
 def _texture(folder: Path, subfolder: str, file: str) -> str:
-    """A texture beside the model, else of those that come with the package."""
     beside, shared = _absolute(folder, subfolder, file), models_root() / "textures" / file
     return str(shared) if file and not is_file(Path(beside)) and is_file(shared) else beside
 

@@ -1,1 +1,1 @@
-"""The compiled house without objects and person: rooms, receptacles, floor, rays."""
+"""Compiled houses without objects and a person: rooms, receptacles, floor, rays."""

@@ -1,8 +1,8 @@
-"""Tighter bounding volume hierarchies for the house: half as many box tests in collision detection and ray casts.
+"""Tighter bounding volume hierarchies for houses, which halve the box tests of collision detection and ray casts.
 
 MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house this groups table legs with
-walls and floors, and the boxes overlap. Here the tree is rebuilt over the same leaves with the surface area heuristic
-(MacDonald and Booth, 1990). Contacts and ray hits do not change.
+walls and floors, so boxes overlap. This module rebuilds the tree over the same leaves with the surface area heuristic
+(MacDonald and Booth, 1990). Contacts and ray hits stay the same.
 """
 
 import math
@@ -28,7 +28,7 @@ def tighten(model: mujoco.MjModel) -> None:
         made, children, leaf, depth = surface_area_tree(
             boxes[:, :3] - boxes[:, 3:], boxes[:, :3] + boxes[:, 3:]
         )
-        if len(made) != count:  # not a binary tree with one geom per leaf: leave it as it is
+        if len(made) != count:  # not a binary tree with one geom per leaf
             continue
         inner = leaf < 0
         model.bvh_aabb[nodes] = made
@@ -42,10 +42,10 @@ def tighten(model: mujoco.MjModel) -> None:
 def surface_area_tree(
     low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """A binary tree over boxes with corners (n, 3), split where the surface area heuristic is lowest.
+    """Build a binary tree over boxes with corners (n, 3), split by the surface area heuristic.
 
-    Returns for each of 2n - 1 nodes its box as centre and half size, its two children or -1, the index of a leaf's box
-    or -1, and its depth; node 0 is the root.
+    Returns arrays over the 2n - 1 nodes, of which node 0 is the root: the box as centre and half size, the two children
+    or -1, the index of a leaf's box or -1, and the depth.
     """
     count = len(low)
     total = 2 * count - 1
@@ -82,7 +82,7 @@ def surface_area_tree(
 def _split(
     low: NDArray[np.float64], high: NDArray[np.float64], order: NDArray[np.int64], begin: int, end: int
 ) -> int:
-    """Sort order[begin:end] along the best axis and return the index of the best cut."""
+    """Sort order[begin:end] along the best axis, and return the index of the best split."""
     count = end - begin
     best, best_cut = math.inf, begin + count // 2
     members = order[begin:end].copy()
@@ -105,7 +105,7 @@ def _split(
 def _areas(
     low: NDArray[np.float64], high: NDArray[np.float64], ranked: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> None:
-    """Fill `areas` with half the surface area of the box around the first k + 1 boxes, for every k."""
+    """Fill `areas[k]` with half the surface area of the box around the first k + 1 boxes."""
     lx = ly = lz = math.inf
     hx = hy = hz = -math.inf
     for k in range(len(ranked)):

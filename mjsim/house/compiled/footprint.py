@@ -1,7 +1,4 @@
-"""The floor plan of what a person cannot walk through: outlines of the compiled model's static geoms.
-
-A `Floor` holds those that stop the trunk, in a grid for kernels.
-"""
+"""Footprints of static geoms: floor plans, a grid of obstacles for the trunk, and a distance field."""
 
 import math
 from dataclasses import dataclass
@@ -18,16 +15,16 @@ from mjsim.house.compiled.sites import RoomMap
 from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
-CIRCLE_SIDES = 32  # a circumscribed polygon covers 0.5 % of the radius too much, never too little
+CIRCLE_SIDES = 32  # the circumscribed polygon is up to 0.5 % wider than the circle, never narrower
 _GEOM = mujoco.mjtGeom
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
-# A polygon around the unit circle, touching it at the middles of its sides, (k, 2).
+# Polygon whose sides touch the unit circle at their middles, (k, 2)
 _CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-_TRUNK_BAND = (0.04, 1.72)  # heights of the trunk, m
-CELL = 0.25  # m
-MARGIN = 0.12  # m beyond the trunk that a cell of the grid covers
-BORDER = 0.4  # m of grid around the rooms
+_TRUNK_BAND = (0.04, 1.72)  # lower and upper end of the trunk, m
+CELL = 0.25  # cell size of the grid of a `Floor`, m
+MARGIN = 0.12  # distance beyond the trunk up to which a cell lists obstacles, m
+BORDER = 0.4  # default width of the grid around the rooms, m
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +38,11 @@ class Footprint:
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
     """Project the static colliding geoms that reach into a band of heights, from `low` to `high`, m.
 
-    Floors and rugs end below the band; lintels, lamps and wall cupboards begin above it. A geom that reaches
-    into the band counts with its whole outline. Objects and the person move, so they are left out.
+    Floors and rugs end below the default band, while lintels, lamps and wall cupboards begin above it. A geom in the
+    band counts with its whole outline. Objects and the person are left out because they move.
 
     Raises:
-        AssetError: The house has no rooms, or a static geom is a height field or a zero-sized shape.
+        AssetError: The house has no rooms, or a static geom is a height field or has no area.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -64,9 +61,10 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Points (k, 3), m, around `centre` with the geom's extent in z, whose outline from above covers its own.
+    """Return points (k, 3), m, that cover a geom: their outline contains the geom's, and their range of z equals its.
 
-    `AssetError` where the geom is a plane or a height field.
+    Raises:
+        AssetError: The geom is a plane or a height field.
     """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == _GEOM.mjGEOM_BOX:
@@ -93,8 +91,8 @@ def outline_points(
 
 
 def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Outline and top and bottom of the image of the unit ball under the columns of `axes`."""
-    # The shadow of a ball under a linear map to the plane is the ellipse that the map's SVD gives.
+    """Return the outline, the top and the bottom of the unit ball, transformed by the columns of `axes`."""
+    # A linear map to the plane turns a ball into an ellipse, whose axes are given by the SVD of the map.
     directions, lengths, _ = np.linalg.svd(axes[:2])
     outline = np.zeros((CIRCLE_SIDES, 3))
     outline[:, :2] = _CIRCLE @ (directions * lengths).T
@@ -117,28 +115,30 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Floor(NamedTuple):
-    """Outlines of the obstacles of the trunk, with a grid to look up the near ones; for kernels."""
+    """Outlines of the obstacles of the trunk, with a grid for looking up those nearby. For kernels."""
 
     # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
     edges: NDArray[np.float64]
     first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
-    boxes: NDArray[np.float64]  # each polygon's smallest and largest x, and smallest and largest y, m, (p, 4)
-    near: NDArray[np.int64]  # polygons that may touch the trunk, cell by cell
-    near_first: NDArray[np.int64]  # cell i, j has `near` from `near_first[i * columns + j]`, (cells + 1,)
-    origin_x: float  # corner of cell 0, 0, m
+    boxes: NDArray[np.float64]  # smallest and largest x, smallest and largest y of each polygon, m, (p, 4)
+    near: NDArray[np.int64]  # polygons that the trunk may touch, cell by cell
+    near_first: NDArray[
+        np.int64
+    ]  # index into `near` of the first polygon of each cell, row by row, (cells + 1,)
+    origin_x: float  # corner of cell (0, 0), m
     origin_y: float
-    rows: int  # cells along x
-    columns: int  # cells along y
+    rows: int  # number of cells along x
+    columns: int  # number of cells along y
 
     @classmethod
     def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
-        """Outlines of the static geoms at the heights of a trunk of this radius, m."""
+        """Collect the static geoms at the heights of a trunk of a radius, m."""
         low, high = _TRUNK_BAND
         return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
 
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
-        """Convex counter-clockwise polygons (k, 2), m, for a trunk of this radius, m."""
+        """Make the grid for convex counter-clockwise polygons (k, 2), m, and a trunk of a radius, m."""
         reach = radius + MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
@@ -166,7 +166,7 @@ class Floor(NamedTuple):
 
 
 def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Start, direction and length of the sides of a polygon (k, 2), shape (k, 5); none of length 0."""
+    """Return start, direction and length of the sides of a polygon, (k, 5), without sides of length 0."""
     sides = np.roll(polygon, -1, axis=0) - polygon
     lengths = np.hypot(sides[:, 0], sides[:, 1])
     keep = lengths > 0.0
@@ -174,10 +174,10 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ClearanceField(NamedTuple):
-    """Signed distance to the static geoms of a band of heights, on a grid; also for kernels."""
+    """Grid of signed distances to the static geoms of a band of heights. Also for kernels."""
 
     distance: NDArray[np.float64]  # distance of each cell's centre, m, positive outside, (nx, ny)
-    gradient: NDArray[np.float64]  # direction of increasing distance, (nx, ny, 2)
+    gradient: NDArray[np.float64]  # unit vector in which the distance increases, (nx, ny, 2)
     origin_x: float  # centre of cell (0, 0), m
     origin_y: float
     resolution: float  # cell size, m
@@ -192,7 +192,7 @@ class ClearanceField(NamedTuple):
         resolution: float = 0.04,
         border: float = BORDER,
     ) -> "ClearanceField":
-        """Rasterise the static colliding geoms between two heights, m, up to `border` m around the rooms."""
+        """Rasterize the static colliding geoms between two heights, m, up to `border` m around the rooms."""
         plan = footprint(model, low=low, high=high)
         xmin, ymin, xmax, ymax = plan.bounds
         origin = np.array([xmin - border, ymin - border])
@@ -210,7 +210,7 @@ class ClearanceField(NamedTuple):
 
 @kernel
 def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, float, float]:
-    """Distance at a point, m, interpolated, and the direction (x, y) away from the nearest geom."""
+    """Interpolate the distance at a point, m, and return it with the direction (x, y) away from the nearest geom."""
     distance, gradient = field.distance, field.gradient
     u = (x - field.origin_x) / field.resolution
     v = (y - field.origin_y) / field.resolution
@@ -224,7 +224,7 @@ def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, floa
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
-    """Mark the cells whose centre lies within half a cell of a convex polygon, given in cells, (k, 2)."""
+    """Mark the cells whose centre is at most half a cell outside a convex polygon, given in cells, (k, 2)."""
     low = np.maximum(np.floor(polygon.min(axis=0)).astype(int), 0)
     high = np.minimum(np.ceil(polygon.max(axis=0)).astype(int) + 1, grid.shape)
     if np.any(low >= high):
@@ -236,7 +236,7 @@ def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
     for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = end - start
         length = float(np.hypot(*edge))
-        if length > 1e-9:  # counter-clockwise: the inside lies to the left of every edge
+        if length > 1e-9:  # counter-clockwise: the inside is to the left of every edge
             offset = cells - start
             left_by = (edge[0] * offset[..., 1] - edge[1] * offset[..., 0]) / length
             inside &= left_by >= -0.5

@@ -1,4 +1,8 @@
-"""A house compiled once per process and content, and object models made ready for its scenes."""
+"""Compiled houses, cached per process and content, and object models prepared for scenes.
+
+The navigable floor comes from an installed package, because navmeshes belong to the planner, which `mjsim` must not
+import. This module defines the protocol and loads the entry point `mjsim.navigable`.
+"""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -18,45 +22,45 @@ from mjsim.house.compiled.footprint import Footprint, footprint
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap, receptacle_geometries
 from mjsim.values.errors import AssetError, SamplingError
 
-VISUAL_BODY = "looks"  # body of an object's visual geoms
+VISUAL_BODY = "looks"  # name of the body with an object's visual geoms
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
-MAX_HOUSES = 4  # kept in memory, some 30 MB each
+MAX_HOUSES = 4  # size of the cache, at some 30 MB per house
 T = TypeVar("T")
-GROUP = "mjsim.navigable"
+GROUP = "mjsim.navigable"  # entry points of navmesh builders
 
 
 class NavigablePoints(Protocol):
-    """What sampling needs to know of the floor; points are (x, y) in m."""
+    """The walkable floor, as sampling uses it. Points are (x, y) in m."""
 
     def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """A point (2,) drawn uniformly from the part of the floor that a person can walk over."""
+        """Draw a point (2,) uniformly from the part of the floor that a person can reach."""
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Whether a person can stand at a point (2,)."""
+        """Return True if a person can stand at a point (2,)."""
 
     def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
-        """The nearest point (2,) that `sample` could draw: the point itself if it is one."""
+        """Return the nearest point (2,) that `sample` could draw, which is the point itself if possible."""
 
 
 class NavigableFloor(NavigablePoints, Protocol):
-    """The navigable floor of a house, with a map for users."""
+    """The walkable floor of a house."""
 
     @property
     def topdown_map(self) -> NDArray[np.int32]:
-        """The floor from above, shape (rows, columns): 0 where one can walk, -1 where not, else an island's number."""
+        """Islands of the floor, shape (rows, columns): 0 for the largest, 1, 2, ... for others, -1 for obstacles."""
 
 
 class NavigableBuilder(Protocol):
-    """Makes the navigable floor of a house."""
+    """A function that computes the walkable floor of a house."""
 
     def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigableFloor:
-        """Compute where one can walk among convex polygons (vertices, 2), m, within (x_min, y_min, x_max, y_max), m."""
+        """Compute the floor among convex polygons (vertices, 2), m, within (x_min, y_min, x_max, y_max), m."""
         ...
 
 
 def installed_builder(group: str = GROUP) -> NavigableBuilder:
-    """The builder that an installed package registers, of several the first by name; `SamplingError` without one."""
+    """Load the builder of an installed package, the first by name. Raise a SamplingError if there is none."""
     offers = sorted(entry_points(group=group), key=lambda e: e.name)
     if not offers:
         raise SamplingError(
@@ -71,7 +75,7 @@ def installed_builder(group: str = GROUP) -> NavigableBuilder:
 
 
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Remove what has no effect on motion, in place: geoms that meet nothing, materials, textures, unused meshes.
+    """Remove everything without effect on motion, in place: visual geoms, materials, textures, unused meshes.
 
     Bodies stay, so that a state fits the models with and without visuals.
     """
@@ -81,10 +85,10 @@ def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Give the visual geoms of an object a body of their own, fixed to the object's, in place.
+    """Move the visual geoms of an object to a body of their own, fixed to the object's, in place. It saves time.
 
-    In every step the broad phase visits all geoms of every body that can collide, asleep or not. Geoms in nested
-    frames stay where they are.
+    The broad phase visits all geoms of every body that can collide in each step, even while it sleeps. Geoms in nested
+    frames are not moved.
     """
     body = spec.body("object")
     groups: list[tuple[Any, list[Any]]] = []
@@ -106,7 +110,6 @@ def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def _like(body: Any, frame: Any) -> Any:
-    """A new frame of a body, placed as another one; None is none at all."""
     new = body.add_frame()
     if frame is not None:
         new.pos, new.quat = frame.pos, frame.quat
@@ -116,11 +119,10 @@ def _like(body: Any, frame: Any) -> Any:
 
 
 def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
-    """Move geoms into a frame of their body, and that frame into another body."""
     names = [geom.name for geom in geoms]
     before = len(body.geoms)
     for geom in geoms:
-        geom.name = ""  # while there are two of it
+        geom.name = ""  # names are unique, and attaching makes a copy first
         geom.set_frame(frame)
     body.attach_frame(frame, "", "")
     spec.delete(frame)
@@ -133,9 +135,9 @@ def _is_visual(geom: Any) -> bool:
 
 
 class CompiledHouse:
-    """A house and its receptacles, compiled, without misplaced objects and without a person.
+    """A compiled house with its receptacles, without misplaced objects and without a person.
 
-    Obtain it from `compiled_house`. All users share what it holds; do not change it.
+    Obtain it from `compiled_house`. Its contents are shared and must not be changed.
     """
 
     def __init__(self, catalogue: Catalogue) -> None:
@@ -144,50 +146,47 @@ class CompiledHouse:
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """The compiled house; `AssetError` where a model is malformed or a mount is missing."""
+        """The compiled model. Raises an AssetError if a model is malformed or a mount is missing."""
         with compile_errors(f"house {self.catalogue.house_path}"):
             return self._spec.copy().compile()
 
     @cached_property
     def data(self) -> mujoco.MjData:
-        """Its state, in which nothing moves."""
+        """The state of the house, in which nothing moves."""
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
         return data
 
     @cached_property
     def rooms(self) -> RoomMap:
-        """Which room a point lies in."""
         return RoomMap.from_model(self.model, self.catalogue.rooms)
 
     @cached_property
     def receptacles(self) -> dict[str, ReceptacleGeometry]:
-        """Receptacle key -> its geometry."""
         return receptacle_geometries(self.model, self.catalogue.receptacles)
 
     @cached_property
     def floor(self) -> Footprint:
-        """Obstacles and bounds of the floor."""
         return footprint(self.model)
 
     @cached_property
     def navigable(self) -> NavigableFloor:
-        """Where one can walk, by the installed builder; `SamplingError` where there is none."""
+        """The walkable floor. Raises a SamplingError if no builder is installed."""
         return installed_builder()(self.floor.obstacles, self.floor.bounds)
 
     def spec(self, *, visuals: bool = True) -> mujoco.MjSpec:
-        """An editable copy, with all static bodies fused into one; `visuals` are geoms that meet nothing."""
+        """Return an editable copy whose static bodies are fused into one, with or without visual geoms."""
         return (self._fused if visuals else self._collision).copy()
 
     def object_spec(self, path: Path, *, visuals: bool = True) -> mujoco.MjSpec:
-        """An object model from its MJCF file, for attaching, with or without what is only drawn."""
+        """Return an object model for attaching, with or without visual geoms."""
         if visuals:
             return self.once((path, True), lambda: separate_visuals(read_model(path, body="object")))
         whole = self.object_spec(path)
         return self.once((path, False), lambda: remove_visuals(whole.copy()))
 
     def once(self, key: Any, compute: Callable[[], T]) -> T:
-        """What `compute` returned at the first call with `key`."""
+        """Call `compute` at the first call with `key`, and return its result in all later calls."""
         if key not in self._derived:
             self._derived[key] = compute()
         return cast(T, self._derived[key])
@@ -211,8 +210,8 @@ class CompiledHouse:
     @cached_property
     def _fused(self) -> mujoco.MjSpec:
         spec = self._spec.copy()
-        # The broad phase visits every body of the house in every step; as one body it steps four times as fast.
-        # Compiling fuses the bodies of the spec itself, so a scene made from it need not do it again.
+        # The broad phase visits every body of the house in every step. With one body, steps take a quarter of the time.
+        # Compiling fuses the bodies of the spec itself, so scenes made from it need not do it again.
         spec.compiler.fusestatic = True
         with compile_errors(f"house {self.catalogue.house_path}"):
             spec.compile()
@@ -225,17 +224,16 @@ class CompiledHouse:
 
 @functools.lru_cache(maxsize=MAX_HOUSES)
 def compiled_house(catalogue: Catalogue) -> CompiledHouse:
-    """The compiled house of a catalogue: one per process for all catalogues of the same content.
+    """Return the compiled house of a catalogue. Catalogues of the same content share it.
 
-    A file that changes on disk changes the content of the next catalogue that is loaded, and so gives a new model.
-
-    Nothing is read or compiled before it is used.
+    A changed file changes the content of catalogues loaded afterwards, so they get a new house. Nothing is read or
+    compiled before it is used.
     """
     return CompiledHouse(catalogue)
 
 
 def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
-    """Where one can walk in a house, computed once per process by the installed builder.
+    """Return the walkable floor of a house, which the installed builder computes once per process.
 
     Raises:
         SamplingError: No builder is installed, or it cannot be loaded.
@@ -246,7 +244,7 @@ def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
 
 @contextmanager
 def compile_errors(what: str) -> Iterator[None]:
-    """Turn MuJoCo's errors into an `AssetError` that names `what` does not compile and says what to do."""
+    """Turn MuJoCo's compile errors into an AssetError that names `what` and a remedy."""
     try:
         yield
     except (ValueError, mujoco.FatalError) as error:
@@ -266,5 +264,5 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     option.impratio = 10.0
     option.sleep_tolerance = SLEEP_TOLERANCE
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    # A silent reset would hide a blow-up; the world turns the warning into an error.
+    # A silent reset would hide that the simulation diverged. `World` raises an error for the warning instead.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

@@ -1,4 +1,4 @@
-"""Ray casts against the compiled model: the nearest geom, and lines of sight."""
+"""Ray casts into a compiled model: nearest geoms and lines of sight."""
 
 import math
 
@@ -11,11 +11,12 @@ from mjsim.house.compiled.sites import ReceptacleGeometry
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# What collides: structure and furniture (0), collision guards (3); not ceilings (1), decoration (2) or the person (4).
+# Groups of colliding geoms: structure and furniture (0), collision guards (3). Not ceilings (1), decoration (2) or the
+# person (4).
 SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
-DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # what the first-person view shows
-RIM = 0.06  # m, from a receptacle's volume to the outside of its walls
-_SKIP = 1e-6  # share of a ray that is skipped to get through a surface
+DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # groups that the first-person view shows
+RIM = 0.06  # distance from a receptacle's volume to the outside of its walls, m
+_SKIP = 1e-6  # distance skipped to pass through a surface, in units of the ray's length
 _MAX_SKIPS = 32
 
 
@@ -30,14 +31,14 @@ def first_hit(
     without: int = -1,
     reach: float = math.inf,
 ) -> tuple[float, int]:
-    """Distance and id of the nearest geom along a ray, infinity and -1 where there is none.
+    """Return the distance and id of the nearest geom along a ray, or infinity and -1 if it hits none.
 
     Args:
-        start, ray: Start, m, and direction, (3,); distances are in units of its length.
-        groups: Which geom groups count, (6,).
-        through: Geoms that the ray passes through, (ngeom,); None for none.
-        without: Body that counts as absent, so that what touches its surface is found too; -1 for none.
-        reach: Where the ray ends; later hits may be reported or not.
+        start, ray: Start, m, and direction, (3,). Distances are in units of the direction's length.
+        groups: Mask of the geom groups to hit, (6,).
+        through: Mask of the geoms that the ray passes through, (ngeom,).
+        without: Id of a body to ignore, so that what touches its surface is found too. -1 for none.
+        reach: End of the ray. Hits beyond it may be reported or not.
     """
     origin, along = np.asarray(start, np.float64), np.asarray(ray, np.float64)
     geom, travelled = np.zeros(1, np.int32), 0.0
@@ -53,21 +54,20 @@ def first_hit(
 
 
 def moving_geoms(model: mujoco.MjModel) -> Mask:
-    """Which geoms can move, (ngeom,)."""
     return np.asarray(model.body_weldid[model.geom_bodyid] != 0)
 
 
 def sees(model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, point: Floats) -> bool:
-    """Whether no static solid geom lies between two points (3,), m."""
+    """Return True if no static solid geom is between two points (3,), m."""
     return first_hit(model, data, eye, point - eye, through=moving_geoms(model), reach=1.0)[0] >= 1.0
 
 
 def receptacle_in_sight(
     model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, receptacle: ReceptacleGeometry
 ) -> bool:
-    """Whether the top of a receptacle's volume is visible from an eye (3,), m, at its middle or at the nearest point.
+    """Return True if the top of a receptacle's volume, at its middle or nearest point, is visible from an eye (3,), m.
 
-    The receptacle's own rim does not hide it: a geom within its outline is taken to be part of it.
+    Geoms within its outline are taken for its own rim, which does not hide it.
     """
     half, through = receptacle.half_size, moving_geoms(model)
     nearest = np.clip(

@@ -1,4 +1,4 @@
-"""The room that a point on the floor lies in, as the checklist names it (PAPER section 5)."""
+"""Rooms and receptacles, read from the sites of a compiled house."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -16,19 +16,20 @@ PREFIX = "room:"
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
-    """Rectangles on the floor, each a room or a part of one."""
+    """Rectangles on the floor, of which each is a room or a part of a room (PAPER section 5)."""
 
     labels: Mapping[str, str]  # room key -> label shown to people ("Kitchen"), in the catalogue's order
-    keys: tuple[str, ...]  # room key per rectangle, length k
+    keys: tuple[str, ...]  # room key of each rectangle, length k
     centers: NDArray[np.float64]  # centres, m, (k, 2)
     half_sizes: NDArray[np.float64]  # half extents along the rectangle's own axes, m, (k, 2)
     axes: NDArray[np.float64]  # rectangle axes as columns, (k, 2, 2)
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str] | None = None) -> "RoomMap":
-        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house; labels are the keys by default.
+        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house. By default, labels are the keys.
 
-        `AssetError` for a room without a site, a site without a room, or a site that is not an upright box.
+        Raises:
+            AssetError: A room has no site, a site has no room, or a site is not an upright box.
         """
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -56,18 +57,18 @@ class RoomMap:
         )
 
     def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Distance from points (..., 2), m, to each rectangle, m, shape (..., k); 0 inside."""
+        """Distances from points (..., 2), m, to each rectangle, m, shape (..., k). They are 0 inside."""
         offsets = np.asarray(xy, dtype=np.float64)[..., None, :2] - self.centers
         local = np.einsum("kji,...kj->...ki", self.axes, offsets)
         outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
         return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
 
     def room_at(self, xy: ArrayLike) -> str:
-        """Key of the room that contains the point (x, y), m, shape (2,), or else of the nearest one."""
+        """Return the key of the room that contains a point (2,), m, or else of the nearest room."""
         return self.keys[int(np.argmin(self.distances(xy)))]
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
-        """Whether the point (x, y), m, shape (2,), lies in some room, or within `margin` metres of one."""
+        """Return True if a point (2,), m, is in a room, or within `margin` metres of one."""
         x, y = np.asarray(xy, dtype=np.float64)[:2].tolist()
         return bool(nearest_rectangle(x, y, *self.rectangles) <= margin)
 
@@ -77,14 +78,14 @@ class RoomMap:
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
-        """Label of a room; `AssetError` where there is none."""
+        """Return the label of a room. Raise an AssetError if there is no such room."""
         if key not in self.labels:
             raise AssetError(f"no room {key!r}; the house has {sorted(self.labels)}")
         return self.labels[key]
 
     @property
     def area(self) -> float:
-        """Of all rectangles, m2; what two of them share counts twice."""
+        """Sum of the areas of all rectangles, m2. Overlaps count twice."""
         return float(4 * self.half_sizes.prod(axis=1).sum())
 
     @property
@@ -103,7 +104,7 @@ def nearest_rectangle(
     half_sizes: NDArray[np.float64],
     axes: NDArray[np.float64],
 ) -> float:
-    """Distance from a point to the nearest of k rectangles, m; 0 inside; arrays and shapes as in `RoomMap`."""
+    """Return the distance from a point to the nearest of k rectangles, m, or 0 inside one. See `RoomMap` for shapes."""
     nearest = math.inf
     for k in range(len(centers)):
         dx, dy = x - centers[k, 0], y - centers[k, 1]
@@ -121,16 +122,16 @@ def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str)
 
 @dataclass(frozen=True, eq=False)
 class ReceptacleGeometry:
-    """One receptacle in the house frame."""
+    """Geometry of a receptacle in the house frame."""
 
     key: str  # receptacle key
-    center: NDArray[np.float64]  # centre of the delivery volume, m, (3,)
+    center: NDArray[np.float64]  # centre of the volume in which objects count as delivered, m, (3,)
     half_size: NDArray[np.float64]  # half extents of the volume along its own axes, m, (3,)
     rotation: NDArray[np.float64]  # the volume's axes as columns, (3, 3)
-    approach: NDArray[np.float64]  # floor point (x, y) where a person stands to use it, m, (2,)
+    approach: NDArray[np.float64]  # floor point (x, y) at which a person stands to use it, m, (2,)
 
     def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
-        """Whether a point (3,), m, lies in the volume grown by `margin` metres."""
+        """Return True if a point (3,), m, is in the volume, enlarged by `margin` m on each side."""
         local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
@@ -142,7 +143,7 @@ class ReceptacleGeometry:
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
-    """Read the sites `<key>/volume`, a box, and `<key>/approach` of a compiled model; receptacles do not move."""
+    """Read the box sites `<key>/volume` and the sites `<key>/approach` of a compiled model."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     found = {}
