@@ -105,13 +105,11 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
 
 
 def _elements(path: str, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
-    """Yield the elements of an MJCF file and of files that it includes, and add their contents to `files`."""
     if path not in files and _read(path, files):
         yield from _parsed(files[path], folder, files)
 
 
 def _parsed(content: bytes, folder: str, files: dict[str, bytes]) -> Iterator[ET.Element]:
-    """Like `_elements`, for the content of a file in `folder`."""
     try:
         root = ET.fromstring(content)
     except ET.ParseError:

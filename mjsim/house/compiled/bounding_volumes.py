@@ -82,7 +82,6 @@ def surface_area_tree(
 def _split(
     low: NDArray[np.float64], high: NDArray[np.float64], order: NDArray[np.int64], begin: int, end: int
 ) -> int:
-    """Sort order[begin:end] along the best axis, and return the index of the best split."""
     count = end - begin
     best, best_cut = math.inf, begin + count // 2
     members = order[begin:end].copy()
@@ -105,7 +104,6 @@ def _split(
 def _areas(
     low: NDArray[np.float64], high: NDArray[np.float64], ranked: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> None:
-    """Fill `areas[k]` with half the surface area of the box around the first k + 1 boxes."""
     lx = ly = lz = math.inf
     hx = hy = hz = -math.inf
     for k in range(len(ranked)):

@@ -91,7 +91,6 @@ def outline_points(
 
 
 def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the outline, the top and the bottom of the unit ball, transformed by the columns of `axes`."""
     # A linear map to the plane turns a ball into an ellipse, whose axes are given by the SVD of the map.
     directions, lengths, _ = np.linalg.svd(axes[:2])
     outline = np.zeros((CIRCLE_SIDES, 3))
@@ -166,7 +165,6 @@ class Floor(NamedTuple):
 
 
 def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return start, direction and length of the sides of a polygon, (k, 5), without sides of length 0."""
     sides = np.roll(polygon, -1, axis=0) - polygon
     lengths = np.hypot(sides[:, 0], sides[:, 1])
     keep = lengths > 0.0
@@ -224,7 +222,6 @@ def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, floa
 
 
 def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
-    """Mark the cells whose centre is at most half a cell outside a convex polygon, given in cells, (k, 2)."""
     low = np.maximum(np.floor(polygon.min(axis=0)).astype(int), 0)
     high = np.minimum(np.ceil(polygon.max(axis=0)).astype(int) + 1, grid.shape)
     if np.any(low >= high):

@@ -1,1 +1,1 @@
-"""A composed house: sampled episodes, settled objects, the person's body, and the compiled scene of all."""
+"""Composed houses: sampled episodes, settled objects, the person's body, and compiled scenes."""

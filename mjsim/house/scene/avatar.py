@@ -1,6 +1,6 @@
-"""The person's body: two slides and a yaw joint for walking, a head that pitches, and two hands that hold by welds.
+"""The person's body: two slide joints and a yaw joint, a head that pitches, and two hands that hold objects by welds.
 
-Contact bits are set here only. Two geoms collide when contype of one shares a bit with conaffinity of the other:
+All contact bits are set here. Two geoms collide if contype of one shares a bit with conaffinity of the other:
 
     geoms                     contype   conaffinity   collides with
     static (MuJoCo default)   1         1             objects, trunk
@@ -9,8 +9,8 @@ Contact bits are set here only. Two geoms collide when contype of one shares a b
     avatar foot               0         4             objects
     hands                     0         0             nothing
 
-Each joint's `ref` is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is the
-person's x in the house, m, and `qpos` of `avatar/left/z` is the height of the left hand, m.
+The `ref` of each joint is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is
+the person's x in the house, m, and `qpos` of `avatar/left/z` is the height of the left hand, m.
 """
 
 import itertools
@@ -36,16 +36,16 @@ TRUNK = "avatar/trunk"
 FOOT = "avatar/foot"
 HANDS = ("left", "right")
 GRIPS = (0, 1)
-GENTLE, FIRM = "gentle", "firm"  # how a hand holds
-SIDES = 64  # of the prisms of trunk and foot
+GENTLE, FIRM = "gentle", "firm"  # kinds of welds between hand and object
+SIDES = 64  # number of sides of the prisms of trunk and foot
 # Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
-# of the object's weight, so that a person steps over an object which a wall holds back. The high damping ties the
+# of the object's weight, so that a person steps over an object that is stuck at a wall. The high damping ties the
 # force to speed, so that such an object neither pushes the person away nor flies off.
 _FOOT_CONTACT = (0.1, 3.0, 0.2)
 EYE_FORWARD = 0.06
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
-# Postures of a hand in the body frame of a person of usual eye height: forward, to its own side, up; m.
+# Postures of a hand in the body frame of a person of default eye height: forward, to its own side, up; m.
 REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
@@ -54,23 +54,23 @@ HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
 # Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object
 # upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by less
-# than 2 degrees even when the object brushes a door frame at walking speed.
+# than 2 degrees even if the object brushes a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
-_TORQUESCALE = 10  # index in a weld's data
+_TORQUESCALE = 10  # index in the data of a weld
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
 _GLOVE = (0.93, 0.74, 0.22, 1.0)
 _SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
-    """Name of the weld that holds `instance` in `hand` at its grip site 0 or 1, `GENTLE` or `FIRM`."""
+    """Return the name of the `GENTLE` or `FIRM` weld that holds an object in a hand at its grip site 0 or 1."""
     return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
 
 
 def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> tuple[float, float, float]:
-    """A posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m.
+    """Return a posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m.
 
-    Who has lower eyes, m, holds the hands lower in proportion.
+    Its height is proportional to the person's eye height, m.
     """
     forward, side, up = place
     return forward, side if hand == 0 else -side, up * (eye_height / PersonParameters.eye_height)
@@ -79,7 +79,7 @@ def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> 
 def eye_position(
     x: float, y: float, heading: float, pitch: float, eye_height: float
 ) -> tuple[float, float, float]:
-    """Eye position in the house, m, of a person at (x, y), with heading and head pitch, rad; lengths in m."""
+    """Return the eye position, m, of a person at (x, y) m with a heading, head pitch and eye height, rad and m."""
     out = EYE_FORWARD * math.cos(pitch)
     height = eye_height + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
@@ -92,9 +92,10 @@ def attach_avatar(
     start: tuple[float, float, float],
     person: PersonParameters,
 ) -> None:
-    """Add the person at `start` (m, m, rad), and inactive welds between each hand and each object, in place.
+    """Add the person at `start` (m, m, rad) and inactive welds between each hand and each object, in place.
 
-    `AssetError` where an instance has no body `<instance>/object` or lacks a grip site.
+    Raises:
+        AssetError: The scene has no body `<instance>/object`, or an object lacks a grip site.
     """
     _set_object_bits(spec, object_names)
     body = _add_body(spec, start, person.body_radius)
@@ -105,7 +106,6 @@ def attach_avatar(
 
 
 def _angle(spec: mujoco.MjSpec, radians: float) -> float:
-    """An angle in the unit that the spec's compiler reads."""
     return math.degrees(radians) if spec.compiler.degree else radians
 
 
@@ -137,7 +137,7 @@ def _set_inertia(
 
 def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: float) -> Any:
     x, y, heading = start
-    # The base does not turn, because a contact off its axis would spin the body.
+    # The base does not turn, because contacts off its axis would spin it.
     base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
     _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -152,15 +152,15 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
         name=TRUNK,
         pos=[0, 0, 0.88],
         conaffinity=STATIC_BIT,
-        condim=1,  # no friction: the person slides along walls
+        condim=1,  # without friction, the person slides along walls
         priority=2,
         solref=[0.008, 1],
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
         **_prism(spec, TRUNK, radius, 0.84),
     )
-    # Soft, and lower than any carried object: it pushes light objects along the floor without launching them. It
-    # reaches below the floor, so that it touches flat objects with its side and never stands on them.
-    # It has its own body because the broad phase filters by body, and the foot never collides with the house.
+    # The foot is soft, and lower than any carried object. It pushes light objects along the floor without launching
+    # them. It extends below the floor, so that it touches flat objects with its side and never stands on them. It has
+    # a body of its own because the broad phase filters by body, and the foot never collides with the house.
     sole = base.add_body(name=SOLE)
     sole.fuse = 0
     _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
@@ -179,10 +179,10 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
 
 
 def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) -> dict[str, Any]:
-    """Arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
+    """Return arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
 
-    Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box;
-    meshes do not.
+    Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box.
+    Meshes do not.
     """
     angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
     ring = radius * np.column_stack((np.cos(angles), np.sin(angles)))
@@ -192,17 +192,17 @@ def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) ->
 
 
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
-    """A velocity servo if kp is 0, else a position servo with damping.
+    """Add a velocity servo if kp is 0, otherwise a position servo with damping.
 
-    The activation is the target and the control its rate of change, so that the target follows a ramp over the physics
-    steps of one control step.
+    The activation is the target and the control its rate of change, so the target follows a ramp over the physics
+    steps of a control step.
     """
     spec.add_actuator(
         name=PREFIX + joint,
         target=PREFIX + joint,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
-        actearly=True,  # the ramp begins with the first physics step
+        actearly=True,  # the ramp starts with the first physics step
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[kp or kv] + [0.0] * 9,
@@ -213,7 +213,7 @@ def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, forc
 
 
 def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
-    # The hinge's axis is -y, so that a positive pitch looks up.
+    # The axis of the hinge is -y, so that a positive pitch looks up.
     half = -START_PITCH / 2
     head = body.add_body(
         name=HEAD, pos=[0, 0, person.eye_height], quat=[math.cos(half), 0, math.sin(half), 0]
@@ -250,7 +250,6 @@ def _add_hand(spec: mujoco.MjSpec, body: Any, hand: str, position: tuple[float, 
 
 
 def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
-    """An inactive site-to-site weld for each hand, object, grip site and kind; inactive welds cost no time."""
     for name, grip in itertools.product(object_names, GRIPS):
         site = f"{name}/grip_{grip}"
         if spec.site(site) is None:
@@ -270,7 +269,7 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
 
 
 def draw_hand(node: Any, name: str, side: float) -> None:
-    """A cleaning glove and a sleeve, which collide with nothing; `side` is 1 for the left, -1 for the right hand."""
+    """Draw a cleaning glove and a sleeve. `side` is 1 for the left and -1 for the right hand."""
 
     def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
         node.add_geom(

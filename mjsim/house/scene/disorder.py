@@ -1,4 +1,4 @@
-"""How much is out of place in a house, and how far, as numbers that episodes can be drawn from."""
+"""Observed disorder: the numbers of misplaced objects, and their distances from their places, to draw episodes from."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from mjsim.support.files import read_text
 from mjsim.values.errors import EpisodeError, brief
 
-_COUNTS, _DISTANCES = 0, 1  # keys of the random streams
+_COUNTS, _DISTANCES = 0, 1  # keys of the random generators
 
 
 class _Count(msgspec.Struct):
@@ -28,11 +28,11 @@ class _DisorderFile(msgspec.Struct):
 
 @dataclass(frozen=True)
 class Disorder:
-    """Disorder as it was observed.
+    """Disorder of observed episodes.
 
     Attributes:
-        misplaced: How many objects are out of place, in each episode.
-        distances: Of each of them over the floor to where it belongs, m, where that is known.
+        misplaced: Number of misplaced objects of each episode.
+        distances: Known distances over the floor from misplaced objects to where they belong, m.
     """
 
     misplaced: tuple[int, ...]
@@ -40,7 +40,7 @@ class Disorder:
 
     @classmethod
     def load(cls, path: Path) -> "Disorder":
-        """Read the `disorder.json` of `mjsim import episodes`; `EpisodeError` where it cannot be read."""
+        """Read the `disorder.json` of `mjsim import episodes`. Raise an EpisodeError if it cannot be read."""
         try:
             found = msgspec.json.decode(read_text(path), type=_DisorderFile)
         except (OSError, UnicodeDecodeError, msgspec.MsgspecError) as error:
@@ -51,7 +51,7 @@ class Disorder:
         return cls(counts, tuple(found.distances))
 
     def tables(self) -> dict[str, list[dict[str, int]] | list[float]]:
-        """What `load` reads, to be written as JSON."""
+        """Return the content of a file for `load`."""
         counts = sorted(Counter(self.misplaced).items())
         return {
             "misplaced": [{"objects": n, "episodes": k} for n, k in counts],
@@ -59,22 +59,22 @@ class Disorder:
         }
 
     def count(self, seed: int, most: int) -> int:
-        """A number of objects as often as it was observed, of those from 1 to `most`."""
+        """Draw a number of objects from the observed ones that are from 1 to `most`."""
         fitting = [n for n in self.misplaced if 1 <= n <= most]
         if not fitting:
             raise EpisodeError(f"no episode has 1 to {most} misplaced objects; allow more")
         return int(np.random.default_rng([seed, _COUNTS]).choice(fitting))
 
     def assign(self, points: NDArray[np.float64], homes: NDArray[np.float64], seed: int) -> NDArray[np.intp]:
-        """Which point each object takes, so that it lies about as far from its home as objects were observed to.
+        """Assign points to objects so that their distances from home match distances drawn from the observed ones.
 
         Args:
             points: Free points (p, 2), m.
-            homes: Where the objects belong (k, 2), m, k <= p.
-            seed: Of the distances that are drawn.
+            homes: Places where the objects belong (k, 2), m, k <= p.
+            seed: Seed of the drawn distances.
 
         Returns:
-            Rows of `points`, shape (k,), none twice.
+            A different row of `points` for each object, shape (k,).
         """
         wanted = np.random.default_rng([seed, _DISTANCES]).choice(self.distances, len(homes))
         reached = np.linalg.norm(points - homes[:, None], axis=2)

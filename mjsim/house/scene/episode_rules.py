@@ -1,4 +1,4 @@
-"""Rules of an episode: it fits its house, and everything in it lies free within a person's reach."""
+"""Rules for episodes: they fit their house, and objects are free and within a person's reach."""
 
 import re
 from collections import Counter
@@ -17,17 +17,17 @@ from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.person_parameters import PersonParameters
 
 MAX_OBJECTS = 200
-FULL = 8  # objects that a receptacle is sure to hold
-HEIGHTS = (-0.02, 1.5)  # m, of an object's origin
-UNIT = 0.01  # greatest deviation of a quaternion's norm from 1
-OVERLAP = 0.005  # m, between what starts
-REACH = PersonParameters().reach  # m, from where a person can stand to an object
-OUTSIDE = 0.05  # m, out of a room
+FULL = 8  # number of objects that any receptacle can hold
+HEIGHTS = (-0.02, 1.5)  # range of the height of an object's origin, m
+UNIT = 0.01  # largest deviation of a quaternion's norm from 1
+OVERLAP = 0.005  # largest overlap of objects at the start, m
+REACH = PersonParameters().reach  # largest distance of an object from the walkable floor, m
+OUTSIDE = 0.05  # largest distance of an object from a room, m
 NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
 def check_fit(episode: Episode, catalogue: Catalogue) -> Iterator[Finding]:
-    """What the catalogue does not know, or knows otherwise."""
+    """Find what contradicts the catalogue."""
     if len(episode.objects) > MAX_OBJECTS:
         yield _episode("objects", f"has {len(episode.objects)} objects", f"use at most {MAX_OBJECTS}")
     unknown = sorted(set(episode.receptacles) - set(catalogue.receptacles))
@@ -86,7 +86,7 @@ def _check_object(placed: PlacedObject, target: str, catalogue: Catalogue) -> It
 
 
 def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
-    """The start and the objects are in the house, and the objects have an orientation."""
+    """Find a start or objects outside the house, and invalid orientations."""
     start = episode.start
     if not rooms.contains((start.x, start.y), margin=OUTSIDE):
         yield Finding(
@@ -125,7 +125,7 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
 
 
 def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:
-    """Nothing starts inside of something else; `owner` (ngeom,) is the object of each geom, or -1."""
+    """Find things that overlap at the start. `owner` is the index of the object of each geom, or -1, (ngeom,)."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     trunk = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TRUNK)
@@ -133,7 +133,7 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
     reported = set()
     for contact in deep:
         first, second = sorted(data.contact.geom[contact].tolist(), key=lambda g: (owner[g] < 0, g))
-        # The person pushes objects out of the way, but not walls.
+        # The person can push objects away, but not walls.
         if trunk in (first, second):
             what, subject = "a wall or a piece of furniture", "start"
         elif owner[first] < 0:
@@ -156,7 +156,7 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
 
 
 def check_reach(episode: Episode, navigable: NavigablePoints) -> Iterator[Finding]:
-    """A person at the start can walk to within reach of every object."""
+    """Find objects that a person at the start cannot walk to."""
     places = [("start", (episode.start.x, episode.start.y), 0.25)]
     places += [(o.name, o.position[:2], REACH) for o in episode.objects]
     for subject, xy, limit in places:

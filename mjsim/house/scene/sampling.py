@@ -1,7 +1,7 @@
-"""Sampling of disorganized houses, as in PAPER section 4.
+"""Sampling of disorganized houses (PAPER section 4).
 
-Every random choice has its own stream, keyed by the seed and its purpose, so that the points of a seed are
-the same at every level and a change in one choice leaves the others as they are.
+Each random choice has a generator of its own, made from the seed and the choice's purpose. So a seed has the same
+points at every level, and a change in one choice does not affect the others.
 """
 
 import enum
@@ -20,17 +20,17 @@ from mjsim.house.validation.validate import require_usable
 from mjsim.values.episode import POINTS, Episode, PlacedObject, StartPose
 from mjsim.values.errors import SamplingError, brief
 
-MIN_DISTANCE = 1.0  # m, between points, and from points to receptacles
-START_CLEARANCE = 0.5  # m, from the start to every object
-DROP = (0.01, 0.02)  # m above the floor
-PACKINGS, DRAWS = 20, 4000  # a jammed packing is given up as a whole, to keep the points uniform
+MIN_DISTANCE = 1.0  # smallest distance between points, and from points to receptacles, m
+START_CLEARANCE = 0.5  # smallest distance from the start to every object, m
+DROP = (0.01, 0.02)  # range of heights above the floor from which objects are dropped, m
+PACKINGS, DRAWS = 20, 4000  # a packing that is stuck is discarded as a whole, so that points stay uniform
 DROPS = 8
-MAX_POINTS = 1000  # a metre apart
+MAX_POINTS = 1000
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
 class _Purpose(enum.IntEnum):
-    """Keys of the random streams; their numbers are part of what a seed means."""
+    """Keys of the random generators. Changing a number changes the episodes of all seeds."""
 
     POINTS = 0
     CATEGORIES = 1
@@ -51,26 +51,25 @@ def sample_episode(
 ) -> Episode:
     """Sample a disorganized house.
 
-    Points and their categories follow from the seed alone, so that a level holds the easier ones. The object
-    model of a point is drawn again at each level; none repeats before all of its category were used.
+    The seed alone determines points and their categories, so each level contains the easier ones. Object models are
+    drawn again for each level. None repeats before all models of its category were used.
 
     Args:
-        catalogue: What the house offers.
-        navigable: The navigable floor of the same house; None for that of the installed planner.
-        objects: How many objects: the level, 1 to `points`. Categories are equally frequent when it is a
-            multiple of their number.
-        seed: Not negative.
-        points: Size of the pool of points that the levels draw from; that of the house where it has fewer.
-        disorder: How far objects lie from where they belong: of the pool, each takes a point about as far from its
-            receptacle. None for the first points, which are anywhere.
+        catalogue: Catalogue of the house.
+        navigable: Walkable floor of the same house. By default, the installed planner computes it.
+        objects: Number of objects: the level, 1 to `points`. Categories are equally frequent if it is a multiple of
+            their number.
+        seed: Seed, 0 or larger.
+        points: Number of points that the levels draw from. At most that of the house.
+        disorder: Observed disorder. Each object takes a point of the pool whose distance from its receptacle is close
+            to an observed one. By default, objects take the first points.
 
     Returns:
-        The episode, its objects at rest on the floor.
+        The episode, with its objects at rest on the floor.
 
     Raises:
-        SamplingError: An argument is out of range, or the house has no room for the points, the objects or
-            the start.
-        AssetError: A model of the catalogue is unusable.
+        SamplingError: An argument is out of range, or the points, the objects or the start do not fit into the house.
+        AssetError: A model of the catalogue is invalid.
         PhysicsError: MuJoCo warned while the objects settled.
 
     Example:
@@ -109,7 +108,7 @@ def sample_episode(
 def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
-    """The points of a seed that its levels share, m, shape (points, 2); `SamplingError` where they do not fit."""
+    """Return the points that all levels of a seed share, m, (points, 2). Raise a SamplingError if they do not fit."""
     points = min(points, catalogue.points or points)
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
@@ -123,7 +122,7 @@ def sample_points(
     rng: np.random.Generator,
     min_distance: float = MIN_DISTANCE,
 ) -> NDArray[np.float64]:
-    """Draw navigable points (count, 2), m, by rejection, apart from each other and from `keep_away` (k, 2)."""
+    """Draw navigable points (count, 2), m, that are apart from each other and from `keep_away` (k, 2), by rejection."""
     best = 0
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng, min_distance)
@@ -138,7 +137,7 @@ def sample_points(
 
 
 def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
-    """How many points, `count` at most, one packing holds; arguments as in `sample_points`."""
+    """Return the number of points, at most `count`, that fit into the house in one attempt."""
     return len(_pack(navigable, keep_away, count, np.random.default_rng(0), MIN_DISTANCE))
 
 
@@ -149,7 +148,7 @@ def _pack(
     rng: np.random.Generator,
     min_distance: float,
 ) -> NDArray[np.float64]:
-    """As many points as come in `DRAWS` draws, `count` at most, m, shape (k, 2)."""
+    """Collect at most `count` points in `DRAWS` draws, m, shape (k, 2)."""
     taken = np.empty((len(keep_away) + count, 2))
     taken[: len(keep_away)] = keep_away
     filled = len(keep_away)
@@ -179,7 +178,7 @@ def _rng(seed: int, purpose: _Purpose, *level: int) -> np.random.Generator:
 
 
 def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator) -> list[str]:
-    """Category per point: every block of as many points as categories is a permutation of them."""
+    """Draw the category of each point. Each block of as many points as categories has every category once."""
     keys = list(catalogue.categories)
     blocks = -(-count // len(keys))
     order = np.concatenate([rng.permutation(len(keys)) for _ in range(blocks)])
@@ -187,7 +186,7 @@ def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator
 
 
 def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.random.Generator) -> list[str]:
-    """Object model per point; a category's models are drawn without replacement, and again when all are used."""
+    """Draw the object model of each point, without replacement until all models of the category are used."""
     decks: dict[str, list[str]] = {key: [] for key in catalogue.categories}
     models = []
     for category in categories:
@@ -199,7 +198,6 @@ def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.rando
 
 
 def _drop(episode: Episode, catalogue: Catalogue, rng: np.random.Generator) -> Episode:
-    """Drop the objects upright with a random yaw; those that roll away are dropped again."""
     dropped = tuple(_above_floor(o, rng) for o in episode.objects)
     for _ in range(DROPS):
         settled = settle(replace(episode, objects=dropped), catalogue)
@@ -221,7 +219,6 @@ def _above_floor(placed: PlacedObject, rng: np.random.Generator) -> PlacedObject
 
 
 def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generator) -> StartPose:
-    """The first candidate where a person can start."""
     objects = np.array([o.position[:2] for o in episode.objects])
     centroid = objects.mean(axis=0)
     for point in _start_candidates(centroid, rng):
@@ -237,18 +234,18 @@ def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generato
 def _start_candidates(
     centroid: NDArray[np.float64], rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
-    """The objects' centroid (2,), m, then random points in larger and larger circles around it."""
+    """Yield the objects' centroid (2,), m, then random points in growing circles around it."""
     yield centroid
     for radius in RADIUS_STEP * np.arange(1, RADII + 1):
         for _ in range(DRAWS_PER_RADIUS):
-            # The square root spreads the points evenly over the disc.
+            # The square root makes the points uniform over the disc.
             reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
             yield centroid + reach * np.array([math.cos(angle), math.sin(angle)])
 
 
 def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:
     clear = bool((np.hypot(*(objects - point).T) >= START_CLEARANCE).all())
-    # Snapping tells the floor that all objects are on from islands of it, such as the inside of a table.
+    # Snapping moves points on islands, such as the inside of a table, to the floor on which all objects are.
     return (
         clear
         and navigable.is_navigable(point)

@@ -1,4 +1,4 @@
-"""Composition of a house, its receptacles and an episode's objects into one compiled model (MjSpec)."""
+"""Composition of a house, its receptacles, an episode's objects and the person into one compiled model."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -25,14 +25,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
-    """Where each object lives in the model's and the state's arrays, in the episode's order."""
+    """Addresses of the objects in the arrays of `MjModel` and `MjData`, in the episode's order."""
 
     names: tuple[str, ...]  # instance names
     bodies: NDArray[np.int32]  # body ids, (n,)
     qpos: NDArray[np.int32]  # first `qpos` address of each free joint (3 position, 4 quaternion), (n,)
     dofs: NDArray[np.int32]  # first `qvel` address (3 linear, 3 angular), (n,)
     trees: NDArray[np.int32]  # kinematic tree ids, for sleep states, (n,)
-    geom_owner: NDArray[np.int32]  # per geom, the position of its object in this order, or -1, (ngeom,)
+    geom_owner: NDArray[np.int32]  # index of each geom's object, or -1, (ngeom,)
     _rows: NDArray[np.intp] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -40,7 +40,7 @@ class SceneIndex:
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
-        """Look the objects up in a compiled model; `AssetError` where it lacks the body or the free joint of one."""
+        """Find the objects in a compiled model. Raise an AssetError if one lacks its body or free joint."""
         bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
         joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
         owner_of_body = np.full(model.nbody, -1, np.int32)
@@ -56,26 +56,22 @@ class SceneIndex:
         )
 
     def position_of(self, name: str) -> int:
-        """Position of an instance in the episode's order.
-
-        Raises:
-            EpisodeError: No such instance.
-        """
+        """Return the index of an instance. Raise an EpisodeError if it is unknown."""
         try:
             return self.names.index(name)
         except ValueError:
             raise EpisodeError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
 
     def body(self, name: str) -> int:
-        """Body id of an instance; raises `EpisodeError` for an unknown one."""
+        """Return the body id of an instance. Raise an EpisodeError if it is unknown."""
         return int(self.bodies[self.position_of(name)])
 
     def geoms(self, name: str) -> NDArray[np.intp]:
-        """Geom ids of an instance, shape (its geoms,); raises `EpisodeError` for an unknown one."""
+        """Return the geom ids of an instance. Raise an EpisodeError if it is unknown."""
         return np.flatnonzero(self.geom_owner == self.position_of(name))
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Positions (n, 3), m, and quaternions wxyz (n, 4) of all objects, copied out of a `qpos`."""
+        """Copy positions (n, 3), m, and quaternions wxyz (n, 4) of all objects from a `qpos`."""
         rows = qpos[self._rows]
         return rows[:, :3], rows[:, 3:]
 
@@ -85,15 +81,15 @@ class Scene:
     """A compiled episode.
 
     Attributes:
-        model: The compiled model; its `qpos0` holds the episode's poses.
-        episode: What it was composed from.
-        catalogue: The house's catalogue.
-        index: Where the objects are in the state.
-        rooms: Which room a point is in.
+        model: The compiled model. Its `qpos0` has the poses of the episode.
+        episode: The composed episode.
+        catalogue: Catalogue of the house.
+        index: Addresses of the objects in the state.
+        rooms: Rooms of the house.
         receptacles: Receptacle key -> geometry.
-        spec: The editable description, for export.
-        person: Size, reach and speeds of the person.
-        visuals: Whether the model includes what is only drawn.
+        spec: Editable description, for export.
+        person: Parameters of the person.
+        visuals: True if the model has geoms that are only drawn.
     """
 
     model: mujoco.MjModel
@@ -108,13 +104,13 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def once(self, key: str, make: Callable[[], T]) -> T:
-        """The cached result of `make`, which is called once per `key`."""
+        """Call `make` at the first call with `key`, and return its result in all later calls."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
 
     def counterpart(self, *, visuals: bool) -> "Scene":
-        """The same episode, with the person, with or without what is only drawn; states fit both."""
+        """Return the scene of the same episode with or without visual geoms. States fit both."""
         if visuals == self.visuals:
             return self
         return self.once(
@@ -133,20 +129,20 @@ def compose(
     """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
 
     Args:
-        episode: What to compose.
+        episode: Episode to compose.
         catalogue: Catalogue of the episode's house.
-        person: Size, reach and speeds of the person; None for the default.
-        avatar: Whether to add the person's body.
-        visuals: Whether to include what is only drawn. Without it a scene moves the same, compiles faster and steps
+        person: Parameters of the person. By default, a default person.
+        avatar: False to leave out the person's body.
+        visuals: False to leave out geoms that are only drawn. Such a scene moves in the same way, compiles and steps
             faster, but cannot be rendered.
 
     Raises:
-        AssetError: The house of a user breaks a convention of docs/models.md, or a model does not compile.
-        EpisodeError: The episode does not fit the catalogue, or something starts outside of the house or inside of
-            something else.
+        AssetError: The house breaks a convention of docs/models.md, or a model does not compile.
+        EpisodeError: The episode does not fit the catalogue, or at the start something is outside the house or
+            overlaps something else.
     """
     _require(check_fit(episode, catalogue), episode)
-    if avatar:  # without one, things are still to fall into place
+    if avatar:  # objects without an avatar have not been dropped yet
         _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
     scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
     if avatar:
@@ -162,7 +158,7 @@ def assemble(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """As `compose`, for an episode whose poses need not make sense."""
+    """Compose an episode like `compose`, without checking it."""
     person = person or PersonParameters()
     house = compiled_house(catalogue)
     require_usable(house)

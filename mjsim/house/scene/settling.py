@@ -1,4 +1,4 @@
-"""Dropped objects come to rest under physics, in a house without a person."""
+"""Settling of dropped objects by physics, in a house without a person."""
 
 from dataclasses import dataclass, replace
 
@@ -13,23 +13,26 @@ from mjsim.values.errors import PhysicsError
 
 REST_SPEED = 0.01  # m/s
 MAX_TIME = 6.0  # s
-MAX_DRIFT = 0.3  # m, from where it was dropped
-MAX_SINK = 0.02  # m below the floor
+MAX_DRIFT = 0.3  # largest distance from the point where it was dropped, m
+MAX_SINK = 0.02  # largest depth below the floor, m
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Objects after the drop, in the episode's order."""
+    """Result of settling."""
 
-    objects: tuple[PlacedObject, ...]  # the objects in their settled poses
-    faults: dict[str, str]  # instance name -> why its pose is unusable; empty when all is well
+    objects: tuple[PlacedObject, ...]  # all objects in their settled poses, in the episode's order
+    faults: dict[str, str]  # instance name -> why its pose cannot be used
 
 
 def settle(episode: Episode, catalogue: Catalogue) -> Settled:
-    """Run the physics of an empty house until every object sleeps, 6 s at most; `PhysicsError` where it fails.
+    """Simulate a house without a person until every object sleeps, at most 6 s.
 
-    An object is at fault when it is then awake and faster than 1 cm/s, when it came to lie more than 0.3 m
-    from its point, or when it left the house.
+    An object has a fault if it is then still faster than 1 cm/s, is more than 0.3 m from its point, or is outside the
+    house.
+
+    Raises:
+        PhysicsError: MuJoCo warned.
     """
     scene = compose(episode, catalogue, avatar=False, visuals=False)
     data = mujoco.MjData(scene.model)

@@ -1,1 +1,1 @@
-"""What a person can see in a house, and how high a receptacle is filled."""
+"""Visibility of objects and receptacles for a person, and fill heights of receptacles."""

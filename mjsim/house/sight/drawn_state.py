@@ -1,4 +1,4 @@
-"""The state of a scene without visuals in the model that has them, for looking and drawing."""
+"""Scenes with visual geoms: their state, taken from the scene without visual geoms, and their large boxes."""
 
 from typing import Any
 
@@ -6,14 +6,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mjsim.house.compiled.rays import DRAWN, moving_geoms
 from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 
+_MIN_WALL = 0.25  # smallest half extents of large boxes along their two longer axes, m
+
 
 def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
-    """The scene with visuals and its state, placed as in `data` until the next call with a state of the same scene."""
+    """Return the scene with visual geoms, and its state, which is valid until the next call for the same scene."""
     if scene.visuals:
         return scene, data
     drawn = scene.once("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
@@ -21,13 +24,30 @@ def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData
     return drawn.scene, drawn.data
 
 
-class _DrawnState:
-    """Poses of bodies and geoms in a scene with visuals."""
+def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
+    """Find the large static boxes whose alpha exceeds `alpha`, in a scene with visual geoms, the largest first.
 
+    Returns centres, m, (w, 3), axes as columns, (w, 3, 3), and half extents, m, (w, 3).
+    """
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
+    opacity = model.geom_rgba[:, 3].copy()  # rays pass through geoms with alpha 0
+    textured = model.geom_matid >= 0
+    opacity[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
+    extents = np.sort(model.geom_size, axis=1)
+    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= _MIN_WALL)
+    found = np.flatnonzero(large & static & drawn & (opacity > alpha))
+    found = found[np.argsort(-extents[found, 1] * extents[found, 2], kind="stable")]
+    return data.geom_xpos[found], data.geom_xmat[found].reshape(-1, 3, 3), model.geom_size[found]
+
+
+class _DrawnState:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.data = scene, mujoco.MjData(scene.model)
         model, data = scene.model, self.data
-        mujoco.mj_kinematics(model, data)  # places what never moves
+        mujoco.mj_kinematics(model, data)  # places static geoms
         geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
         self._geoms = (
             geoms, model.geom_bodyid[geoms], model.geom_pos[geoms], model.geom_quat[geoms],
@@ -35,7 +55,6 @@ class _DrawnState:
         )  # fmt: skip
 
     def place(self, data: mujoco.MjData) -> None:
-        """Place everything as in the state of a model with the same bodies."""
         mine = self.data
         mine.xpos[:], mine.xquat[:], mine.xmat[:] = data.xpos, data.xquat, data.xmat
         mine.xipos[:], mine.ximat[:] = data.xipos, data.ximat
@@ -44,10 +63,10 @@ class _DrawnState:
 
 @kernel
 def place_geoms(geoms: Any, positions: Floats, quaternions: Floats, rotations: Floats) -> None:
-    """Place geoms on their bodies, with the operations of MuJoCo in the same order.
+    """Place geoms on their bodies, with the same operations in the same order as MuJoCo.
 
-    `geoms` holds ids (g,), bodies (g,), positions (g, 3), m, and quaternions (g, 4) in the body frame, and the poses to
-    write, (ngeom, 3) and (ngeom, 9); the other arrays are poses of bodies, as in `MjData`.
+    `geoms` has ids (g,), body ids (g,), positions (g, 3), m, and quaternions (g, 4) in the body frame, and the output
+    arrays, (ngeom, 3) and (ngeom, 9). The other arrays are poses of bodies, as in `MjData`.
     """
     ids, bodies, local_positions, local_quaternions, geom_xpos, geom_xmat = geoms
     for k in range(len(ids)):

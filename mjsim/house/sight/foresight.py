@@ -1,8 +1,8 @@
-"""Which objects may come into view soon, whatever the person does: for a display that draws what it was told.
+"""Potential visibility: objects that may come into view soon, for displays that draw from snapshots.
 
-The answer errs towards yes. Walls and large furniture hide; an object counts as a ball around it, and a person may turn
-and walk at full speed. Whether an object can be seen from a cell of a grid at eye height is worked out once, and anew
-after the object was moved.
+The result is conservative: it may include objects that stay hidden. Only walls and large furniture hide objects, an
+object counts as a ball around it, and the person may turn and walk at full speed. The visibility of an object from the
+cells of a grid at eye height is computed once, and again after the object has moved.
 """
 
 import math
@@ -14,39 +14,39 @@ from numpy.typing import NDArray
 
 from mjsim.house.compiled.rays import Floats, Mask
 from mjsim.house.scene.scene import Scene
-from mjsim.house.sight.sight import large_boxes
+from mjsim.house.sight.drawn_state import large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.observation import Observation
 
-CELL = 0.25  # m
-_MOVED = 1e-3  # m by which an object was moved
+CELL = 0.25  # cell size, m
+_MOVED = 1e-3  # distance by which an object counts as moved, m
 _UNKNOWN, _HIDDEN, _OPEN = -1, 0, 1
-_OPAQUE = 0.99  # alpha
-_MARGIN = 1e-6  # m
+_OPAQUE = 0.99  # smallest alpha of walls that hide objects
+_MARGIN = 1e-6  # tolerance for rounding, m
 
 
 class _WallSegments(NamedTuple):
-    """Opaque boxes that never move, the largest first: centres, axes as columns, and half extents, m."""
+    """Opaque static boxes, the largest first."""
 
-    centers: Floats  # (w, 3)
-    axes: Floats  # (w, 3, 3)
-    half_sizes: Floats  # (w, 3)
+    centers: Floats  # m, (w, 3)
+    axes: Floats  # axes as columns, (w, 3, 3)
+    half_sizes: Floats  # half extents, m, (w, 3)
 
 
 class _VisibilityGrid(NamedTuple):
-    """What can be seen from where, as far as it is known."""
+    """Known visibility of objects from cells of the floor."""
 
-    origin: Floats  # corner of the first cell, and the height of the eyes, m, (3,)
-    seen: NDArray[np.int8]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN`, by cell and object, (rows, columns, n)
+    origin: Floats  # corner of the first cell, and eye height, m, (3,)
+    seen: NDArray[np.int8]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, (rows, columns, n)
 
 
 class Foresight:
-    """The objects that a person may see within a while.
+    """Predictor of the objects that a person may see within a time.
 
     Args:
         scene: The composed episode.
-        horizon: Within which time, s.
-        field_of_view: How wide the view is, rad; that of the scene's person if it is left out.
+        horizon: The time, s.
+        field_of_view: Horizontal field of view, rad. By default, that of the scene's person.
     """
 
     def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:
@@ -65,13 +65,13 @@ class Foresight:
         self._centers = np.full((len(self._radii), 3), np.inf)
 
     def may_see(self, seen: Observation, aspect: float) -> Mask:
-        """Which objects, in the episode's order, may come into a view of some width over height; shape (n,)."""
+        """Mask of the objects that may come into a view with an aspect ratio (width over height), shape (n,)."""
         centers = _centers(seen.object_positions, seen.object_quaternions, self._offsets)
         moved = (np.abs(centers - self._centers) > _MOVED).any(axis=1)
         if moved.any():
             self._centers[moved] = centers[moved]
             self._grid.seen[:, :, moved] = _UNKNOWN
-        corner = math.atan(self._width * math.hypot(1.0, 1.0 / aspect))  # of the view, from its middle
+        corner = math.atan(self._width * math.hypot(1.0, 1.0 / aspect))  # angle from the middle of the view
         c, s, cp, sp = (f(a) for a in (seen.heading, seen.pitch) for f in (math.cos, math.sin))
         gaze = np.array([c * cp, s * cp, sp])
         arguments = seen.eye, gaze, corner + self._swing, self._stride
@@ -79,7 +79,7 @@ class Foresight:
 
 
 def _balls(scene: Scene) -> tuple[Floats, Floats]:
-    """Middle of each object in its body's frame, m, (n, 3), and radius of a ball around it, m, (n,)."""
+    """Bounding balls of the objects: centres in the frames of their bodies, m, (n, 3), and radii, m, (n,)."""
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
     model, owner = scene.model, scene.index.geom_owner
     data = mujoco.MjData(model)
@@ -108,7 +108,6 @@ def _opaque_walls(scene: Scene) -> _WallSegments:
 
 
 def _extent(walls: _WallSegments, margin: float) -> tuple[Floats, Floats]:
-    """Corners of the floor that the walls cover, with a margin, m, each (2,)."""
     if not len(walls.centers):
         return np.full(2, -margin), np.full(2, margin)
     half = np.abs(walls.axes[:, :2]) @ walls.half_sizes[:, :, None]
@@ -118,7 +117,7 @@ def _extent(walls: _WallSegments, margin: float) -> tuple[Floats, Floats]:
 
 @kernel
 def _centers(positions: Floats, quaternions: Floats, offsets: Floats) -> Floats:
-    """Middles of objects, m, (n, 3), from their poses, (n, 3) and (n, 4), and the middles in their frames."""
+    """Compute the centres of objects, m, (n, 3), from their poses and the centres in their own frames."""
     centers = np.empty_like(positions)
     for i in range(len(positions)):
         w, x, y, z = quaternions[i]
@@ -141,10 +140,10 @@ def _may_see(
     walls: _WallSegments,
     grid: _VisibilityGrid,
 ) -> Mask:
-    """Which objects are within an angle, rad, of the gaze, and in sight from a cell that the eye can get to.
+    """Mask of the objects within an angle, rad, of the gaze and in sight of a cell that the eye can reach.
 
-    `eye` and the unit vector `gaze` are (3,), `stride` is how far the eye can get, m, `centers` (n, 3) and `radii` (n,)
-    are the balls around the objects, m. What is found out about cells is kept in `grid`.
+    `eye` and the unit vector `gaze` are (3,). `stride` is how far the eye can move, m. `centers` (n, 3) and `radii`
+    (n,) are balls around the objects, m. Results for cells are stored in `grid`.
     """
     ahead = np.zeros(len(radii), np.bool_)
     for i in range(len(radii)):
@@ -178,13 +177,13 @@ def _may_see(
 
 @kernel
 def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
-    """`_OPEN` if no wall hides the middle of a ball, or its left, right, upper or lower end; else `_HIDDEN`."""
+    """Return `_OPEN` if no wall hides the centre of a ball, or its left, right, top or bottom end, else `_HIDDEN`."""
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
     distance = math.hypot(level, ray[2])
     if distance <= radius or level < radius:
         return _OPEN
-    reach = 1.0 - radius / distance  # share of the way to the ball
+    reach = 1.0 - radius / distance  # share of the ray that ends at the ball
     if not _is_blocked(eye, center, reach, walls):
         return _OPEN
     side = np.array([-ray[1], ray[0], 0.0]) * (radius / level)
@@ -197,7 +196,7 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegme
 
 @kernel
 def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
-    """Whether the first share `reach` of the way between two points (3,), m, leads into a wall."""
+    """Return True if the first share `reach` of the line between two points (3,), m, enters a wall."""
     for w in range(len(walls.centers)):
         enter, leave = 0.0, reach
         for k in range(3):

@@ -1,4 +1,4 @@
-"""Heights of what lies in a receptacle: many rays straight down at once, against the few geoms that are near."""
+"""Heights of the contents of receptacles, by casting many vertical rays at once into the few geoms nearby."""
 
 import math
 from typing import NamedTuple
@@ -22,7 +22,7 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 
 
 class Shapes(NamedTuple):
-    """Shapes of all geoms of a model, as in `MjModel`."""
+    """Shapes of all geoms, in arrays of `MjModel`."""
 
     types: Ints  # `geom_type`, (ngeom,)
     sizes: Floats  # `geom_size`, m, (ngeom, 3)
@@ -36,7 +36,7 @@ class Shapes(NamedTuple):
 
 
 class ReceptacleHeights:
-    """Measures how high the receptacles of one scene are filled, by rays."""
+    """Measures by rays how high the receptacles of a scene are filled."""
 
     def __init__(self, scene: Scene) -> None:
         model = scene.model
@@ -62,9 +62,9 @@ class ReceptacleHeights:
     def heights(
         self, data: mujoco.MjData, receptacle: ReceptacleGeometry, points: Floats, top: float, ignore: Ints
     ) -> Floats:
-        """Height of the first solid surface below each point (k, 2), m, from height `top` down; -inf without one.
+        """Return the height of the first solid surface below each point (k, 2), m, starting at `top`, or -inf.
 
-        The rays pass through the bodies in `ignore`.
+        The rays pass through the bodies whose ids are in `ignore`.
         """
         moving = self._within_reach(data, receptacle, self._moving)
         bodies = self._model.geom_bodyid[moving]
@@ -88,12 +88,15 @@ class ReceptacleHeights:
 def cast_down(
     points: Floats, top: float, geoms: Ints, positions: Floats, rotations: Floats, shapes: Shapes
 ) -> Floats:
-    """Height (k,) of the first of some geoms below points (k, 2) at height `top`, m; -inf where there is none."""
+    """Return the height of the first of some geoms below each point (k, 2) at height `top`, m, (k,), or -inf."""
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
         x, y, dz = positions[geom, 0], positions[geom, 1], top - positions[geom, 2]
-        bound, axes = shapes.bounds[geom] ** 2, rotations[geom]  # columns of the rotation are the geom's axes
+        bound, axes = (
+            shapes.bounds[geom] ** 2,
+            rotations[geom],
+        )  # the columns of the rotation are the geom's axes
         size, is_box = shapes.sizes[geom], shapes.types[geom] == _BOX
         along[0], along[1], along[2] = -axes[6], -axes[7], -axes[8]
         for k in range(len(points)):
@@ -110,7 +113,7 @@ def cast_down(
 
 @kernel
 def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float:
-    """Where a ray enters a geom that is no box, in its own frame; -1 if it misses."""
+    """Return where a ray enters a geom that is not a box, in the geom's frame, or -1."""
     kind, size = shapes.types[geom], shapes.sizes[geom]
     if kind != _MESH:
         return _into_round(start, along, size, kind)
@@ -121,7 +124,7 @@ def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float
 
 @kernel
 def _into_box(start: Floats, along: Floats, size: Floats) -> float:
-    """Where a ray enters a box of these half sizes; -1 if it misses."""
+    """Return where a ray enters a box with half sizes `size`, or -1."""
     enter, leave = 0.0, math.inf
     for axis in range(3):
         if abs(along[axis]) < 1e-12:
@@ -136,7 +139,7 @@ def _into_box(start: Floats, along: Floats, size: Floats) -> float:
 
 @kernel
 def _into_round(start: Floats, along: Floats, size: Floats, kind: int) -> float:
-    """Where a ray enters a sphere, ellipsoid, capsule or cylinder; -1 if it misses."""
+    """Return where a ray enters a sphere, ellipsoid, capsule or cylinder, or -1."""
     if kind == _SPHERE:
         return _into_ball(start, along, size[0], size[0], size[0], 0.0)
     if kind == _ELLIPSOID:
@@ -157,7 +160,7 @@ def _into_round(start: Floats, along: Floats, size: Floats, kind: int) -> float:
 
 @kernel
 def _into_ball(start: Floats, along: Floats, rx: float, ry: float, rz: float, z: float) -> float:
-    """Where a ray enters an ellipsoid around (0, 0, z); -1 if it misses."""
+    """Return where a ray enters an ellipsoid around (0, 0, z), or -1."""
     sx, sy, sz = start[0] / rx, start[1] / ry, (start[2] - z) / rz
     ax, ay, az = along[0] / rx, along[1] / ry, along[2] / rz
     return _root(ax * ax + ay * ay + az * az, sx * ax + sy * ay + sz * az, sx * sx + sy * sy + sz * sz - 1.0)
@@ -165,7 +168,7 @@ def _into_ball(start: Floats, along: Floats, rx: float, ry: float, rz: float, z:
 
 @kernel
 def _into_tube(start: Floats, along: Floats, radius: float, half: float) -> float:
-    """Where a ray enters the side of a cylinder along z; -1 if it misses."""
+    """Return where a ray enters the side of a cylinder along z, or -1."""
     a = along[0] * along[0] + along[1] * along[1]
     if a < 1e-12:
         return -1.0
@@ -176,14 +179,14 @@ def _into_tube(start: Floats, along: Floats, radius: float, half: float) -> floa
 
 @kernel
 def _root(a: float, b: float, c: float) -> float:
-    """Smaller root of a t^2 + 2 b t + c, -1 if there is none."""
+    """Return the smaller root of a t^2 + 2 b t + c, or -1."""
     inside = b * b - a * c
     return (-b - math.sqrt(inside)) / a if inside >= 0.0 else -1.0
 
 
 @kernel
 def _sooner(first: float, second: float) -> float:
-    """The smaller of two depths, of which negative ones do not count."""
+    """Return the smaller of two depths, where negative ones mean a miss."""
     if first < 0.0 or (0.0 <= second < first):
         return second
     return first
@@ -191,7 +194,7 @@ def _sooner(first: float, second: float) -> float:
 
 @kernel
 def _into_mesh(start: Floats, along: Floats, vertices: Floats, faces: Ints, count: int) -> float:
-    """Where a ray first meets a triangle (Moeller and Trumbore, 1997); -1 if it misses all."""
+    """Return where a ray first meets a triangle (Moeller and Trumbore, 1997), or -1."""
     best = -1.0
     for face in range(count):
         a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]

@@ -1,7 +1,7 @@
-"""Which objects and receptacles a person sees: rays from the eye, without any rendering.
+"""Visibility of objects and receptacles for a person, by ray casts instead of rendering.
 
-A kernel leaves out the rays that a large wall certainly blocks, and MuJoCo casts the others one by one: for the few
-objects that are in the same room, this takes two thirds of the time of one `mj_multiRay`.
+A kernel discards rays that a large wall certainly blocks. MuJoCo casts the remaining ones one by one: for the few
+objects of a room, this takes two thirds of the time of one `mj_multiRay`.
 """
 
 import math
@@ -16,41 +16,40 @@ from numpy.typing import ArrayLike, NDArray
 from mjsim.house.compiled.rays import DRAWN, RIM, Floats, Mask, first_hit, moving_geoms
 from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.house.scene.scene import Scene
-from mjsim.house.sight.drawn_state import drawn_state
+from mjsim.house.sight.drawn_state import drawn_state, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.person_parameters import PersonParameters
 
-INSET = 0.7  # of the half extents: box corners and face centres of round objects are empty
+INSET = 0.7  # ray targets, as a share of the half extents, because corners of the boxes of round objects are empty
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
-_MIN_WALL = 0.25  # m, half extents of the boxes that are tested before any ray is cast
-_MARGIN = 1e-6  # m, for rounding
+_MARGIN = 1e-6  # tolerance for rounding, m
 
 
 @dataclass(frozen=True)
 class FieldOfView:
-    """How far and how wide a person sees."""
+    """Angles and range of a person's view."""
 
     horizontal: float  # full angle, rad
     vertical: float  # full angle, rad
-    range: float  # how far an object is noticed, m
+    range: float  # distance at which objects are noticed, m
 
     @classmethod
     def of(cls, person: PersonParameters) -> "FieldOfView":
-        """The field of view of a person, whose picture is 4:3."""
+        """Return the field of view of a person, whose picture has the aspect ratio 4:3."""
         return cls(person.field_of_view, person.vertical_field, person.viewing_distance)
 
 
 def persons_geoms(scene: Scene) -> Mask:
-    """Which geoms belong to the person, (ngeom,)."""
+    """Mask of the geoms of the person's body, (ngeom,)."""
     return _sight(scene).person
 
 
 def in_field_of_view(
     points: ArrayLike, eye: ArrayLike, heading: float, pitch: float, field: FieldOfView
 ) -> Mask:
-    """Which points (n, 3), m, are inside the field of view, at any distance and behind whatever; shape (n,).
+    """Mask of the points (n, 3), m, inside the field of view, at any distance and regardless of obstacles, (n,).
 
-    The gaze is as in `visible_objects`.
+    The other arguments are as for `visible_objects`.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field)
     forward, left, up = gaze.axes @ (np.reshape(points, (-1, 3)) - gaze.eye).T
@@ -68,11 +67,11 @@ def visible_receptacles(
     field: FieldOfView,
     own: Mask | None = None,
 ) -> frozenset[str]:
-    """Keys of the receptacles in view.
+    """Return the keys of the receptacles in view.
 
-    A receptacle is in view when one of seven rays, to the middle of its volume and to points around it, is inside the
-    field of view and meets nothing before the receptacle. The model is any that contains the house, `own` (ngeom,)
-    marks geoms of the person, which hide nothing, and the gaze is as in `visible_objects`.
+    A receptacle is in view if one of seven rays, to the centre of its volume and to points around it, is inside the
+    field of view and hits nothing before the receptacle. The model can be any that contains the house. `own` (ngeom,)
+    is a mask of geoms that hide nothing, such as those of the person. Other arguments are as for `visible_objects`.
     """
     origin = np.array(eye, dtype=np.float64)
 
@@ -100,12 +99,13 @@ def visible_objects(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> tuple[str, ...]:
-    """Instance names of the objects in view, in the episode's order.
+    """Return the instance names of the objects in view, in the episode's order.
 
-    An object is in view when one of seven rays, to the middle of its bounding box and to points around it, is
-    inside the field of view and meets the object first. Walls, furniture and other objects block; the person's
-    own body does not. `data` has geom poses up to date; `eye` is in m, (3,), `heading` rad, counter-clockwise from +x,
-    `pitch` rad, positive upwards; `field` defaults to that of the scene's person, `among`, names to look for, to all.
+    An object is in view if one of seven rays, to the centre of its bounding box and to points around it, is inside the
+    field of view and hits the object first. Walls, furniture and other objects block rays, the person's body does not.
+
+    `data` needs current poses of geoms. `eye` is (3,), m, `heading` rad, counter-clockwise from +x, and `pitch` rad,
+    positive upwards. `field` is by default that of the scene's person. `among` are the names to look for.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     return tuple(scene.index.names[i] for i in sorted(set(_met(scene, data, gaze, among, once=True))))
@@ -121,9 +121,9 @@ def visible_shares(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> dict[str, float]:
-    """How much of each object in view is seen, as the share of its seven rays that reach it: 0 < share <= 1.
+    """Return the share of the seven rays that hit the object, for each object in view: 0 < share <= 1.
 
-    Arguments are as in `visible_objects`.
+    The arguments are as for `visible_objects`.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     hits = list(_met(scene, data, gaze, among, once=False))
@@ -131,19 +131,19 @@ def visible_shares(
 
 
 class _SightGeometry(NamedTuple):
-    """The objects' drawn geoms, the large static boxes and the person in a scene; none of it changes."""
+    """Static data of a scene: drawn geoms of objects, large static boxes, and the person's geoms."""
 
-    geoms: NDArray[np.int64]  # ids of the drawn geoms, (g,)
-    owners: NDArray[np.int64]  # position of the object of each in the episode's order, (g,)
-    boxes: Floats  # centre and half extents of each one's bounding box, in its own frame, m, (g, 6)
-    wall_centers: Floats  # of walls and cupboards, the largest first, m, (w, 3)
-    wall_axes: Floats  # as columns, (w, 3, 3)
+    geoms: NDArray[np.int64]  # ids of the objects' drawn geoms, (g,)
+    owners: NDArray[np.int64]  # index of the object of each, (g,)
+    boxes: Floats  # centre and half extents of the bounding box of each, in its own frame, m, (g, 6)
+    wall_centers: Floats  # centres of large boxes, the largest first, m, (w, 3)
+    wall_axes: Floats  # axes as columns, (w, 3, 3)
     wall_half_sizes: Floats  # m, (w, 3)
-    person: Mask  # which geoms belong to the person, (ngeom,)
+    person: Mask  # mask of the person's geoms, (ngeom,)
 
 
 class _Gaze(NamedTuple):
-    """The eye (3,), m, rows forward, left and up (3, 3), tangents of half the field of view (2,), and its range, m."""
+    """Eye (3,), m; rows forward, left and up (3, 3); tangents of half the angles of view (2,); range, m."""
 
     eye: Floats
     axes: Floats
@@ -161,7 +161,7 @@ def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaz
 def _met(
     scene: Scene, data: mujoco.MjData, gaze: _Gaze, among: Collection[str] | None, *, once: bool
 ) -> Iterator[int]:
-    """Position of the object of each ray that meets it first; `once` stops at an object's first such ray."""
+    """Yield the object index of each ray that hits its object first, or only of the first such ray if `once`."""
     scene, data = drawn_state(scene, data)
     sight, names = _sight(scene), scene.index.names
     looked_for = frozenset(names if among is None else among)
@@ -198,33 +198,14 @@ def _sight_geometry(scene: Scene) -> _SightGeometry:
     )
 
 
-def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
-    """The large boxes in a scene with visuals that never move and are less transparent than `alpha`, the largest first.
-
-    Returns their centres, m, (w, 3), axes as columns, (w, 3, 3), and half extents, m, (w, 3).
-    """
-    model = scene.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
-    opacity = model.geom_rgba[:, 3].copy()  # a ray passes through what is fully transparent
-    textured = model.geom_matid >= 0
-    opacity[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
-    extents = np.sort(model.geom_size, axis=1)
-    large = (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX) & (extents[:, 1] >= _MIN_WALL)
-    found = np.flatnonzero(large & static & drawn & (opacity > alpha))
-    found = found[np.argsort(-extents[found, 1] * extents[found, 2], kind="stable")]
-    return data.geom_xpos[found], data.geom_xmat[found].reshape(-1, 3, 3), model.geom_size[found]
-
-
 @kernel
 def _open_rays(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask, gaze: _Gaze
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Rays worth casting, inside the field of view and not certainly behind a wall.
+    """Collect the rays inside the field of view that no wall certainly blocks.
 
-    Takes poses of geoms, (ngeom, 3) m and (ngeom, 9), and which objects are wanted, (n,). Returns the object of each
-    ray, (k,), in order, and vectors from the eye to points in its bounding box, m, (k, 3).
+    Poses of geoms are (ngeom, 3) m and (ngeom, 9), `wanted` (n,) is a mask of objects. Returns the object index of each
+    ray, (k,), in order, and vectors from the eye to points in the object's bounding box, m, (k, 3).
     """
     low, high = _bounding_boxes(sight, positions, rotations, wanted)
     owners, rays = np.empty(7 * len(wanted), np.int64), np.empty((7 * len(wanted), 3))
@@ -245,9 +226,9 @@ def _open_rays(
 def _bounding_boxes(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask
 ) -> tuple[Floats, Floats]:
-    """Corners of the upright boxes around wanted objects, m, each (n, 3); infinity and -infinity for the others."""
+    """Corners of the axis-aligned boxes around wanted objects, m, each (n, 3), or infinity and -infinity for others."""
     low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
-    for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba knows no `strict`
+    for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba has no `strict`
         if not wanted[i]:
             continue
         for k in range(3):
@@ -261,7 +242,7 @@ def _bounding_boxes(
 
 @kernel
 def _in_field(ray: Floats, gaze: _Gaze) -> bool:
-    """Whether a vector (3,) from the eye, m, ends inside the viewing frustum."""
+    """Return True if a vector (3,) from the eye, m, ends inside the field of view."""
     if ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2 > gaze.range**2:
         return False
     forward = ray[0] * gaze.axes[0, 0] + ray[1] * gaze.axes[0, 1] + ray[2] * gaze.axes[0, 2]
@@ -272,11 +253,11 @@ def _in_field(ray: Floats, gaze: _Gaze) -> bool:
 
 @kernel
 def _is_blocked(ray: Floats, low: Floats, high: Floats, eye: Floats, sight: _SightGeometry) -> bool:
-    """Whether a ray (3,) from the eye enters a wall before the box from `low` to `high`, each (3,), m.
+    """Return True if a ray (3,) from the eye enters a wall before the box from `low` to `high`, each (3,), m.
 
-    Walls are taken as a little smaller than they are, and the box as a little larger.
+    For safety, walls are shrunk and the box is enlarged by `_MARGIN`.
     """
-    reach = 0.0  # share of the ray at which it enters the object's box
+    reach = 0.0  # share of the ray at which it enters the box
     for k in range(3):
         if ray[k] > _MARGIN:
             reach = max(reach, (low[k] - _MARGIN - eye[k]) / ray[k])

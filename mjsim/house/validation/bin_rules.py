@@ -1,4 +1,4 @@
-"""Rules of the receptacles of a house: a person can reach, see and fill each of them."""
+"""Rules for the receptacles of a house: a person can reach, see and fill each of them."""
 
 import math
 from collections.abc import Iterator
@@ -13,19 +13,19 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
-DEFAULT = PersonParameters()  # a study may have others
-SNAP = 1.0  # m, from a receptacle's site `approach` to where a person can stand
-MAX_TOP = 1.4  # m, of a receptacle's volume
-ABOVE = 0.3  # m that an object needs on its way down into a receptacle
-INSIDE_GAP = 0.006  # m of the house within the volume that are no fault
-SUPPORT_GAP = 0.05  # m, below a receptacle
+DEFAULT = PersonParameters()
+SNAP = 1.0  # largest distance from the site `approach` to where a person can stand, m
+MAX_TOP = 1.4  # largest height of the top of a receptacle's volume, m
+ABOVE = 0.3  # free height that an object needs above a receptacle, m
+INSIDE_GAP = 0.006  # depth up to which geoms of the house may extend into the volume, m
+SUPPORT_GAP = 0.05  # largest gap below a receptacle, m
 _WITHIN = ((0.0, 0.0), (0.6, 0.6), (0.6, -0.6), (-0.6, 0.6), (-0.6, -0.6))
 _LIFT = np.array([0.0, 0.0, 0.01])
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def check_bins(floor: WalkableFloor) -> Iterator[Finding]:
-    """All that is wrong with the receptacles at their mounts."""
+    """Check all receptacles of a house at their mounts."""
     for receptacle in floor.receptacles.values():
         for rule in (_bin_height, _bin_surroundings, _bin_use):
             yield from rule(floor, receptacle)
@@ -64,7 +64,6 @@ def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterato
 
 
 def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    """Nothing of the house is in the volume or just above it, and something supports the receptacle."""
     compiled, subject = floor.compiled, _about(floor, receptacle)
     model = compiled.model
     own = model.body(f"{receptacle.key}/receptacle").id
@@ -93,7 +92,6 @@ def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> I
 
 
 def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    """From where a person can stand, its volume is within reach and its top in sight."""
     compiled = floor.compiled
     subject = _about(floor, receptacle)
     stand = floor.navigable.snap(receptacle.approach, math.inf)
@@ -118,5 +116,4 @@ def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[F
 
 
 def _about(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:
-    """The house, with findings about a receptacle."""
     return replace(floor.compiled, subject=f"receptacle {receptacle.key}")

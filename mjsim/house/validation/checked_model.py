@@ -1,4 +1,4 @@
-"""A model compiled on its own for checking, and the rules that hold for every MJCF file."""
+"""Models that are compiled on their own for checking, and rules for all MJCF files."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from mjsim.house.compiled.footprint import outline_points
 from mjsim.house.validation.findings import Finding
 from mjsim.values.errors import AssetError
 
-MAX_NUMBER = 1e6  # larger ones in an MJCF file are typing mistakes
+MAX_NUMBER = 1e6  # larger numbers in an MJCF file are typing mistakes
 LOOK_GROUPS, SOLID_GROUPS = (0, 1, 2), (0, 3)
 _TEXT = ("name", "file", "class", "childclass", "material", "mesh", "texture", "model")
 _KIND = {
@@ -34,16 +34,15 @@ _KIND = {
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A compiled model at rest."""
+    """A compiled model in its initial state."""
 
-    subject: str  # what findings call it (`object mug`)
-    path: Path  # its MJCF file
-    model: mujoco.MjModel  # the compiled model
-    data: mujoco.MjData  # its state, with the frames of bodies, geoms and sites
+    subject: str  # name in findings (`object mug`)
+    path: Path  # MJCF file
+    model: mujoco.MjModel
+    data: mujoco.MjData  # initial state, with frames of bodies, geoms and sites
 
     @classmethod
     def of(cls, subject: str, path: Path, model: mujoco.MjModel) -> "Compiled":
-        """The model at its initial positions."""
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -51,49 +50,49 @@ class Compiled:
 
     @cached_property
     def solid(self) -> NDArray[np.intp]:
-        """Geoms that collide, shape (k,)."""
+        """Ids of geoms that collide, (k,)."""
         return np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
 
     @cached_property
     def shown(self) -> NDArray[np.intp]:
-        """Geoms that a person sees, shape (k,)."""
+        """Ids of geoms that a person sees, (k,)."""
         seen = np.isin(self.model.geom_group, LOOK_GROUPS) & (self.model.geom_rgba[:, 3] > 0)
         return np.flatnonzero(seen)
 
     def points(self, geom: int) -> NDArray[np.float64]:
-        """Points (k, 3), m, that span a geom's outline from above and its bounding box."""
+        """Return points (k, 3), m, that span a geom's outline from above and its bounding box."""
         rotation = self.data.geom_xmat[geom].reshape(3, 3)
         return outline_points(self.model, geom, self.data.geom_xpos[geom], rotation)
 
     def extent(self, geoms: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Lower and upper corner of the box around some geoms, m, shape (2, 3)."""
+        """Return the lower and the upper corner of the box around some geoms, m, (2, 3)."""
         points = np.concatenate([self.points(int(g)) for g in geoms])
         return np.array([points.min(axis=0), points.max(axis=0)])
 
     def geom_name(self, geom: int) -> str:
-        """A geom's name, or its number and body."""
+        """Return a geom's name, or its id and body if it has no name."""
         body = self.model.body(int(self.model.geom_bodyid[geom])).name
         return repr(self.model.geom(geom).name or f"#{geom} of body {body}")
 
     def site(self, name: str) -> int | None:
-        """Id of a site; None where there is none."""
+        """Return the id of a site, or None if it is missing."""
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name)
         return None if found < 0 else int(found)
 
     def error(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
-        """A finding about this model; `place` is (x, y, z), m."""
+        """Make an error about this model. `place` is (x, y, z), m."""
         return Finding(rule, self.subject, message, remedy, "error", self.path.name, _place(place))
 
     def warning(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
-        """A finding that does not make the model unusable; `place` is (x, y, z), m."""
+        """Make a warning about this model. `place` is (x, y, z), m."""
         return Finding(rule, self.subject, message, remedy, "warning", self.path.name, _place(place))
 
 
 def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
-    """Compile an MJCF file on its own, or say why that cannot be done."""
+    """Compile an MJCF file on its own, or return the findings that prevent it."""
     try:
         file = ModelFile.read(path)
-        # Before MuJoCo reads it: that takes NaN for a missing number, and leaves a log file.
+        # Before MuJoCo reads the file, because it takes NaN for a missing number and writes a log file.
         if found := list(check_numbers(subject, file)):
             return found
         return Compiled.of(subject, path, file.spec().compile())
@@ -109,7 +108,7 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
 
 
 def check_numbers(subject: str, model: ModelFile) -> Iterator[Finding]:
-    """Numbers in the text that are not finite or absurdly large: MuJoCo takes some of them for missing."""
+    """Find numbers that are not finite or absurdly large. MuJoCo treats some of them as missing."""
     for element in model.elements:
         for name, value in element.items():
             if name in _TEXT or element.tag in ("include", "text"):
@@ -126,7 +125,7 @@ def check_numbers(subject: str, model: ModelFile) -> Iterator[Finding]:
 
 
 def check_still(compiled: Compiled) -> Iterator[Finding]:
-    """Rules of whatever is put into a scene: no joints and nothing but bodies, geoms, sites and looks."""
+    """Check that a model has no joints, and only bodies, geoms, sites and assets."""
     model = compiled.model
     for joint in range(model.njnt):
         body = model.body(int(model.jnt_bodyid[joint])).name
@@ -147,7 +146,7 @@ def check_still(compiled: Compiled) -> Iterator[Finding]:
 
 
 def check_groups(compiled: Compiled) -> Iterator[Finding]:
-    """What collides is in group 0 or 3, and what does not in 1 or 2: sight and pictures go by the group."""
+    """Check that geoms in groups 0 and 3 collide and those in 1 and 2 do not. Sight and pictures depend on groups."""
     model = compiled.model
     collides = (model.geom_contype | model.geom_conaffinity) != 0
     solid = np.isin(model.geom_group, SOLID_GROUPS)
@@ -161,14 +160,14 @@ def check_groups(compiled: Compiled) -> Iterator[Finding]:
     for geom in np.flatnonzero(~collides & ~np.isin(model.geom_group, (1, 2))):
         yield compiled.error(
             "groups",
-            f"geom {compiled.geom_name(int(geom))} meets nothing but is in group {model.geom_group[geom]}",
+            f"geom {compiled.geom_name(int(geom))} does not collide but is in group {model.geom_group[geom]}",
             "use group 2 for what is only seen (1 for ceilings and lamps), or let it collide",
             compiled.data.geom_xpos[geom],
         )
 
 
 def check_contact_bits(compiled: Compiled) -> Iterator[Finding]:
-    """What collides has the bit by which MuJoCo's defaults meet: others would fall through each other."""
+    """Check that colliding geoms have MuJoCo's default contact bits. Others would pass through each other."""
     model = compiled.model
     for geom in compiled.solid:
         contype, conaffinity = int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])

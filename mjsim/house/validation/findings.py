@@ -1,4 +1,4 @@
-"""What is wrong with a model or an episode: findings, one per fault, each with its remedy."""
+"""Findings: faults of a model or an episode, each with a remedy."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,17 +11,15 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One fault."""
+    """A fault of a model or an episode."""
 
-    rule: str  # convention that is broken (`mass`), a heading of the rules in docs/models.md
-    subject: str  # what is at fault (`object mug`, `house`, `object_03`)
-    message: str  # where, and with which value
-    remedy: str  # what to change
-    # `error` where it cannot be used, `warning` where it can but people would be surprised
-    severity: Severity = "error"
-    file: str = ""  # name of the file to change; empty where the subject says it
-    # where, m, (x, y) or (x, y, z) in the frame of the house or of the object; None where it has no place
-    place: tuple[float, ...] | None = None
+    rule: str  # the broken convention (`mass`), a heading of the rules in docs/models.md
+    subject: str  # the faulty thing (`object mug`, `house`, `object_03`)
+    message: str  # the fault, with its value
+    remedy: str
+    severity: Severity = "error"  # errors prevent use, warnings are about surprises for people
+    file: str = ""  # name of the file to change, if `subject` does not tell
+    place: tuple[float, ...] | None = None  # (x, y) or (x, y, z) in the frame of the house or the object, m
 
     def __str__(self) -> str:
         where = f"{self.subject} ({self.file})" if self.file else self.subject
@@ -29,12 +27,12 @@ class Finding:
 
 
 def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Those that make something unusable."""
+    """Select the findings of severity `error`."""
     return tuple(f for f in findings if f.severity == "error")
 
 
 def one_line(findings: Iterable[Finding], name: object) -> str:
-    """The first error of what is called `name`, and how many more there are, for an exception."""
+    """Format the first error about `name`, and the number of further errors, for an exception."""
     first, *more = errors(findings)
     rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
     return f"{name}: {first}{rest}"

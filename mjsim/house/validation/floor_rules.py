@@ -1,4 +1,4 @@
-"""Rules of a house's floor: it is closed, level and in one piece, and a person can use every receptacle."""
+"""Rules for a house's floor: it is closed, level and in one piece, and all receptacles can be used."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -16,24 +16,23 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import BODY_BAND, BORDER, WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
-USUAL = PersonParameters()  # a study may have others
-PASSAGE = 0.70  # m, width below which people squeeze through
-MIN_PASSAGE = 0.50  # m, width of the body with the planner's clearance
-ROOM_AREA = 0.25  # m^2 of floor to stand on
-FLOOR_GAP = 0.006  # m, between the floor and z = 0
-HEADROOM = 2.0  # m, the highest eyes
+DEFAULT = PersonParameters()
+PASSAGE = 0.70  # width below which people squeeze through, m
+MIN_PASSAGE = 0.50  # width of the body with the planner's clearance, m
+ROOM_AREA = 0.25  # smallest walkable area of a room, m^2
+FLOOR_GAP = 0.006  # largest deviation of the floor from z = 0, m
+HEADROOM = 2.0  # height of the highest eyes, m
 _RAYS = 3000
-_HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of what collides, and of ceilings and lamps
-_CHEST = 1.0  # m, where rays begin: nothing that a person can stand at is there
+_HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of colliding geoms, ceilings and lamps
+_CHEST = 1.0  # height of the start of rays, which is free wherever a person can stand, m
 
 
 def check_floor(floor: WalkableFloor) -> list[Finding]:
-    """All that is wrong with a house as a place to walk in."""
     return [finding for rule in RULES for finding in rule(floor)]
 
 
 def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
-    """What is wrong with a house in which no place is free: most often its floor is too high."""
+    """Describe why a person can stand nowhere in a house. Most often its floor is too high."""
     steps = np.stack(np.meshgrid(*2 * [np.linspace(-0.9, 0.9, 7)]), axis=-1).reshape(-1, 2)
     offsets = np.einsum("kij,nkj->nki", rooms.axes, steps[:, None] * rooms.half_sizes)
     points = (rooms.centers + offsets).reshape(-1, 2)
@@ -42,15 +41,15 @@ def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
         remedy = f"move the house by {-height:.3f} m along z: floors lie at z = 0"
         return compiled.error("floor", f"most of the floor is at z = {height:.3f} m", remedy)
     remedy = f"leave ways of at least {PASSAGE} m between what collides"
-    return compiled.error("rooms", "nowhere in its rooms can a person stand", remedy)
+    return compiled.error("rooms", "a person cannot stand anywhere in its rooms", remedy)
 
 
 def _shell(floor: WalkableFloor) -> Iterator[Finding]:
-    """No way leads out: free space does not reach from a room to the border."""
+    """Check that the outer walls are closed: free space must not connect rooms with the border of the grid."""
     free = floor.clearance.distance > 0
     components, _ = label(free)
     indoors = floor.rectangle_of >= 0
-    inside = components[indoors & (floor.clearance.distance > USUAL.body_radius)]
+    inside = components[indoors & (floor.clearance.distance > DEFAULT.body_radius)]
     outside = components[0, 0]
     if not len(inside) or np.bincount(inside).argmax() != outside:
         return
@@ -71,7 +70,6 @@ def _shell(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _rooms(floor: WalkableFloor) -> Iterator[Finding]:
-    """Every room has floor to stand on that belongs to the largest island."""
     points, area = floor.walkable
     owner = floor.rectangle_of[tuple(floor.cell_of(points).T)]
     for key in dict.fromkeys(floor.rooms.keys):
@@ -86,7 +84,7 @@ def _rooms(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _passages(floor: WalkableFloor) -> Iterator[Finding]:
-    """Ways between rooms that are narrower than `PASSAGE`, by the rooms that a wider person could not enter."""
+    """Find passages narrower than `PASSAGE` by the rooms that a wider person could not enter."""
     field = floor.clearance
     inside = distance_transform_edt(floor.rectangle_of < 0) * field.resolution <= BORDER / 2
     radius = PASSAGE / 2 - field.resolution
@@ -100,7 +98,7 @@ def _passages(floor: WalkableFloor) -> Iterator[Finding]:
     for key in dict.fromkeys(floor.rooms.keys):
         room = np.isin(floor.rectangle_of, floor.rectangles_of(key))
         if (wide[room] == main).any() or not (body[room] == at_home).any():
-            continue  # wide enough, or no way at all, which is another rule
+            continue  # wide enough, or not connected at all, which another rule reports
         place, width = _narrowest(field, wide, main, room & (wide > 0), body == at_home)
         at = floor.centres[place]
         yield floor.compiled.warning(
@@ -118,9 +116,9 @@ def _narrowest(
     beyond: NDArray[np.bool_],
     body: NDArray[np.bool_],
 ) -> tuple[tuple[int, int], float]:
-    """Cell and width, m, of the widest way between the wide component `main` and cells beyond it, all (nx, ny)."""
+    """Return cell and width, m, of the widest passage from the wide component `main` to the cells `beyond`."""
     seeds = (wide == main) | beyond
-    if not beyond.any():  # a room that is narrow throughout: its edge
+    if not beyond.any():  # the whole room is narrow, so take its edge
         seeds = wide == main
     nearest = distance_transform_edt(~seeds, return_distances=False, return_indices=True)
     near_main = (wide == main)[tuple(nearest)]
@@ -132,7 +130,6 @@ def _narrowest(
 
 
 def _level(floor: WalkableFloor) -> Iterator[Finding]:
-    """Wherever one can walk, the floor is at z = 0."""
     points = np.vstack([_places(floor), _low_things(floor)])
     heights = np.array([_CHEST - _free(floor.compiled, p, -1.0) for p in points])
     wrong = np.flatnonzero(~(np.abs(heights) <= FLOOR_GAP))
@@ -149,7 +146,7 @@ def _level(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
-    """Nothing hangs into the way of eyes; what hangs below 1.8 m is walked around."""
+    """Check that nothing is at the height of eyes. Things that hang below 1.8 m are obstacles, and allowed."""
     points = _places(floor)
     heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
     low = int(heights.argmin())
@@ -163,13 +160,12 @@ def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _places(floor: WalkableFloor) -> NDArray[np.float64]:
-    """Points (k, 2), m, all over the walkable floor."""
     points, _ = floor.walkable
     return points[:: max(1, len(points) // _RAYS)]
 
 
 def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
-    """Middles (k, 2), m, of colliding geoms that are too low to be walked around, where one can walk."""
+    """Return the middles (k, 2), m, of colliding geoms on the walkable floor that are too low to be obstacles."""
     compiled, found = floor.compiled, [np.empty((0, 2))]
     points, area = floor.walkable
     for geom in compiled.solid:
@@ -184,7 +180,7 @@ def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
-    """Distance, m, from chest height over a floor point (2,) to the first solid geom above (1) or below (-1)."""
+    """Return the distance, m, from chest height above a point (2,) to the next solid geom, up (1) or down (-1)."""
     geom = np.zeros(1, np.int32)
     start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
     distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, _HANGING, 1, -1, geom)

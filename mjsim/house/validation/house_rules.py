@@ -1,7 +1,4 @@
-"""Rules of a house's MJCF file: docs/models.md, "A house"; what one can walk on is judged in `floor_rules`.
-
-MuJoCo takes each mesh that collides for its convex hull, which may fill floor that the mesh leaves free.
-"""
+"""Rules for a house's MJCF file (docs/models.md, "A house"), except those for its floor in `floor_rules`."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -25,20 +22,20 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import BODY_BAND
 from mjsim.values.errors import AssetError
 
-AREA = 0.1  # m^2 of floor that a hull may fill
-_SIDE = 24  # places along each side of a hull's outline
+AREA = 0.1  # largest floor area that a convex hull may fill in addition to its mesh, m^2
+_SIDE = 24  # number of points along each side of a hull's outline
 _MAX_CROSSINGS = 50
-SIZE = (1.5, 150.0)  # m, sides of the rectangle around all rooms
+SIZE = (1.5, 150.0)  # smallest and largest side of the rectangle around all rooms, m
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
 GRAVITY_SLACK = 0.1  # m/s^2
-OVERLAP = 0.05  # m^2, between two rooms
+OVERLAP = 0.05  # largest overlap of two rooms, m^2
 MOUNT = "mount:"
 RESERVED = "avatar"
-USUAL_TIMESTEP = 0.002  # s, of a file that names none
+DEFAULT_TIMESTEP = 0.002  # timestep of a file that does not set it, s
 
 
 def check_hulls(compiled: Compiled) -> Iterator[Finding]:
-    """Colliding meshes around whose triangles a person could stand, but not around their hull."""
+    """Find colliding meshes that leave floor free which their convex hull, with which MuJoCo collides, fills."""
     model, (low, high) = compiled.model, BODY_BAND
     meshes = compiled.solid[model.geom_type[compiled.solid] == mujoco.mjtGeom.mjGEOM_MESH]
     for geom in meshes.tolist():
@@ -58,7 +55,7 @@ def check_hulls(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Places (k, 2), m, on a grid within the convex hull of points (n, 2), m, and the area of each, m^2."""
+    """Return points (k, 2), m, on a grid in the convex hull of points (n, 2), m, and the area per point, m^2."""
     sides = np.ptp(points, axis=0) / _SIDE
     steps = np.stack(np.meshgrid(np.arange(_SIDE), np.arange(_SIDE)), axis=-1).reshape(-1, 2)
     places = points.min(axis=0) + (steps + 0.5) * sides
@@ -68,7 +65,7 @@ def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
 
 
 def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
-    """Whether nothing of a mesh is at chest height over a floor point (2,), m, and nothing below it."""
+    """Return True if a mesh has nothing at chest height above a floor point (2,), m, and nothing below it."""
     low, high = BODY_BAND
     at, crossings = np.array([*place, high / 2]), 0
     below = _to_mesh(compiled, geom, at, -1.0)
@@ -79,12 +76,12 @@ def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
 
 
 def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: float) -> float:
-    """Distance from a point (3,), m, up (1) or down (-1) to the next triangle of a mesh, m; -1 where there is none."""
+    """Return the distance, m, from a point (3,), m, up (1) or down (-1) to the next triangle of a mesh, or -1."""
     return float(mujoco.mj_rayMesh(compiled.model, compiled.data, geom, start, np.array([0.0, 0.0, up])))
 
 
 def check_house_file(catalogue: Catalogue) -> list[Finding]:
-    """All that is wrong with a house's file, without its receptacles."""
+    """Check a house's file, without its receptacles."""
     compiled = compile_model("house", catalogue.house_path)
     if not isinstance(compiled, Compiled):
         return compiled
@@ -102,7 +99,7 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
         bits = mujoco.mjtDisableBit.__members__.items()
         flags = [name for name, bit in bits if int(bit) & option.disableflags]
         yield compiled.error("options", f"its <flag> disables {flags}", "remove <flag>")
-    if option.timestep not in (USUAL_TIMESTEP, TIMESTEP):
+    if option.timestep not in (DEFAULT_TIMESTEP, TIMESTEP):
         yield compiled.warning(
             "options",
             f"its timestep of {option.timestep:g} s is not used: a step takes {TIMESTEP:g} s",
@@ -115,7 +112,7 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _names(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
-    """Scenes prefix the names of receptacles, objects and the person; the house must not use these prefixes."""
+    """Find names with prefixes that scenes use for receptacles, objects and the person."""
     model = compiled.model
     taken = {RESERVED, *catalogue.receptacles}
     kinds = (("body", model.nbody), ("geom", model.ngeom), ("site", model.nsite))
@@ -150,10 +147,11 @@ def _rooms(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
 
 
 def _overlaps(compiled: Compiled, rooms: RoomMap) -> Iterator[Finding]:
-    """Rooms whose rectangles overlap: a point would be in both."""
     reach = np.einsum("kij,kj->ki", np.abs(rooms.axes), rooms.half_sizes)
     low, high = rooms.centers - reach, rooms.centers + reach
-    square = np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9  # others are not judged: their corners stand out
+    square = (
+        np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9
+    )  # skips rotated rooms, whose extents are too large
     for i, j in itertools.combinations(np.flatnonzero(square), 2):
         sides = np.minimum(high[i], high[j]) - np.maximum(low[i], low[j])
         if rooms.keys[i] != rooms.keys[j] and sides.min() > 0 and np.prod(sides) > OVERLAP:
@@ -180,7 +178,7 @@ def _mounts(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
         if name.startswith(MOUNT) and name.removeprefix(MOUNT) not in catalogue.receptacles:
             yield compiled.warning(
                 "mounts",
-                f"the site {name!r} is for no receptacle of the catalogue",
+                f"the site {name!r} belongs to no receptacle of the catalogue",
                 f"the catalogue has {sorted(catalogue.receptacles)}",
                 compiled.data.site_xpos[site],
             )

@@ -1,4 +1,4 @@
-"""Rules of an object that a person picks up and carries: docs/models.md, "An object"."""
+"""Rules for an object that a person can carry (docs/models.md, "An object")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,17 +16,17 @@ from mjsim.house.validation.checked_model import (
 )
 from mjsim.house.validation.findings import Finding, errors
 
-SIZE = (0.06, 0.32)  # m, least and greatest length of the longest side
+SIZE = (0.06, 0.32)  # smallest and largest length of the longest side, m
 MASS = (0.03, 1.5)  # kg
-REST_GAP = 0.002  # m, between the lowest point and z = 0
-OFF_CENTRE = 0.03  # m, of the footprint's middle from the origin
-GRIP_GAP = 0.03  # m, between the height of a grip and the top
-GRIP_REACH = 0.05  # m, between a grip and the nearest part
-UPRIGHT = 0.99  # least cosine between a grip's z axis and the vertical
-TURN = 0.1  # greatest deviation of the cosine between the grips' x axes from -1
-THIN = 0.015  # m, of a part that collides
-LOOK_GAP = 0.03  # m, between what is seen and what collides
-SLENDER = 1e-4  # least moment of inertia over mass times the greatest distance squared
+REST_GAP = 0.002  # largest distance of the lowest point from z = 0, m
+OFF_CENTRE = 0.03  # largest distance of the footprint's middle from the origin, m
+GRIP_GAP = 0.03  # largest difference of height between a grip and the top, m
+GRIP_REACH = 0.05  # largest distance of a grip from the nearest part, m
+UPRIGHT = 0.99  # smallest cosine between a grip's z axis and the vertical
+TURN = 0.1  # largest deviation from -1 of the cosine between the x axes of the grips
+THIN = 0.015  # smallest thickness of a colliding part, m
+LOOK_GAP = 0.03  # largest difference between the extents of visible and of colliding geoms, m
+SLENDER = 1e-4  # smallest moment of inertia, in units of mass times the largest distance squared
 ROUND = [
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "CYLINDER", "ELLIPSOID")
 ]
@@ -34,20 +34,19 @@ GRIPS = ("grip_0", "grip_1")
 
 
 def check_object(path: Path, key: str | None = None) -> list[Finding]:
-    """All that is wrong with an object's MJCF file; its `key` in the catalogue is by default the file's name."""
+    """Check an object's MJCF file. By default, its `key` in the catalogue is the file's name."""
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
     return check_compiled_object(compiled) if isinstance(compiled, Compiled) else compiled
 
 
 def check_compiled_object(compiled: Compiled) -> list[Finding]:
-    """All that is wrong with a compiled object."""
     found = list(check_structure(compiled, "object"))
     return found if errors(found) else [finding for rule in RULES for finding in rule(compiled)]
 
 
 def check_structure(compiled: Compiled, body: str) -> Iterator[Finding]:
-    """One top-level body of a name, that collides and is seen; what else there is would be torn apart in a scene."""
+    """Check that a model has a single body, named `body`, with geoms that collide and geoms that are visible."""
     model = compiled.model
     names = [model.body(b).name for b in range(1, model.nbody)]
     if names != [body]:
@@ -57,7 +56,7 @@ def check_structure(compiled: Compiled, body: str) -> Iterator[Finding]:
     outside = np.flatnonzero(model.geom_bodyid == 0)
     if len(outside):
         name = compiled.geom_name(int(outside[0]))
-        yield compiled.error("body", f"geom {name} lies outside of every body", f"move it into body {body!r}")
+        yield compiled.error("body", f"geom {name} is outside all bodies", f"move it into body {body!r}")
     if not len(compiled.solid):
         yield compiled.error(
             "contact", "no geom collides, so it falls through the floor", "add convex parts in group 3"
@@ -159,7 +158,6 @@ def _grip(
     at: NDArray[np.float64],
     box: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Iterator[Finding]:
-    """The grip is above the object's footprint, near its top and near a part of it."""
     low, high = box
     beside = np.maximum(np.maximum(low - at, at - high), 0.0)[:2]
     top = float(high[2])
@@ -182,7 +180,7 @@ def _grip(
 
 
 def _distance(compiled: Compiled, geom: int, at: NDArray[np.float64]) -> float:
-    """From a point (3,), m, to the bounding box of a geom along its own axes, m."""
+    """Return the distance, m, from a point (3,), m, to the bounding box of a geom along its own axes."""
     box = compiled.model.geom_aabb[geom]
     local = compiled.data.geom_xmat[geom].reshape(3, 3).T @ (at - compiled.data.geom_xpos[geom])
     return float(np.linalg.norm(np.maximum(np.abs(local - box[:3]) - box[3:], 0.0)))
@@ -192,7 +190,7 @@ def _parts(compiled: Compiled) -> Iterator[Finding]:
     model = compiled.model
     for geom in compiled.solid:
         thin = float(2 * model.geom_aabb[geom, 3:].min())
-        if thin < THIN - 5e-5:  # what rounds to 15.0 mm is not told to be thin
+        if thin < THIN - 5e-5:  # tolerates what is printed as 15.0 mm
             yield compiled.warning(
                 "thin",
                 f"geom {compiled.geom_name(int(geom))} is {1000 * thin:.1f} mm thin",

@@ -1,4 +1,4 @@
-"""Rules of a receptacle on its own: docs/models.md, "A receptacle"."""
+"""Rules for a receptacle on its own (docs/models.md, "A receptacle")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,25 +11,24 @@ from mjsim.house.validation.checked_model import Compiled, compile_model
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_structure
 
-SIDE = (0.1, 1.2)  # m, of the interior
-DEPTH = (0.08, 0.8)  # m, of the interior
-FLOOR = 0.03  # m, least thickness of its floor
-GAP = 0.02  # m, between the volume and the floor or the walls
-BASE_GAP = 0.005  # m, between the lowest point and z = 0
-STIFF = 0.02  # s, greatest time constant of its contacts
+SIDE = (0.1, 1.2)  # smallest and largest side of the interior, m
+DEPTH = (0.08, 0.8)  # smallest and largest height of the interior, m
+FLOOR = 0.03  # smallest thickness of its floor, m
+GAP = 0.02  # largest gap between the volume and the floor or the walls, m
+BASE_GAP = 0.005  # largest distance of the lowest point from z = 0, m
+STIFF = 0.02  # largest time constant of its contacts, s
 _SLOTS = ((0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5))
 _SIDES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def check_receptacle(path: Path, key: str | None = None) -> list[Finding]:
-    """All that is wrong with a receptacle's MJCF file; its `key` in the catalogue is by default the file's name."""
+    """Check a receptacle's MJCF file. By default, its `key` in the catalogue is the file's name."""
     compiled = compile_model(f"receptacle {key or path.stem}", path)
     return check_compiled_receptacle(compiled) if isinstance(compiled, Compiled) else compiled
 
 
 def check_compiled_receptacle(compiled: Compiled) -> list[Finding]:
-    """All that is wrong with a compiled receptacle."""
     found = [*check_structure(compiled, "receptacle"), *_sites(compiled)]
     return found if errors(found) else [finding for rule in RULES for finding in rule(compiled)]
 
@@ -45,7 +44,7 @@ def _sites(compiled: Compiled) -> Iterator[Finding]:
     if volume is None:
         return
     if compiled.model.site_type[volume] != mujoco.mjtGeom.mjGEOM_BOX:
-        yield compiled.error("sites", "the site 'volume' is no box", 'give it type="box"')
+        yield compiled.error("sites", "the site 'volume' is not a box", 'give it type="box"')
         return
     if compiled.data.site_xmat[volume, 8] < 1 - 1e-6:
         yield compiled.error("sites", "the site 'volume' is tilted", "turn it about z only")
@@ -60,7 +59,7 @@ def _sites(compiled: Compiled) -> Iterator[Finding]:
 
 
 class _Volume:
-    """The site `volume` of a compiled receptacle: (3,) centre and half sizes, m, and axes."""
+    """The site `volume` of a compiled receptacle: centre and half sizes (3,), m, and axes."""
 
     def __init__(self, compiled: Compiled) -> None:
         site = compiled.site("volume")
@@ -71,13 +70,11 @@ class _Volume:
         self.top = float(self.centre[2] + self.half[2])
 
     def at(self, x: float, y: float, height: float) -> NDArray[np.float64]:
-        """Point at shares `x` and `y` of the half sizes, and a height, m."""
         point = self.centre + self.axes @ (self.half * [x, y, 0.0])
         return np.array([point[0], point[1], height])
 
 
 def _open_top(compiled: Compiled) -> Iterator[Finding]:
-    """From above, the floor of the volume is the first thing that is met."""
     volume = _Volume(compiled)
     for x, y in _SLOTS:
         start = volume.at(x, y, volume.top + 0.5)
@@ -165,7 +162,7 @@ def _contacts(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _ray(compiled: Compiled, start: NDArray[np.float64], along: NDArray[np.float64]) -> tuple[float, int]:
-    """Distance, m, and id of the first geom that collides; -1 and -1 where there is none."""
+    """Return the distance, m, and id of the first colliding geom along a ray, or -1 and -1."""
     geom = np.array([-1], np.int32)
     groups = np.array([1, 0, 0, 1, 0, 0], np.uint8)
     return mujoco.mj_ray(compiled.model, compiled.data, start, along, groups, 1, -1, geom), int(geom[0])

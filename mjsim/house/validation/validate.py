@@ -1,4 +1,4 @@
-"""The validator of houses with their objects and receptacles, for `mjsim check` and for houses of users."""
+"""Validation of houses with their objects and receptacles."""
 
 import contextlib
 from collections.abc import Iterator, Mapping
@@ -21,13 +21,14 @@ from mjsim.support.files import source_digest
 from mjsim.support.kernels import cache_base
 from mjsim.values.errors import AssetError, MjsimError
 
-SLOTS = 2.5  # footprints of an average object of the category that a receptacle's floor should have room for
+SLOTS = 2.5  # smallest number of average objects that fit side by side into a receptacle
 
 
 def require_usable(house: CompiledHouse) -> None:
-    """Check a house, unless it comes with the package; `AssetError` gives the first error.
+    """Check a house, unless it is shipped with the package. Raise an AssetError with the first error.
 
-    Once per process, and a generated one once for all: its cached verdict is one on its content, by this code.
+    A house is checked once per process. A generated house is checked once: a file in the cache records that a house of
+    this content was found usable by this code.
     """
     catalogue = house.catalogue
     if catalogue.ref.kind == "shipped":
@@ -38,22 +39,18 @@ def require_usable(house: CompiledHouse) -> None:
     if found := errors(house.once("findings", lambda: check_house(house))):
         raise AssetError(one_line(found, catalogue.name))
     if verdict is not None:
-        with contextlib.suppress(OSError):  # of a full disk: the next process checks again
+        with contextlib.suppress(OSError):  # such as a full disk: the next process checks again
             verdict.parent.mkdir(parents=True, exist_ok=True)
             verdict.touch()
 
 
 def _verdict(catalogue: Catalogue) -> Path:
-    """A file that is there where a house of this content was found usable."""
     by = f"{source_digest('mjsim', 'planner')}-{mujoco.__version__}"
     return cache_base() / "houses" / "usable" / f"{catalogue.content[:32]}-{by}"
 
 
 def check_house(house: CompiledHouse) -> list[Finding]:
-    """All that is wrong with a house, its receptacles and its objects.
-
-    What needs a sound file is only judged where the file is sound: a house of the wrong size has no floor plan.
-    """
+    """Check a house with its receptacles and objects. If a file has errors, skip the rules for the whole house."""
     catalogue = house.catalogue
     found = check_house_file(catalogue)
     for receptacle in catalogue.receptacles.values():
@@ -80,14 +77,13 @@ def _check_composed(house: CompiledHouse) -> list[Finding]:
         navigable = house.navigable
     except MjsimError:
         raise
-    except Exception:  # of whichever package computes it, where nothing is free
+    except Exception:  # raised by the package that computes the floor if nothing is free
         return [nowhere_to_stand(compiled, rooms)]
     rooms_of = {r.key: r.room for r in house.catalogue.receptacles.values()}
     return check_floor(WalkableFloor(compiled, rooms, receptacles, rooms_of, navigable))
 
 
 def _check_sizes(house: CompiledHouse, footprints: Mapping[str, NDArray[np.float64]]) -> Iterator[Finding]:
-    """Every object fits into its receptacle, and a few of them do side by side."""
     for category in house.catalogue.categories.values():
         interior = np.sort(2 * house.receptacles[category.receptacle].half_size[:2])
         sizes = {key: footprints[key] for key in category.objects}

@@ -1,4 +1,4 @@
-"""Outlines of models from above and from the sides, for the pictures of `mjsim check`: no OpenGL is needed."""
+"""Outlines of models from above and from the sides, for the pictures of `mjsim check`. They need no OpenGL."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,22 +15,18 @@ from mjsim.values.episode import Episode
 from mjsim.values.errors import AssetError
 
 Point = tuple[float, float]
-_BAND = (0.05, 1.8)  # m, heights of what is drawn of a house
+_BAND = (0.05, 1.8)  # range of heights of a house that is drawn, m
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """A drawing in metres."""
+    """Outlines of a model in metres, seen along an axis."""
 
-    title: str  # from where it is seen
-    axes: tuple[int, int]  # which coordinates of a place it shows, to the right and up: (0, 1) from above
+    title: str  # direction of view
+    axes: tuple[int, int]  # indices of the coordinates that point right and up: (0, 1) from above
     outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each (k, 2)
-    rooms: tuple[
-        tuple[str, NDArray[np.float64]], ...
-    ] = ()  # corners (4, 2) of each rectangle, with the room's name
-    marks: Mapping[str, Point] = field(
-        default_factory=dict
-    )  # name -> point, of sites, receptacles and objects
+    rooms: tuple[tuple[str, NDArray[np.float64]], ...] = ()  # name and corners (4, 2) of each rectangle
+    marks: Mapping[str, Point] = field(default_factory=dict)  # name -> point, of sites, receptacles, objects
 
 
 def floor_view(
@@ -39,7 +35,7 @@ def floor_view(
     receptacles: Mapping[str, ReceptacleGeometry] | None = None,
     episode: Episode | None = None,
 ) -> Drawing:
-    """A house from above: what a person bumps into, rooms, receptacles, and what an episode puts there."""
+    """Draw a house from above: obstacles, rooms, receptacles, and the objects and start of an episode."""
     marks = {key: _point(r.center, (0, 1)) for key, r in (receptacles or {}).items()}
     if episode is not None:
         marks |= {o.name: _point(o.position, (0, 1)) for o in episode.objects}
@@ -48,7 +44,7 @@ def floor_view(
 
 
 def side_views(compiled: Compiled) -> tuple[Drawing, ...]:
-    """An object or a receptacle from above, from the front and from the right, with its sites."""
+    """Draw an object or a receptacle with its sites from above, from the front and from the right."""
     sites = {compiled.model.site(s).name: compiled.data.site_xpos[s] for s in range(compiled.model.nsite)}
     return tuple(
         Drawing(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
@@ -72,7 +68,6 @@ def _rectangles(rooms: RoomMap | None) -> tuple[tuple[str, NDArray[np.float64]],
 def _outlines(
     compiled: Compiled, axes: tuple[int, int], band: tuple[float, float] | None = None
 ) -> tuple[NDArray[np.float64], ...]:
-    """Outlines of what collides as seen along the remaining axis; what has none is left out."""
     right, up = (np.eye(3)[a] for a in axes)
     turn = np.array([right, up, np.cross(right, up)])
     found = []
@@ -87,7 +82,7 @@ def _outlines(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
             )
             found.append(points[ConvexHull(points[:, :2]).vertices, :2])
-        except (AssetError, QhullError, ValueError):  # flat or not finite: the findings say so
+        except (AssetError, QhullError, ValueError):  # flat or not finite, which findings report
             continue
     return tuple(found)
 

@@ -60,7 +60,7 @@ BROKEN = {
     "a floor too high": ("house.xml", END, '<geom type="box" pos="3 2 0.15" size="4 3 0.15"/>' + END, "floor",
         "z = 0.300 m; move the house by -0.300 m"),
     "rooms full of furniture": ("house.xml", END, '<geom type="box" pos="3 2 1.45" size="4 3 0.35"/>' + END, "rooms",
-        "nowhere in its rooms"),
+        "a person cannot stand anywhere"),
     "a step": ("house.xml", END, '<geom type="box" pos="1.5 1 0" size="0.4 0.4 0.03"/>' + END, "floor",
         "z = 0.030"),
     "a narrow sill": ("house.xml", END, '<geom type="box" pos="3 2 0.01" size="0.01 0.4 0.02"/>' + END,
