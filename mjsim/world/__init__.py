@@ -1,1 +1,1 @@
-"""A running episode: the world that a person acts in, its state, and its tiers of fidelity."""
+"""Running episodes: the world, its state, and its tiers of fidelity."""

@@ -1,10 +1,9 @@
-"""What makes a run repeatable: state hashes, checkpoints, and the versions that determine the physics.
+"""Reproducibility of runs: state hashes, checkpoints, and the versions that determine the physics.
 
-With sleep on, MuJoCo's state vector does not say which bodies sleep, so setting it on live data is not exact. Setting
-it after `mj_resetData` is. A run therefore passes through a checkpoint itself: it takes the state, resets, and sets
-it again. From then on it and a run that starts at the checkpoint are the same, bit for bit. Between checkpoints the
-physics is left alone. A pick or place under way is a generator, which no value can hold, so checkpoints are taken
-only while the world is not busy.
+If bodies may sleep, MuJoCo's state vector does not tell which ones do, so setting it on live data is not exact, but
+setting it after `mj_resetData` is. A run that takes a checkpoint therefore resets itself and restores its own state.
+From then on, it is bit-identical to a run that starts at the checkpoint. Checkpoints are taken only while no pick or
+place is under way, because a motion is a generator, whose state cannot be stored.
 """
 
 import functools
@@ -29,100 +28,101 @@ from mjsim.world.body.grips import GripState
 from mjsim.world.body.rig import RigState
 from mjsim.world.health.monitor import HealthState
 
-CHECKPOINT_PERIOD = 10.0  # s at least from one checkpoint to the next
+CHECKPOINT_PERIOD = 10.0  # shortest simulated time between checkpoints, s
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _HASHED = int(
     mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_EQ_ACTIVE
 )
-# Looks only: textures, colours, the renderer's share of meshes and cameras. Names and paths do not matter either.
+# Attributes of a model that affect only its looks: textures, colours, and what the renderer needs of meshes and cameras
 _LOOKS = (
     "tex_", "mat_", "light_", "cam_", "skin_", "mesh_normal", "mesh_texcoord", "mesh_facenormal", "name_",
 )  # fmt: skip
 _LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
-_NO_PHYSICS = ("render", "environments")  # folders of mjsim that no state depends on
+_NO_PHYSICS = ("render", "environments")  # folders of mjsim that do not affect states
 
 
 @dataclass(frozen=True, eq=False)
 class PersonState:
-    """Commands, grips and compliance of the person where physics moves it."""
+    """Commands, grips and compliance of a person in full physics."""
 
     rig: RigState  # commands of the servos
     grips: GripState  # object and grip in each hand
-    carrying: CarryingState  # compliance offsets and strain of the hands
-    hand_velocities: NDArray[np.float64]  # of the hands' targets, m/s, (2, 3)
+    carrying: CarryingState  # compliance of the hands, and how long they have been strained
+    hand_velocities: NDArray[np.float64]  # velocities of the hands' targets, m/s, (2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class StateDetails:
-    """The part of a world's state that is not physics."""
+    """The part of a world's state outside MuJoCo."""
 
-    hands: tuple[str | None, str | None]  # object in the left and the right hand
-    status: tuple[ObjectStatus, ...]  # status per object
-    health: HealthState  # what the health monitor has accumulated
-    person: PersonState | None  # the person's commands; None in a state without physics
+    hands: tuple[str | None, str | None]  # instance names in the left and the right hand
+    status: tuple[ObjectStatus, ...]  # status of each object
+    health: HealthState
+    person: PersonState | None  # None in fidelity `event`
 
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
     """The complete state of a world between two motions."""
 
-    physics: NDArray[np.float64]  # MuJoCo's integration state, or that of a world without physics, (n,)
-    details: StateDetails  # everything else
+    physics: NDArray[np.float64]  # MuJoCo's integration state, or the state of a kinematic world, (n,)
+    details: StateDetails
 
     @property
     def hash(self) -> int:
-        """64 bits that differ whenever two states do (up to chance)."""
+        """A 64-bit hash of the complete state."""
         return checkpoint_hash(self.physics, self.details_json())
 
     def details_json(self) -> str:
-        """The details as JSON, in which numbers keep their full precision."""
+        """Return the details as JSON with full precision."""
         return json.dumps(msgspec.to_builtins(self.details, enc_hook=np.ndarray.tolist))
 
     @classmethod
     def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
-        """The state of `physics`, shape (n,), and of what `details_json` gave; `StateError` for anything else."""
+        """Restore a state from `physics`, shape (n,), and the text of `details_json`. Raise a StateError if invalid."""
         try:
             values = json.loads(details)
             return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
-        except (ValueError, TypeError) as error:  # of JSON, of msgspec and of arrays
+        except (ValueError, TypeError) as error:  # raised by json, msgspec or NumPy
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
 
 
 def checkpoint_hash(physics: NDArray[np.float64], details: str) -> int:
-    """Hash of a state of `physics`, shape (n,), and `WorldState.details_json`."""
+    """Hash `WorldState.physics` and the text of `WorldState.details_json`."""
     return hash64(physics.tobytes() + details.encode())
 
 
 class StateHash:
-    """Hashes the state of one simulation: time, positions, velocities, activations, commands, active welds."""
+    """Hashes the physics of a simulation: time, positions, velocities, activations, commands, active welds."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._buffer = np.zeros(mujoco.mj_stateSize(model, _HASHED))
 
     def of(self, data: mujoco.MjData) -> int:
-        """64 bits that differ whenever the state differs (up to chance)."""
+        """Return a 64-bit hash of the state."""
         mujoco.mj_getState(self._model, data, self._buffer, _HASHED)
         return hash64(self._buffer.data)
 
 
 def hash64(content: Any) -> int:
-    """The first 64 bits of the SHA-1 of some bytes: a checksum against accidents, not against forgery."""
+    """Return the first 64 bits of the SHA-1 of some bytes, as a checksum against accidental differences."""
     return int.from_bytes(hashlib.sha1(content, usedforsecurity=False).digest()[:8], "little")
 
 
 def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
-    """MuJoCo's integration state, shape (n,)."""
+    """Return MuJoCo's integration state, shape (n,)."""
     physics = np.zeros(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, physics, _STATE)
     return physics
 
 
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
-    """Reset the data and set it to a state of `take_physics`, shape (n,), whatever it was before.
+    """Reset the data and set them to a state that `take_physics` returned, shape (n,).
 
-    `StateError` where the state is of another model, or not finite.
+    Raises:
+        StateError: The state belongs to another model, or is not finite.
     """
     size = mujoco.mj_stateSize(model, _STATE)
     if physics.shape != (size,) or not np.isfinite(physics).all():
@@ -138,7 +138,7 @@ def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.
 
 
 def model_fingerprint(model: mujoco.MjModel) -> str:
-    """16 hex digits over everything in a compiled model that affects the physics; looks are left out."""
+    """Return a digest, 16 hex digits, of everything in a compiled model that affects the physics."""
     digest = hashlib.sha256()
     for part in (model, model.opt):
         for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_looks(n)):
@@ -152,7 +152,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
 
 
 def engine_versions() -> dict[str, str]:
-    """Versions of everything that determines how a state follows from the one before."""
+    """Return the versions of everything that determines how states follow from each other."""
     return {
         "mjsim": _own_version(),
         "physics_code": _code_fingerprint(),
@@ -176,6 +176,6 @@ def _own_version() -> str:
 
 @functools.cache
 def _code_fingerprint() -> str:
-    """16 hex digits over the source of this package, since a version may span many changes."""
+    """Return a digest of the source of this package, because a version may span many changes."""
     root = Path(__file__).parents[1]
     return digest_of(*(place for place in sorted(root.iterdir()) if place.name not in _NO_PHYSICS))

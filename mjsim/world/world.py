@@ -1,4 +1,4 @@
-"""The world: one person, one house, stepped at a fixed control rate."""
+"""The world of a running episode: one person in one house, stepped at a fixed control rate."""
 
 import math
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ from mjsim.world.state import WorldState
 from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED
 from mjsim.world.walking.walker import BACK_OFF, Walker
 
-MAX_STEPS = 1000  # control steps of one action, unless another limit is given
+MAX_STEPS = 1000  # default limit of control steps per action
 
 _STOPS = {ARRIVED: Stop.ARRIVED, BLOCKED: Stop.BLOCKED, CHANGED: Stop.CHANGED}
 
@@ -41,10 +41,10 @@ class StepResult:
 
     Attributes:
         observation: State after the last control step.
-        result: Answer to a pick or place, None for the other actions.
-        events: What happened in the physics during the last control step; an event stops every action.
-        stopped: Why the action stopped.
-        steps: The control steps taken, and the states between them.
+        result: Answer to a pick or place, None for other actions.
+        events: Physical events during the last control step. Any event stops the action.
+        stopped: Reason why the action stopped.
+        steps: Executed control steps, and the states between them.
     """
 
     observation: Observation
@@ -57,13 +57,13 @@ class StepResult:
 class World:
     """A running episode.
 
-    During a pick or place (`Observation.busy`) a `Move` is ignored and another `Pick` or `Place` is refused. A
-    refused action leaves the world exactly as `IDLE` would. How far the person has got along a path is no part of the
-    state: `restore` leaves it as it is, `reset` forgets it.
+    During a pick or place (`Observation.busy`), a `Move` is ignored and another `Pick` or `Place` is refused. A
+    refused action has the same effect as `IDLE`. Progress along a path is not part of the state: `restore` does not
+    change it, and `reset` clears it.
 
     Attributes:
-        scene: The composed episode; its model is never modified.
-        options: The rules, and how much of the world is physics (docs/simulation.md).
+        scene: The composed episode, whose model is never modified.
+        options: Options of the world, including its fidelity (docs/fidelity.md).
 
     Example:
         >>> import mjsim
@@ -84,9 +84,9 @@ class World:
 
         Args:
             scene: The composed episode.
-            options: The rules; None for the usual ones.
-            walls: Outline of the floor on which a person who follows a path passes objects, ends x, y, x, y of its
-                edges, m, shape (e, 4); None if all of it is free.
+            options: Options of the world. By default, those of `WorldOptions()`.
+            walls: Edges x, y, x, y of the floor on which a person who follows a path may walk around objects, m, shape
+                (e, 4). By default, the whole floor.
 
         Raises:
             AssetError: The scene has no person, or an object lacks a grip site.
@@ -102,23 +102,21 @@ class World:
 
     @property
     def model(self) -> mujoco.MjModel:
-        """The compiled model."""
         return self.scene.model
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state, for rendering and rays; read-only. Read it anew after every step."""
+        """The state for rendering and ray casts. Do not change it, and get it again after every step."""
         return self._tier.data
 
     def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
-        """A copy of `data`, to draw while the world is stepped; in an earlier copy, if it is given."""
+        """Copy `data` into a new object or into `into`, to draw it while the world is stepped."""
         copied = mujoco.MjData(self.model) if into is None else into
         mujoco.mj_copyData(copied, self.model, self.data)
         return copied
 
     @property
     def control_timestep(self) -> float:
-        """Simulated time of one `step`, s."""
         return self.options.control_timestep
 
     @property
@@ -133,36 +131,36 @@ class World:
 
     @property
     def busy(self) -> bool:
-        """Whether a pick or place is under way."""
+        """True while a pick or place is under way."""
         return self._tier.busy
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """The person's body as `mjsim.world.fidelity.body_state` lays it out, a copy of shape (BODY_SIZE,)."""
+        """Copy of the person's body state, laid out as in `mjsim.world.fidelity.body_state`, shape (BODY_SIZE,)."""
         return self._tier.body
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Where the left and the right hand are in the body's frame, m, a copy of shape (2, 3)."""
+        """Positions of the left and the right hand in the body frame, m, a copy of shape (2, 3)."""
         return self._tier.hands
 
     @property
     def blocked(self) -> bool:
-        """Whether the path that is followed makes no progress; until the first step after backing off."""
+        """True if the walk along a path makes no progress, until the first step after backing off."""
         return self._walker.blocked
 
     def reset(self) -> Observation:
-        """Return to the episode's beginning; the same actions then lead to bit-identical states."""
+        """Return to the start of the episode. The same actions then lead to bit-identical states."""
         self._tier.reset()
         self._walker.reset()
         return self._tier.observation()
 
     def state_hash(self) -> int:
-        """64 bits that differ whenever the state of the physics differs (up to chance)."""
+        """Return a 64-bit hash of the physics."""
         return self._tier.state_hash()
 
     def state(self) -> WorldState:
-        """The complete state as a value; `restore` continues from it.
+        """Return the complete state, for `restore`.
 
         Raises:
             StateError: A pick or place is under way.
@@ -174,30 +172,30 @@ class World:
         return self._tier.state()
 
     def restore(self, state: WorldState) -> Observation:
-        """Continue from a state of this world, or of another one of the same scene and options.
+        """Continue from a state of this world, or of another world with the same scene and options.
 
-        This resets the physics: the world that the state was taken from continues identically only if it is restored,
-        too (`mjsim.world.state`).
+        This resets the physics. The world that the state was taken from continues identically only if it is also
+        restored (see `mjsim.world.state`).
 
         Raises:
-            StateError: The state does not fit the scene, or is of another fidelity.
+            StateError: The state belongs to another scene or another fidelity.
         """
         try:
             self._tier.restore(state)
-        except (ValueError, IndexError) as error:  # of arrays that have other shapes
+        except (ValueError, IndexError) as error:  # raised for arrays of other shapes
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
         return self._tier.observation()
 
     def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
-        """Carry out an action: one control step for `Move`, `Pick` and `Place`, up to `limit` for the others.
+        """Execute an action: one control step for `Move`, `Pick` and `Place`, up to `limit` steps for others.
 
         Args:
-            action: What the person does.
-            limit: How many control steps to take at most, 1 or more.
+            action: Action of the person.
+            limit: Largest number of control steps, 1 or more.
 
         Raises:
             ActionError: `action` is not an action.
-            PhysicsError: MuJoCo warned or the state is not finite; call `reset` before the next step.
+            PhysicsError: MuJoCo warned, or the state is not finite. Call `reset` before the next step.
         """
         if isinstance(action, FollowPath):
             return self._follow(action, limit)
@@ -236,7 +234,6 @@ class World:
         return self._result(steps, Stop.DUE if self.busy else Stop.DONE)
 
     def _steps_until(self, time: float, now: float, limit: int) -> int:
-        """Control steps up to a time, s, at least 1 and at most `limit`."""
         steps = (time - TIME_TOLERANCE - now) / self.control_timestep
         return limit if steps >= limit else max(1, math.ceil(steps))
 
@@ -245,15 +242,15 @@ class World:
         return StepResult(self._tier.observation(), result, events, Stop.EVENT if events else stopped, steps)
 
     def answer(self, action: Pick | Place) -> ActionResult:
-        """What `step` would answer to a pick or place now; nothing changes.
+        """Return the answer that `step` would give to a pick or place now, without changing anything.
 
         Raises:
-            ActionError: `action` is neither.
+            ActionError: `action` is neither a pick nor a place.
         """
         return self._tier.answer(action)
 
     def observation(self) -> Observation:
-        """The present state."""
+        """Return the current state of the episode."""
         return self._tier.observation()
 
 

@@ -1,4 +1,1 @@
-"""The person's body, hands and motions in the physics: picking, carrying, placing, and their rules.
-
-Serves the tiers of `mjsim.world.fidelity`, which decide when the physics moves the person.
-"""
+"""The person's body, hands and motions in full physics: picking, carrying and placing."""

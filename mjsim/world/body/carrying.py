@@ -1,7 +1,7 @@
-"""Carrying: the hands keep their postures and hold their loads clear of the house (`mjsim.world.body.postures`).
+"""Carrying: hands keep their postures and hold loads clear of the house (`mjsim.world.body.postures`).
 
-A load that gets caught all the same slips out of the hand: its weld is stretched, or the hand is dragged far behind its
-servo.
+A load that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, or if the hand lags far
+behind its servo.
 """
 
 import math
@@ -26,10 +26,10 @@ from mjsim.world.body.slots import object_corners
 
 Floats = NDArray[np.float64]
 
-MAX_SERVO_LAG = 0.25  # m; the servo saturates at 0.04 m, from there on the hand is dragged behind
-LOW, HIGH = 0.93, 1.60  # m, heights of carried objects
+MAX_SERVO_LAG = 0.25  # m. The servo saturates at 0.04 m, and a hand that lags more is held back.
+LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, m
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
-_HOUSE, _PERSON = -1, -2  # owners of geoms that belong to no object
+_HOUSE, _PERSON = -1, -2  # owners of geoms that do not belong to an object
 
 
 @kernel
@@ -43,9 +43,10 @@ def count_strain(
     patience: float,
     strained: NDArray[np.int64],
 ) -> int:
-    """Count the control steps for which each hand's weld has been stretched by more than `max_error`, m.
+    """Count the control steps for which each hand has been strained: by its weld, beyond `max_error` m, or its servo.
 
-    Returns the hands whose count in `strained` (2,) has reached `patience`: 1 for the left one, 2 for the right one, 3.
+    The counts `strained` (2,) are updated. Returns the hands whose count exceeds `patience` as a bit mask: 1 for the
+    left, 2 for the right hand.
     """
     slipping = 0
     for hand in range(2):
@@ -66,14 +67,16 @@ def count_strain(
 
 @dataclass(frozen=True, eq=False)
 class CarryingState:
-    """What carrying remembers between control steps."""
+    """State of `Carrying` between control steps."""
 
-    compliance: NDArray[np.float64]  # how far contact has pushed each hand off its posture, m, (2, 2)
-    strained: NDArray[np.int64]  # control steps for which each hand has been strained, (2,)
+    compliance: NDArray[
+        np.float64
+    ]  # offset by which contacts have pushed each hand from its posture, m, (2, 2)
+    strained: NDArray[np.int64]  # number of control steps for which each hand has been strained, (2,)
 
 
 class Carrying:
-    """Keeps both hands in posture; one instance per world."""
+    """Keeps both hands in posture. Each world has one instance."""
 
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
@@ -81,7 +84,7 @@ class Carrying:
         self.clearance: ClearanceField = compiled_house(scene.catalogue).once(
             "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
         )
-        # how far each object reaches sideways and down about its grip, m, (n, 2)
+        # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
@@ -99,21 +102,19 @@ class Carrying:
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
-        """Forget all contacts."""
+        """Clear the effects of contacts."""
         self._compliance[:] = 0.0
         self._strained[:] = 0
 
     def get_state(self) -> CarryingState:
-        """Compliance offsets and strain of the hands as a value."""
         return CarryingState(self._compliance.copy(), self._strained.copy())
 
     def set_state(self, state: CarryingState) -> None:
-        """Restore what `get_state` returned."""
         self._compliance[:] = state.compliance
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
-        """Set the targets of the hands that no motion moves, and keep the walking command off contacts."""
+        """Set the targets of hands that no motion moves, and keep the walking command from pressing into contacts."""
         person = self._person
         left, right = person.held
         left, right = -1 if left is None else left, -1 if right is None else right
@@ -123,7 +124,7 @@ class Carrying:
         _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
 
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
-        """Best position (3,), body frame, m, for a hand to carry object `item` clear of the house."""
+        """Return the best position (3,), body frame, m, for a hand to carry an object clear of the house."""
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
         rig, carrying = self._person.rig, self._person.parameters.carrying
@@ -132,16 +133,15 @@ class Carrying:
         return np.array([*point, max(up, carrying.least_height + height)])
 
     def _contacts(self) -> tuple[Any, ...]:
-        """All contacts of the physics, as `Contacts`."""
         data = self._person.data
         if not data.ncon:
             return self._no_contacts
         contact = data.contact
-        # Strides differ with the number of contacts, and kernels with the strides.
+        # Contiguous copies, because strides depend on the number of contacts, and kernels on the strides
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:
-        """Hands whose loads have been strained for too long: stretched off the grip, or held back; counts this step."""
+        """Count this control step, and return the hands whose loads have been strained for too long."""
         person, options = self._person, self._person.options
         left, right = person.held
         if left is None and right is None:
@@ -162,7 +162,7 @@ class Carrying:
 
 @kernel
 def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: Any, dt: float) -> None:
-    """`update_hands` with plain tuples: numba takes them from Python in half the time of named ones."""
+    """Call `update_hands` with plain tuples, which numba unpacks in half the time of named tuples."""
     pose, command, clearance = body
     motion = BodyMotion(pose, command, ClearanceField(*clearance))
     update_hands(
@@ -171,7 +171,6 @@ def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: 
 
 
 def _load(person: Person, item: int) -> tuple[float, float]:
-    """How far an object reaches sideways and down about its grip, m."""
     index = person.scene.index
     corners = object_corners(person.scene.model, index.geoms(index.names[item]))
     grip = person.scene.model.site(f"{index.names[item]}/grip_0").pos
@@ -180,7 +179,6 @@ def _load(person: Person, item: int) -> tuple[float, float]:
 
 
 def _geom_owners(scene: Scene) -> NDArray[np.int32]:
-    """Object that each geom belongs to, `_HOUSE` or `_PERSON`, shape (ngeom,)."""
     model, owner = scene.model, scene.index.geom_owner
     static = model.body_weldid[model.geom_bodyid] == 0
     return np.where(owner >= 0, owner, np.where(static, _HOUSE, _PERSON)).astype(np.int32)

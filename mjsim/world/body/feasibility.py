@@ -1,4 +1,4 @@
-"""Feasibility of pick and place: reach, sight, hands and targets (PAPER section 3.4)."""
+"""Feasibility of picks and places: reach, sight, hands and targets (PAPER section 3.4)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,13 +12,13 @@ from mjsim.values.inventory import Inventory
 from mjsim.values.observation import ObjectStatus
 from mjsim.world.body.person import Person
 
-_CHEST = 0.75  # of the eye's height
+_CHEST = 0.75  # height of the chest as a share of the eye height
 
 
 def resolve_pick(
     person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
 ) -> ActionResult:
-    """Answer to a pick; the state is not changed."""
+    """Answer a pick without changing the state."""
     names = person.scene.index.names
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
@@ -55,7 +55,7 @@ def _pick_nearest(
 
 
 def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
-    """Answer to a place; the state is not changed."""
+    """Answer a place without changing the state."""
     scene = person.scene
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
@@ -78,7 +78,7 @@ def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: 
 
 
 def reachable_receptacles(person: Person) -> tuple[str, ...]:
-    """Receptacles within reach and in sight, in the episode's order."""
+    """Return the receptacles within reach and in sight, in the episode's order."""
     near = (k for k in person.scene.receptacles if _distance(person, k) <= person.parameters.reach)
     return tuple(k for k in near if _receptacle_in_sight(person, k))
 
@@ -92,7 +92,7 @@ def _object_distance(person: Person, item: int) -> float:
 
 
 def _object_in_sight(person: Person, item: int) -> bool:
-    """Whether the centre or a grip is visible from the eye or the chest; nothing is picked through a wall."""
+    """Return True if the centre or a grip is visible from the eye or the chest. It prevents picking through walls."""
     viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data

@@ -1,4 +1,4 @@
-"""Hands hold objects by welds between a hand's site and a grip site of the object."""
+"""Grips: welds between a hand's site and a grip site of an object."""
 
 import itertools
 import math
@@ -12,14 +12,14 @@ from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.world.body.rig import Rig, find_id
 
-AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for ten physics steps or more
+AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for at least ten physics steps
 
 
-GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip, per hand
+GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip of each hand
 
 
 class Grips:
-    """Closes, opens and measures the welds that `avatar.attach_avatar` declared: hand x object x grip x stiffness."""
+    """Controls the welds that `avatar.attach_avatar` added for each hand, object, grip and stiffness."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
@@ -36,59 +36,58 @@ class Grips:
         ]
         self._grip_sites = np.array(sites, np.intp).reshape(len(names), len(avatar.GRIPS))
         self._welds = np.array(welds, np.intp).reshape(2, len(names), len(avatar.GRIPS), 2)
-        self.sites = np.full((2, 2), -1, np.intp)  # of each hand and of the grip that it holds, -1 for none
+        self.sites = np.full((2, 2), -1, np.intp)  # site of each hand and of the grip in it, -1 for none
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
-        """Grip of object `item` that a hand reaches with the smaller turn: 0 or 1."""
+        """Return the grip of an object, 0 or 1, for which the hand turns less."""
         return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
-        """Grip of object `item` whose x axis is nearest to a direction (3,): 0 or 1."""
+        """Return the grip of an object, 0 or 1, whose x axis is closest to a direction (3,)."""
         agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._grip_sites[item]]
         return int(np.argmax(agreement))
 
     def point(self, item: int, grip: int) -> NDArray[np.float64]:
-        """Position of a grip site, m, shape (3,)."""
+        """Return the position of a grip site, m, (3,)."""
         return np.array(self._data.site_xpos[self._grip_sites[item, grip]])
 
     def gap(self, hand: int, item: int, grip: int) -> float:
-        """Distance between a hand and a grip site, m."""
+        """Return the distance between a hand and a grip site, m."""
         return site_gap(self._data.site_xpos, self._hand_sites[hand], self._grip_sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
-        """Weld object `item` to a hand, firmly or at first gently; a sleeping object wakes."""
+        """Weld an object to a hand. `gently` uses the soft weld. A sleeping object wakes up."""
         self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
         self._held[hand] = (item, grip)
         self._update()
 
     def open(self, hand: int) -> None:
-        """Release what a hand holds, if anything."""
+        """Release the object in a hand, if any."""
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
-            # Falls begin slowly: what was held still would fall asleep in the air.
+            # Falls start slowly, so an object that was held still would fall asleep in the air.
             self._data.tree_asleep[self._trees[held[0]]] = AWAKE
             self._held[hand] = None
             self._update()
 
     def error(self, hand: int) -> float:
-        """How far the weld of a hand is stretched, m; 0 when it holds nothing."""
+        """Return by how much the weld of a hand is stretched, m, or 0 if it holds nothing."""
         held = self._held[hand]
         return 0.0 if held is None else self.gap(hand, *held)
 
     def get_state(self) -> GripState:
-        """Object and grip that each hand holds; the welds themselves are part of the physics."""
+        """Return object and grip of each hand. The welds themselves are part of the physics."""
         left, right = self._held
         return left, right
 
     def set_state(self, state: GripState) -> None:
-        """Restore what `get_state` returned."""
         self._held = list(state)
         self._update()
 
     def reset(self) -> None:
-        """Forget what was held; the state's welds are reset with the state."""
+        """Clear the bookkeeping. The welds are reset with the physics."""
         self._held = [None, None]
         self._update()
 
@@ -100,7 +99,7 @@ class Grips:
 
 @kernel
 def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
-    """Distance between two sites, m; `site_xpos` as in `MjData`, m, shape (nsite, 3)."""
+    """Return the distance between two sites, m. `site_xpos` as in `MjData`, m, (nsite, 3)."""
     total = 0.0
     for axis in range(3):
         total += (site_xpos[first, axis] - site_xpos[second, axis]) ** 2
@@ -109,8 +108,8 @@ def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
 
 @kernel
 def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float:
-    """Angle between two sites' frames, rad; `site_xmat` as in `MjData`, shape (nsite, 9)."""
-    trace = 0.0  # of the rotation from one to the other: 1 + 2 cos(angle)
+    """Return the angle between the frames of two sites, rad. `site_xmat` as in `MjData`, (nsite, 9)."""
+    trace = 0.0  # trace of the rotation between the frames, which is 1 + 2 cos(angle)
     for k in range(9):
         trace += site_xmat[first, k] * site_xmat[second, k]
     return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))

@@ -1,7 +1,7 @@
 """Picking and placing as motions of a hand.
 
-Picking: stand, turn, reach, weld gently, lift into the carrying posture, close firmly. Placing: over a slot of the
-receptacle, down to the measured fill, release, wait for rest.
+A pick stands still, turns, reaches, welds gently, lifts into the carrying posture, and welds firmly. A place moves over
+a slot of the receptacle, lowers the load to the measured fill height, releases it, and waits until it rests.
 """
 
 import math
@@ -17,13 +17,13 @@ from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.person import Motion, Person, Steps, wrap
 from mjsim.world.body.slots import Slot, best_slot, load_extent, object_corners
 
-_ARRIVAL_TIMEOUT = 0.4  # s, longest wait for the hand to arrive after the reach
-_GRIP_TIMEOUT = 0.2  # s, longest wait for the firm grip to draw the load in
+_ARRIVAL_TIMEOUT = 0.4  # longest wait for the hand to arrive after the reach, s
+_GRIP_TIMEOUT = 0.2  # longest wait for the firm grip to pull the load in, s
 _CLOSE_ENOUGH = 0.012  # m
 Vector = NDArray[np.float64]
-_TOUCH = 0.0005  # m of overlap at which the descent ends
-_OVERLAP = 0.001  # m of overlap below which the hand opens
-_RAISE = 0.003  # m per control step, until it is
+_TOUCH = 0.0005  # overlap at which the descent ends, m
+_OVERLAP = 0.001  # overlap below which the hand opens, m
+_RAISE = 0.003  # distance per control step to raise a load that overlaps more, m
 _RAISE_TIMEOUT = 0.6  # s
 
 
@@ -34,7 +34,7 @@ def pick(
     carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
-    """Reach for object `item`, lift it and look to `pitch`, rad; whether the hand then carries it."""
+    """Reach for an object, lift it and look to `pitch`, rad. Return True if the hand then carries it."""
     rig, grips = person.rig, person.grips
     yield from person.face(person.center(item), person.motion.object_tolerance)
     person.moving_hand = hand
@@ -50,7 +50,7 @@ def pick(
         return False
     grips.close(hand, item, grip, gently=True)
     yield from _lift(person, hand, carry_position(hand, item), pitch)
-    # Held gently, a load hangs 2 cm off the hand: only now, clear of its neighbours, is it drawn in.
+    # A gently held load hangs 2 cm off the hand. It is pulled in only now, when it is clear of its neighbours.
     grips.close(hand, item, grip)
     yield from _draw_in(person, hand)
     if grips.error(hand) > person.options.grip_error:
@@ -60,7 +60,7 @@ def pick(
 
 
 def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
-    """Over the object first, then down to it; the goal is followed while it moves."""
+    """Move over the object first, then down to it, and follow it if it moves."""
     steps = person.steps(person.motion.reach_time)
     for _ in person.swing(
         hand, lambda: person.rig.to_body(person.grips.point(item, grip)), steps, ACROSS_FIRST
@@ -70,7 +70,7 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
 
 
 def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) -> Steps:
-    """Straight up first, so that nothing low is brushed, then back to the body."""
+    """Lift straight up first, to avoid low things, then move to the body."""
     for _ in range(person.steps(person.motion.align_time)):
         yield
     for _ in person.swing(hand, lambda: goal, person.steps(person.motion.lift_time), UP_FIRST):
@@ -79,7 +79,7 @@ def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) ->
 
 
 def _draw_in(person: Person, hand: int) -> Steps:
-    """Wait until the firm grip has drawn the load into the hand."""
+    """Wait until the firm grip has pulled the load into the hand."""
     for _ in range(person.steps(_GRIP_TIMEOUT)):
         if person.grips.error(hand) < 0.5 * person.options.grip_error:
             break
@@ -87,7 +87,7 @@ def _draw_in(person: Person, hand: int) -> Steps:
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Put the object of `hand` into its receptacle, look to `pitch`, rad; whether it then rests inside."""
+    """Put an object into its receptacle, and look to `pitch`, rad. Return True if it comes to rest inside."""
     heading = square_heading(person, receptacle)
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
@@ -104,7 +104,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
 
 
 def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
-    """Heading along a side of the receptacle that is nearest to looking at it: held objects fit in squarely."""
+    """Return the heading along a side of the receptacle that is closest to facing it, so that objects fit squarely."""
     rig = person.rig
     towards = rig.heading + rig.bearing(receptacle.center)
     side = math.atan2(receptacle.rotation[1, 0], receptacle.rotation[0, 0])
@@ -113,7 +113,7 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
 
 
 def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
-    """How high an object's lowest point crosses the receptacle, m above the centre of its volume."""
+    """Return how high above the centre of the volume an object's lowest point crosses the receptacle, m."""
     return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
 
 
@@ -122,7 +122,7 @@ def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector)
 
 
 def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
-    """Up to the hover height, then across to the hover position (3,) in the receptacle's axes."""
+    """Move up to the hover height, then across to the hover position (3,) in the receptacle's axes."""
     target = person.rig.hand_targets[hand]
 
     def above() -> Vector:
@@ -141,9 +141,9 @@ def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Ve
 def _descend(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, slot: Slot, low: float
 ) -> Steps:
-    """Down until the object's lowest point, `low` m from the hand, is just above the fill.
+    """Lower the object until its lowest point, `low` m from the hand, is just above the fill height.
 
-    On touching anything, stop and raise until the overlap is small.
+    If it touches anything, stop and raise it until the overlap is small.
     """
     rig = person.rig
     release = slot.fill + person.motion.release_gap - low
@@ -162,7 +162,7 @@ def _descend(
 
 
 def overlap(person: Person, item: int) -> float:
-    """Deepest overlap of object `item` with anything but the person, m."""
+    """Return the deepest overlap of an object with anything but the person, m."""
     data = person.data
     if not data.ncon:
         return 0.0
@@ -174,7 +174,7 @@ def overlap(person: Person, item: int) -> float:
 def deepest_overlap(
     geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
 ) -> float:
-    """Deepest overlap, m, of an object in contacts (k, 2) with distances (k,), m, but for the foot's; 0 without."""
+    """Return an object's deepest overlap, m, among contacts (k, 2) with distances (k,), m, except with the foot."""
     deepest = 0.0
     for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]
@@ -184,7 +184,7 @@ def deepest_overlap(
 
 
 def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Withdraw the hand upwards and wait until the object rests."""
+    """Withdraw the hand upwards, and wait until the object rests."""
     options, motion = person.options, person.motion
     still = 0
     for step in range(person.steps(options.settle_time)):

@@ -1,6 +1,6 @@
-"""Where a load has room, now and shortly: a person draws a box in when passing a door frame.
+"""Free space for carried loads, now and in the near future: a person draws in a box when passing a door frame.
 
-A hand looks up the clearance around the place where it will be shortly, and moves away from what is too near.
+The kernels look up the clearance where the hand will be shortly, and move it away from what is too near.
 """
 
 import math
@@ -15,31 +15,31 @@ from mjsim.values.motion_parameters import CarryingParameters
 
 Floats = NDArray[np.float64]
 
-# Layout of `Rig.pose` and of `Rig.motion`.
+# Indices into `Rig.pose` and `Rig.motion`
 X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
 ROUNDS = 3
-# Of the line from the body's axis to the posture.
+# Candidate positions, as shares of the line from the body's axis to the posture
 EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class BodyMotion(NamedTuple):
-    """Where the body is, its command, and what is around it."""
+    """Pose and command of the body, and the clearance around it."""
 
-    pose: Floats  # x, y, heading and more, m and rad, (10,) or longer
+    pose: Floats  # x, y and heading, m and rad, followed by others, (10,) or longer
     command: Floats  # commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, (3,) or longer
-    clearance: ClearanceField  # clearance at the heights of what is carried
+    clearance: ClearanceField  # clearance at the heights of carried objects
 
 
 @kernel
 def drawn_in(
     forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Place nearest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
+    """Return the position closest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
 
-    First a shift sideways, as past a door frame. If that is not enough, a place between the body's axis and the
-    posture, as far out as the line from the axis is clear: the far side of a wall is clear, too, but out of reach.
+    The kernel tries a shift sideways first, as past a door frame. Otherwise it chooses a point between the body's axis
+    and the posture, as far out as the line from the axis is clear, because the far side of a wall is out of reach.
     """
     needed = radius + carrying.margin
     shift_f, shift_l = _sideways(forward, left, needed, body, carrying)
@@ -67,7 +67,7 @@ def drawn_in(
 def _clear_throughout(
     forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
 ) -> bool:
-    """Whether a load is clear between axis and posture, as the clearance at both ends and their distance tell."""
+    """Return True if a load is clear between axis and posture, judged by the clearance at both ends."""
     length = math.sqrt(forward * forward + left * left)
     for horizon in (0.0, carrying.near, carrying.far):
         axis, _, _ = _room(0.0, 0.0, horizon, body)
@@ -81,7 +81,7 @@ def _clear_throughout(
 def _sideways(
     forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Shift in the body frame, away from what is too near."""
+    """Return the shift in the body frame that moves a load away from what is too near."""
     shift_f, shift_l = 0.0, 0.0
     for horizon in (0.0, carrying.near, carrying.far):
         for _ in range(ROUNDS):
@@ -97,7 +97,7 @@ def _sideways(
 
 @kernel
 def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Clearance, m, in `horizon` seconds at a point of the body frame, and the direction of more clearance."""
+    """Return the clearance, m, at a point of the body frame in `horizon` seconds, and the direction of more."""
     pose, command = body.pose, body.command
     forward += command[FORWARD] * horizon
     left += command[LEFT] * horizon

@@ -1,4 +1,4 @@
-"""Point-to-point movements of a hand: smooth in time, and either straight or with height leading or following."""
+"""Kernels for changes over time: point-to-point movements of a hand, and commands with limited rates."""
 
 import math
 
@@ -7,21 +7,23 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of a movement's two parts, horizontal and vertical
+STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of the horizontal and the vertical part of a movement
+
+# Velocity forward and left, m/s, yaw rate, rad/s, and pitch of the head, rad: `Rig.motion` or a part of a body state
 Command = NDArray[np.float64]
 FORWARD, LEFT, TURN, LOOK = 0, 1, 2, 3
 
 
 @kernel
 def minimum_jerk(phase: float) -> float:
-    """Progress 0..1 of the smoothest point-to-point movement at a phase (Flash and Hogan, 1985), clamped."""
+    """Return the progress 0..1 of a minimum-jerk movement at a phase 0..1 (Flash and Hogan, 1985), clamped."""
     s = min(1.0, max(0.0, phase))
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 @kernel
 def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
-    """Horizontal and vertical progress 0..1 at a phase 0..1 of a movement; `lead` is the share of it that one leads."""
+    """Return horizontal and vertical progress 0..1 at a phase 0..1. `lead` is the head start of one, as a share."""
     if order == STRAIGHT:
         share = minimum_jerk(phase)
         return share, share
@@ -33,7 +35,7 @@ def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
 def point_between(
     start: NDArray[np.float64], goal: NDArray[np.float64], phase: float, order: int, lead: float
 ) -> NDArray[np.float64]:
-    """Where a hand is at a phase 0..1 of its movement from `start` to `goal`, m, all of shape (3,)."""
+    """Return the position of a hand at a phase 0..1 of its movement from `start` to `goal`, m, all (3,)."""
     across, up = progress(phase, order, lead)
     point = np.empty(3)
     for axis in range(3):
@@ -45,7 +47,7 @@ def point_between(
 def change_velocity(
     command: Command, forward: float, left: float, max_speed: float, max_change: float
 ) -> None:
-    """Change the velocity towards a wanted one, no faster than `max_speed`, by `max_change` at most; all m/s."""
+    """Change the velocity towards a wanted one, by at most `max_change` and up to `max_speed`, all in m/s."""
     speed = math.hypot(forward, left)
     if speed > max_speed:
         forward, left = forward * (max_speed / speed), left * (max_speed / speed)
@@ -60,7 +62,7 @@ def change_velocity(
 
 @kernel
 def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
-    """Change the yaw rate towards a wanted one, no faster than `max_rate`, by `max_change` at most; all rad/s."""
+    """Change the yaw rate towards a wanted one, by at most `max_change` and up to `max_rate`, all in rad/s."""
     change = min(max_rate, max(-max_rate, rate)) - command[TURN]
     command[TURN] += min(max_change, max(-max_change, change))
 
@@ -69,7 +71,7 @@ def change_turn_rate(command: Command, rate: float, max_rate: float, max_change:
 def change_pitch(
     command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
 ) -> None:
-    """Move the pitch at a wanted rate, rad/s, no faster than `max_rate`, between the lowest and the highest, rad."""
+    """Change the pitch at a wanted rate, rad/s, of at most `max_rate`, between `lowest` and `highest`, rad."""
     rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
         command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

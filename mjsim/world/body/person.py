@@ -1,4 +1,4 @@
-"""What every motion of the person uses: scene, state, servos, grips and simple body movements."""
+"""The person in full physics: state, servos, grips, and simple movements of which motions consist."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
@@ -21,27 +21,27 @@ from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, cha
 from mjsim.world.body.postures import move_hand, posture_pace
 from mjsim.world.body.rig import Rig
 
-# A motion sets the servos, yields once per control step, and returns whether it succeeded.
+# A motion sets the servos, yields once per control step, and returns True if it succeeded.
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
 
 @dataclass(eq=False)
 class Person:
-    """The body of the person in one running world."""
+    """The body of the person in a running world."""
 
     scene: Scene
     options: WorldOptions
     data: mujoco.MjData
     rig: Rig
     grips: Grips
-    # Index of the object in the left and the right hand, or None.
+    # Indices of the objects in the left and the right hand, or None
     held: list[int | None] = field(default_factory=lambda: [None, None])
-    # How fast the hands' targets move where no motion moves them, m/s, (2, 3).
+    # Velocities of the hands' targets where no motion moves them, m/s, (2, 3)
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
-    moving_hand: int | None = None  # hand that a motion moves at present; the others keep their posture
-    receptacle_heights: ReceptacleHeights = field(init=False)  # tells how full receptacles are
-    posture_pace: NDArray[np.float64] = field(init=False)  # as in `mjsim.world.body.postures.Hands`
+    moving_hand: int | None = None  # hand that a motion moves now; other hands keep their posture
+    receptacle_heights: ReceptacleHeights = field(init=False)
+    posture_pace: NDArray[np.float64] = field(init=False)  # see `mjsim.world.body.postures.Hands`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
@@ -58,54 +58,51 @@ class Person:
 
     @property
     def parameters(self) -> PersonParameters:
-        """Whose body it is."""
         return self.scene.person
 
     @property
     def motion(self) -> MotionParameters:
-        """Times and speeds of picking and placing."""
         return self.scene.person.motion
 
     @property
     def dt(self) -> float:
-        """Control step, s."""
+        """Duration of a control step, s."""
         return self.options.control_timestep
 
     def steps(self, seconds: float) -> int:
-        """Control steps in a duration, at least 1."""
+        """Convert a duration, s, to control steps, at least 1."""
         return max(1, round(seconds / self.dt))
 
     def travel_steps(self, distance: float) -> int:
-        """Control steps in which a hand with a load travels a distance, m; 0 if it need not."""
+        """Return the number of control steps in which a loaded hand travels a distance, m. 0 for tiny distances."""
         motion = self.motion
         if distance < motion.least_travel:
             return 0
         return self.steps(motion.start_time + distance / motion.travel_speed)
 
     def descent_steps(self, height: float) -> int:
-        """Control steps in which a hand lowers a load by a height, m."""
+        """Return the number of control steps in which a hand lowers a load by a height, m."""
         return self.steps(self.motion.start_time + height / self.motion.descent_speed)
 
     def carried_bodies(self) -> frozenset[int]:
-        """Body ids of the objects in the hands."""
+        """Return the body ids of the objects in the hands."""
         return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
 
     def move_hand_to_rest(self, hand: int) -> None:
-        """Move an empty hand's target towards its rest, by one control step."""
+        """Move an empty hand's target towards its rest posture by one control step."""
         rest = avatar.posture(hand, avatar.REST, self.parameters.eye_height)
         move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.posture_pace, self.dt)
 
     def center(self, item: int) -> NDArray[np.float64]:
-        """Centre of mass of object `item`, m, shape (3,)."""
+        """Return an object's centre of mass, m, (3,)."""
         return np.array(self.data.xipos[self.scene.index.bodies[item]])
 
     def speed(self, item: int) -> float:
-        """Linear speed of object `item`, m/s."""
+        """Return an object's linear speed, m/s."""
         dof = self.scene.index.dofs[item]
         return float(np.linalg.norm(self.data.qvel[dof : dof + 3]))
 
     def asleep(self, item: int) -> bool:
-        """Whether the engine has put object `item` to sleep."""
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
@@ -114,7 +111,7 @@ class Person:
         change_command(self.rig.motion, forward, left, turn, look, self._limits)
 
     def brake(self) -> None:
-        """Bring the walk nearer to a stand, by one control step; turning and looking stay as they are."""
+        """Reduce the walking velocity for one control step. Turning and looking stay as they are."""
         rig = self.rig
         size = math.hypot(rig.motion[0], rig.motion[1])
         rig.motion[:2] *= (
@@ -128,20 +125,20 @@ class Person:
         rig.motion[2] += _clip(change, person.turning_acceleration * self.dt)
 
     def glance(self, point: NDArray[np.float64]) -> None:
-        """Move the head's pitch towards a point of the house frame, (3,) m."""
+        """Move the head's pitch towards a point (3,) of the house frame, m."""
         x, y, z = point.tolist()
         eye_x, eye_y, eye_z = self.rig.eye.tolist()
         self.look_towards(math.atan2(z - eye_z, math.hypot(x - eye_x, y - eye_y)))
 
     def look_towards(self, pitch: float) -> None:
-        """Move the head's pitch towards an angle, rad, at the pace of a glance."""
+        """Move the head's pitch towards an angle, rad, at the speed of a glance."""
         target, motion = self.rig.pitch_target, self.motion
         target += _clip(motion.look_gain * (pitch - target), motion.look_speed * self.dt)
         lowest, highest = avatar.PITCH_RANGE
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stand still and turn to a point (3,), m, or to a heading while glancing at the point, to a tolerance, rad."""
+        """Stand still, look at a point (3,), m, and turn to it or to a heading, up to a tolerance, rad."""
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
@@ -159,7 +156,7 @@ class Person:
     def swing(
         self, hand: int, goal: Callable[[], NDArray[np.float64]], steps: int, order: int
     ) -> Iterator[None]:
-        """Set a hand's target once per control step on its way to a goal (3,), m, which may change on the way."""
+        """Move a hand's target to a goal (3,), m, which may move, one control step per iteration."""
         start = self.rig.hand_targets[hand].copy()
         for k in range(1, steps + 1):
             self.rig.hand_targets[hand] = point_between(start, goal(), k / steps, order, self.motion.lead)
@@ -167,7 +164,7 @@ class Person:
 
 
 def wrap(angle: float) -> float:
-    """An angle in [-pi, pi), rad."""
+    """Wrap an angle to [-pi, pi), rad."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
@@ -180,9 +177,10 @@ def change_command(
     look: float,
     limits: NDArray[np.float64],
 ) -> None:
-    """Change a command (forward, left, yaw rate, pitch) towards a wanted move, in m/s and rad/s, by one control step.
+    """Change a command (forward, left, yaw rate, pitch) towards a move, in m/s and rad/s, by one control step.
 
-    `limits` (8,): fastest walk, its change, yaw rate, its change, pitch rate, lowest and highest pitch, control step.
+    `limits` (8,) has the fastest walk, acceleration, yaw rate, angular acceleration, pitch rate, lowest and highest
+    pitch, and the control step.
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
     change_velocity(command, forward, left, max_speed, acceleration * dt)

@@ -1,9 +1,8 @@
-"""One control step of the hands' postures, as numba kernels: how a target moves to where there is room.
+"""Kernels for the postures of the hands in one control step: a target moves to where there is free space.
 
-If a load touches something static all the same (`mjsim.world.body.load_room`), the hand gives way along the contact's
-normal, up to a limit. From there on the body does not walk or turn into the contact.
-
-Arrays belong to the `Rig` and to `Carrying`, and are changed in place.
+If a load nevertheless touches something static (`mjsim.world.body.load_room`), the hand yields along the contact's
+normal, up to a limit. Beyond the limit, the body stops walking or turning into the contact. The arrays belong to the
+`Rig` and to `Carrying`, and are changed in place.
 """
 
 import math
@@ -19,42 +18,44 @@ from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-UPRIGHT = 0.3  # horizontal share below which a contact is a surface underneath, not an obstacle
+UPRIGHT = (
+    0.3  # smallest horizontal part of a contact's normal by which it is an obstacle, not a surface below
+)
 
-_ARRIVED = 0.0005  # m
+_ARRIVED = 0.0005  # distance to the goal at which a hand stops, m
 
 
 class Hands(NamedTuple):
-    """Control of both hands; left before right, in the body frame."""
+    """Control of both hands, left before right, in the body frame."""
 
     targets: Floats  # commanded positions, m, (2, 3)
-    velocities: Floats  # how fast the targets move, m/s, (2, 3)
-    compliance: Floats  # offsets by which the hands give way to contacts, m, (2, 2)
-    goals: Floats  # room for where the hands belong, m, (2, 3)
-    rest: Floats  # where an empty left hand belongs, m, (3,)
-    loads: Floats  # how far each object reaches sideways and down about its grip, m, (n, 2)
-    pace: Floats  # gain, 1/s, fastest, m/s, and acceleration, m/s^2, of a hand on its way to a posture, (3,)
+    velocities: Floats  # velocities of the targets, m/s, (2, 3)
+    compliance: Floats  # offsets by which the hands yield to contacts, m, (2, 2)
+    goals: Floats  # buffer for the goals of the targets, m, (2, 3)
+    rest: Floats  # rest posture of the left hand, m, (3,)
+    loads: Floats  # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
+    pace: Floats  # gain, 1/s, speed limit, m/s, and acceleration limit, m/s^2, of the targets, (3,)
 
 
 class Contacts(NamedTuple):
-    """What touches what."""
+    """Contacts of the physics."""
 
     geoms: Ints  # geoms of each contact, (k, 2)
-    frames: Floats  # frame of each contact, the normal first, (k, 9)
+    frames: Floats  # frame of each contact, normal first, (k, 9)
     owners: Ints  # object of each geom, -1 for the house, -2 for the person, (ngeom,)
 
 
 class Holding(NamedTuple):
-    """What the hands are doing."""
+    """Loads of the hands, and their posture."""
 
     left: int  # object in the hand, or -1
     right: int
     moving: int  # hand that a motion moves, or -1
-    posture: Floats  # where a left hand that holds something belongs, m, (3,)
+    posture: Floats  # posture of a loaded left hand, m, (3,)
 
 
 def posture_pace(motion: MotionParameters) -> Floats:
-    """`Hands.pace` of a person, shape (3,)."""
+    """Return `Hands.pace` of a person, (3,)."""
     return np.array([motion.posture_gain, motion.posture_speed, motion.posture_acceleration])
 
 
@@ -67,7 +68,7 @@ def update_hands(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Set the targets of the hands that no motion moves, and keep the walking command off contacts; dt in s."""
+    """Set the targets of hands that no motion moves, and keep the walking command off contacts. dt in s."""
     for hand in range(2):
         side = 1.0 - 2.0 * hand
         hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt
@@ -96,9 +97,9 @@ def update_hands(
 def move_hand(
     targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
 ) -> None:
-    """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, slower as it comes near.
+    """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, and slow down near it.
 
-    `velocities` (2, 3), m/s, change with it; `pace` is that of `Hands`.
+    `velocities` (2, 3), m/s, are updated. `pace` is `Hands.pace`.
     """
     dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
     gap = math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -120,7 +121,7 @@ def move_hand(
 
 @kernel
 def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
-    """Where two held objects would meet, pass the right one over the left one."""
+    """Raise the right one of two loads over the left one where they would meet."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
     near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
     over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]
@@ -137,7 +138,7 @@ def _comply(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Give way to everything static that a held object touches from the side."""
+    """Yield to all static geoms that a load touches from the side."""
     owners = contacts.owners
     for contact in range(len(contacts.geoms)):
         first, second = owners[contacts.geoms[contact, 0]], owners[contacts.geoms[contact, 1]]
@@ -163,7 +164,7 @@ def _give_way(
     carrying: CarryingParameters,
     dt: float,
 ) -> None:
-    """Move a hand's offset along a contact's normal; at its limit, keep the body from moving into the contact."""
+    """Move a hand's offset along a contact's normal. At its limit, keep the body from moving into the contact."""
     command, target, offset = body.command, hands.targets[hand], hands.compliance[hand]
     c, s = math.cos(body.pose[HEADING]), math.sin(body.pose[HEADING])
     away_f, away_l = c * nx + s * ny, c * ny - s * nx

@@ -1,4 +1,4 @@
-"""The person as servos: poses, commands, and the physics steps of one control step."""
+"""The person's servos: poses, commands, and the physics steps of a control step."""
 
 import math
 from dataclasses import dataclass
@@ -15,25 +15,23 @@ from mjsim.values.errors import AssetError
 
 Vector = NDArray[np.float64]
 
-# A position servo with damping lags a moving target by kv / kp seconds; the command leads by as much.
+# A position servo with damping lags behind a moving target by kv / kp seconds, so commands are ahead by that time.
 _LEAD = avatar.HAND_KV / avatar.HAND_KP
 _SERVOS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class RigState:
-    """Commands of the person, as a value."""
+    """Commands of the person."""
 
     motion: Vector  # see `Rig.motion`, (4,)
     hand_targets: Vector  # see `Rig.hand_targets`, m, (2, 3)
-    previous_hand_targets: Vector  # those of the control step before, m, (2, 3)
-    command: (
-        Vector  # previous commands of the servos: velocities of x, y and yaw, pitch, hand positions, (10,)
-    )
+    previous_hand_targets: Vector  # `hand_targets` of the previous control step, m, (2, 3)
+    command: Vector  # previous servo commands: velocities of x, y and yaw, pitch, hand positions, (10,)
 
 
 class Rig:
-    """Reads and commands the avatar of one simulation."""
+    """Interface to the avatar's joints and servos in a simulation."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
         self.model, self.data = scene.model, data
@@ -45,9 +43,9 @@ class Rig:
         joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
         ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
         actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
-        # x, y, yaw and pitch of the head, then both hands in the body frame; m and rad; a view of the state, (10,)
+        # x, y, yaw and pitch of the head, then both hands in the body frame, m and rad, a view of the state, (10,)
         self.pose = _view(data.qpos, model.jnt_qposadr[ids])
-        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # their velocities, (10,)
+        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # velocities of `pose`, (10,)
         self._activations = _view(data.act, model.actuator_actadr[actuators])
         self._controls = _view(data.ctrl, actuators)
         self.motion = np.zeros(4)  # commanded velocity forward and left, m/s, yaw rate, rad/s, and pitch, rad
@@ -63,7 +61,7 @@ class Rig:
         self.reset()
 
     def reset(self) -> None:
-        """Take the commands from the present state: standing still."""
+        """Set the commands to standing still in the current pose."""
         self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
         self.hand_targets[:] = self.pose[4:].reshape(2, 3)
         self._last_hand_targets[:] = self.hand_targets
@@ -74,16 +72,14 @@ class Rig:
 
     @property
     def body_state(self) -> Vector:
-        """Poses, rates, commands and servos as `mjsim.world.fidelity.body_state` lays them out, shape (BODY_SIZE,)."""
+        """Poses, rates and commands, laid out as in `mjsim.world.fidelity.body_state`, (BODY_SIZE,)."""
         return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
 
     def get_state(self) -> RigState:
-        """The commands as a value."""
         arrays = (self.motion, self.hand_targets, self._last_hand_targets, self._last_command)
         return RigState(*(array.copy() for array in arrays))
 
     def set_state(self, state: RigState) -> None:
-        """Restore commands of `get_state`."""
         self.motion[:] = state.motion
         self.hand_targets[:] = state.hand_targets
         self._last_hand_targets[:] = state.previous_hand_targets
@@ -101,56 +97,54 @@ class Rig:
 
     @property
     def position(self) -> Vector:
-        """Body axis on the floor, m, shape (2,)."""
+        """Position of the body axis on the floor, m, (2,)."""
         return self.pose[:2].copy()
 
     @property
     def heading(self) -> float:
-        """Yaw, rad, unwrapped."""
+        """Yaw, rad, not wrapped."""
         return float(self.pose[2])
 
     @property
     def pitch(self) -> float:
-        """Pitch of the head, rad, positive upwards."""
         return float(self.pose[3])
 
     @property
     def speed(self) -> float:
-        """How fast the body walks, m/s."""
+        """Walking speed, m/s."""
         return math.hypot(self.rates[0], self.rates[1])
 
     @property
     def turn_rate(self) -> float:
-        """Yaw rate, rad/s."""
         return float(self.rates[2])
 
     @property
     def hands(self) -> Vector:
-        """Hand positions in the body frame, m, shape (2, 3)."""
+        """Hand positions in the body frame, m, (2, 3)."""
         return self.pose[4:].reshape(2, 3).copy()
 
     @property
     def eye(self) -> Vector:
-        """Eye camera in the house frame, m, shape (3,)."""
+        """Position of the eye camera in the house frame, m, (3,)."""
         x, y, heading, pitch = self.pose[:4].tolist()
         return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
 
     def to_body(self, point: Vector) -> Vector:
-        """A point of the house frame, (3,) m, in the body frame."""
+        """Transform a point (3,) of the house frame, m, to the body frame."""
         x, y, heading = self.pose[:3].tolist()
         px, py, pz = point.tolist()
         c, s = math.cos(heading), math.sin(heading)
         return np.array([c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), pz])
 
     def bearing(self, point: Vector) -> float:
-        """Direction of a point, m, shape (2,) or (3,), relative to the heading, rad in [-pi, pi]."""
+        """Return the direction of a point (2,) or (3,), m, relative to the heading, rad in [-pi, pi]."""
         x, y, heading = self.pose[:3].tolist()
         dx, dy = float(point[0]) - x, float(point[1]) - y
         c, s = math.cos(heading), math.sin(heading)
         return math.atan2(c * dy - s * dx, c * dx + s * dy)
 
     def advance(self) -> None:
-        """Step the physics by one control step, ramping the servos from the last commands to the new ones."""
+        """Step the physics by one control step, while the servos ramp from the last commands to the new ones."""
         ramp_servos(
             self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
             self._activations, self._controls, self._dt,
@@ -163,10 +157,10 @@ def ramp_servos(
     pose: Vector, motion: Vector, targets: Vector, last_targets: Vector, last_command: Vector,
     activations: Vector, controls: Vector, dt: float,
 ) -> None:  # fmt: skip
-    """Set where the servos' activations start and how fast they change, so that they arrive after one control step.
+    """Set the start and the rate of the servos' activations so that they reach the commands in one control step.
 
-    The hands ramp from `last_targets` (2, 3), with the lead applied at once. `last_command`, `activations` and
-    `controls` (10,) are those of `MjData.act` and `MjData.ctrl`; all four arrays are overwritten.
+    The hands ramp from `last_targets` (2, 3), and the lead is applied at once. `activations` and `controls` (10,) are
+    those of `MjData.act` and `MjData.ctrl`. All arrays from `last_targets` on are overwritten.
     """
     heading = pose[2] + 0.5 * motion[2] * dt
     c, s = math.cos(heading), math.sin(heading)
@@ -188,7 +182,6 @@ def ramp_servos(
 
 
 def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
-    """A view of the values at consecutive addresses."""
     first, count = int(addresses[0]), len(addresses)
     if not np.array_equal(addresses, np.arange(first, first + count)):
         raise AssetError(
@@ -199,7 +192,7 @@ def _view(values: Vector, addresses: NDArray[np.integer[Any]]) -> Vector:
 
 
 def find_id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
-    """Number of a named part of the person; `AssetError` where the model has no such part."""
+    """Return the id of a named part of the person. Raise an AssetError if the model has no such part."""
     found = int(mujoco.mj_name2id(model, kind, name))
     if found < 0:
         raise AssetError(f"the model has no {kind.name} {name!r}; compose the scene with avatar=True")

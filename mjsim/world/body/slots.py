@@ -1,4 +1,4 @@
-"""How full a receptacle is, and where in it the next object goes: a height map by rays, and the best slot."""
+"""Slots of receptacles: a height map of their contents by ray casts, and the best slot for an object."""
 
 import itertools
 from dataclasses import dataclass
@@ -13,37 +13,39 @@ from mjsim.world.body.person import Person
 
 Vector = NDArray[np.float64]
 
-_WALL_GAP = 0.012  # m
-_SIDE_GAP = 0.006  # m around an object on its way down
-_MAX_SPACING = 0.02  # m between the points of the height map
-_RAYS_ABOVE = 0.2  # m above the receptacle's volume, where the rays start
+_WALL_GAP = 0.012  # gap between an object and the walls, m
+_SIDE_GAP = 0.006  # free width around an object on its way down, m
+_MAX_SPACING = 0.02  # largest distance between points of the height map, m
+_RAYS_ABOVE = 0.2  # height of the start of rays above the receptacle's volume, m
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
-_SLOPE_COST = 2.0  # metres of fill that a metre of mean gap below the object counts for
-_MIN_GAIN = 0.015  # m of cost by which another place must be better to be taken instead of a slot
+_SLOPE_COST = 2.0  # cost of a mean gap of 1 m below the object, in metres of fill height
+_MIN_GAIN = 0.015  # smallest gain of cost for which another place is preferred to a slot, m
 
 
 @dataclass(frozen=True, eq=False)
 class LoadExtent:
-    """Extent of a held object about the hand, in the receptacle's axes."""
+    """Extent of a held object around the hand, in the receptacle's axes."""
 
-    low: Vector  # least coordinates of its corners, m, (3,)
-    high: Vector  # largest coordinates, m, (3,)
+    low: Vector  # smallest coordinates of its corners, m, (3,)
+    high: Vector  # largest coordinates of its corners, m, (3,)
 
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """Where the hand releases an object."""
+    """A place in a receptacle for an object."""
 
-    hand: Vector  # horizontal position of the hand in the receptacle's axes, m, (2,)
-    fill: float  # height of what is below the object there, m above the centre of the receptacle's volume
-    top: float  # height that everything in the receptacle stays below, likewise
+    hand: (
+        Vector  # horizontal position of the hand for releasing the object, in the receptacle's axes, m, (2,)
+    )
+    fill: float  # height of the contents below the object, m above the centre of the receptacle's volume
+    top: float  # height of the highest contents of the receptacle, m above the same centre
 
 
 def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
-    """Points (k, 3) of an object's body frame, m, whose bounding box encloses its colliding geoms.
+    """Return points (k, 3) in an object's body frame, m, whose bounding box encloses its colliding geoms.
 
-    Mesh geoms give their vertices, others the corners of their bounding boxes.
+    These are the vertices of mesh geoms, and the corners of the bounding boxes of other geoms.
     """
     points = []
     for geom in geoms:
@@ -68,7 +70,7 @@ def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
 def load_extent(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
 ) -> LoadExtent:
-    """Extent of an object as `hand` holds it now; its `corners`, (k, 3) m, are in its own frame."""
+    """Measure an object as a hand holds it now. Its `corners`, (k, 3) m, are in the object's frame."""
     body = int(person.scene.index.bodies[item])
     world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
     local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
@@ -76,10 +78,10 @@ def load_extent(
 
 
 def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent: LoadExtent) -> Slot:
-    """Where the object comes to lie lowest and most level.
+    """Choose where the object will lie lowest and most level.
 
-    That is one of 2 x 2 slots; among equals, the one nearest to the person. Another place is taken only if it is
-    better by more than `_MIN_GAIN`. All are chosen such that the object clears the walls, if it can.
+    There are 2 x 2 slots. Among equal ones, the nearest to the person is chosen. Another place is taken only if it is
+    better by more than `_MIN_GAIN`. At all places, the object clears the walls if possible.
     """
     half = receptacle.half_size[:2]
     middle = 0.5 * (extent.low + extent.high)[:2]
@@ -100,7 +102,7 @@ def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent:
 
 
 def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
-    """Points (k, 2) all over the receptacle, in its axes, and the height of what lies there without `item`, m."""
+    """Return points (k, 2) all over the receptacle, in its axes, and the heights of its contents without `item`, m."""
     half = receptacle.half_size
     axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _MAX_SPACING))) for h in half[:2]]
     local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -113,12 +115,12 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
 
 @kernel
 def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
-    """Fill height under an object at each centre (k, 2), m, and its cost, m, both (k,).
+    """Return the fill height below an object at each centre (k, 2), m, and its cost, m, both (k,).
 
-    Objects tip over on a slope, so the mean gap below the highest point adds to the cost.
+    Objects tip over on a slope, so the mean gap below the object adds to the cost.
     """
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
-    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)  # at least one point of the map
+    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)  # includes at least one point of the map
     for k in range(len(centres)):
         total, count = 0.0, 0
         for p in range(len(points)):

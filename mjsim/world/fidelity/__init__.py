@@ -1,7 +1,4 @@
-"""The two tiers of fidelity: `full` physics, and `event`, which simulates only what falls (docs/simulation.md).
-
-Serves `mjsim.world.world.World`, which hides the tier behind one interface.
-"""
+"""The two tiers of fidelity: `full` physics, and `event`, which simulates only falling objects (docs/fidelity.md)."""
 
 from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
@@ -12,5 +9,5 @@ __all__ = ["make_tier"]
 
 
 def make_tier(scene: Scene, options: WorldOptions) -> Full | Event:
-    """The tier that the options name, not yet reset."""
+    """Create the tier for the options. Call `reset` before its first step."""
     return (Full if options.fidelity == "full" else Event)(scene, options)

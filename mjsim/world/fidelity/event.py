@@ -1,4 +1,4 @@
-"""No physics but for the fall of a released object: picks and places are computed in advance, then played."""
+"""The tier `event`: picks and places are computed in advance and played. Only released objects fall by physics."""
 
 import math
 from dataclasses import dataclass
@@ -27,20 +27,20 @@ class ActiveMotion:
     """A planned motion that is being played."""
 
     plan: PlannedMotion
-    result: ActionResult  # the answer to the action that started it
+    result: ActionResult  # answer to the action that started it
     hand: int
     item: int
-    played: int = 0  # control steps so far
+    played: int = 0  # number of control steps so far
 
     @property
     def next_stop(self) -> int:
-        """The control step up to which it can be played at once: the next one with an incident, or the last one."""
+        """The next control step with an incident, or the last step. Up to it, the motion can be played at once."""
         incidents = (step + 1 for step, _, _ in self.plan.incidents if step >= self.played)
         return min(incidents, default=self.plan.length)
 
 
 class Event(Tier):
-    """The tier `event`."""
+    """Kinematic tier with planned motions."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self._full = Full(scene, options)
@@ -48,62 +48,54 @@ class Event(Tier):
         self._kinematic = KinematicWorld(self._full, options)
         self._planner = MotionPlanner(self._full, self._kinematic)
         self._motion: ActiveMotion | None = None
-        self._in_step = False  # whether the data of the physics show the present state
+        self._in_step = False  # True if the data of the physics show the current state
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state for rendering and rays."""
+        """Physics data, brought up to date for rendering and ray casts."""
         if not self._in_step:
             self._kinematic.write(self._full.data)
             self._in_step = True
         return self._full.data
 
     def answer(self, action: Pick | Place) -> ActionResult:
-        """What the answer to a pick or place would be now."""
         if self.busy:
             return ActionResult(action, Refusal.BUSY, action.object)
-        _ = self.data  # the decision reads them
+        _ = self.data  # updates the physics data, which `Full.answer` reads
         return self._full.answer(action)
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
         return self._kinematic.time
 
     @property
     def busy(self) -> bool:
-        """Whether a pick or place is under way."""
         return self._motion is not None
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """A copy of the body."""
         return self._kinematic.body.copy()
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Where the hands are in the body's frame, m, shape (2, 3)."""
         return self._kinematic.hands.copy()
 
     @property
     def health(self) -> Health:
-        """Extremes of the physics since the last reset."""
         return self._full.health
 
     @property
     def health_sample(self) -> HealthSample:
-        """Held objects are in line with their hands, and nothing else touches anything."""
+        # Held objects are exactly at their hands, and nothing else touches anything.
         left, right = (math.nan if grasp is None else 0.0 for grasp in self._kinematic.grasps)
         return HealthSample(weld_error_m=(left, right), weld_error_rad=(left, right))
 
     def reset(self) -> None:
-        """Return to the episode's beginning."""
         self._full.reset()
         self._kinematic.reset(self._full.data)
         self._motion, self._in_step = None, False
 
     def step(self, action: StepAction) -> ActionResult | None:
-        """Advance by one control step."""
         result = None if isinstance(action, Move) else self._begin(action)
         self.episode_state.events = []
         self._in_step = False
@@ -115,7 +107,6 @@ class Event(Tier):
         return result
 
     def follow(self, walk: Walk, progress: NDArray[np.float64], limit: int) -> tuple[int, Steps | None]:
-        """Walk along a path by one kernel."""
         if self.busy:
             return super().follow(walk, progress, limit)
         self.episode_state.events = []
@@ -126,7 +117,6 @@ class Event(Tier):
         return phase, Steps(moves, states)
 
     def wait(self, limit: int) -> Steps:
-        """Play the motion under way to its end or until a step brings events; without one, stand still."""
         self.episode_state.events = []
         self._in_step = False
         limit = min(limit, MAX_ROWS)
@@ -137,30 +127,26 @@ class Event(Tier):
         return Steps(np.zeros((until - before, 4)), self._play(self._motion, until))
 
     def observation(self) -> Observation:
-        """The present state."""
         body, poses = self._kinematic.body, self._kinematic.state.poses.copy()
         person, velocity, objects = body[X : PITCH + 1], body[VX : VY + 1], (poses[:, :3], poses[:, 3:])
         return self.episode_state.observation(self.time, person, velocity, objects, busy=self.busy)
 
     def state_hash(self) -> int:
-        """64 bits that differ whenever the state differs (up to chance)."""
         return self._kinematic.state_hash()
 
     def state(self) -> WorldState:
-        """Everything that `restore` needs to continue from here."""
         details = self.episode_state.details(self._full.monitor.get_state())
         return WorldState(self._kinematic.pack(), details)
 
     def restore(self, state: WorldState) -> None:
-        """Continue from a state; `StateError` where it does not fit."""
         self._kinematic.unpack(state.physics)
         self.episode_state.restore(state.details)
         self._full.monitor.set_state(state.details.health)
         self._motion, self._in_step = None, False
 
     def _begin(self, action: StepAction) -> ActionResult | None:
-        """Decide on a pick or place, and plan it if it is feasible."""
-        _ = self.data  # the decision reads them
+        """Answer a pick or place, and plan it if it is feasible."""
+        _ = self.data  # updates the physics data, which `Full.resolve` reads
         result = self._full.resolve(action, busy=self.busy)
         if result is not None and result.applied:
             hand, item = self._full.hand_for(result)
@@ -168,7 +154,7 @@ class Event(Tier):
         return result
 
     def _play(self, motion: ActiveMotion, until: int) -> StepStates | None:
-        """Play a motion up to control step `until`, and report the events of the last one."""
+        """Play a motion up to control step `until`, and report the events of that step."""
         plan, state, item = motion.plan, self.episode_state, motion.item
         before = float(plan.trajectory.vectors[until - 2, TIME]) if until > 1 else self.time
         rows = self._kinematic.play(plan.trajectory, motion.played, until)

@@ -1,4 +1,4 @@
-"""The fall of a released object, where everything else is without physics."""
+"""The fall of a released object by physics, in an otherwise kinematic world."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,29 +16,30 @@ from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.world.fidelity.kinematic_world import KinematicWorld
 
-_SETTLING_TIME = 1.0  # s, for other objects that still move when the released one has come to rest
+_SETTLING_TIME = 1.0  # time for other objects to settle after the released one has come to rest, s
 
 
 @dataclass(frozen=True, eq=False)
 class Fall:
-    """The fall of a released object."""
+    """Result of releasing an object."""
 
-    # of all objects after each control step until it was at rest, or time was up, m and wxyz, shape (k, n, 7)
+    # Poses of all objects after each control step until the released one was at rest, or until the time limit, m and
+    # wxyz, (k, n, 7)
     poses: NDArray[np.float64]
-    rest: NDArray[np.float64]  # where everything came to rest, shape (n, 7)
-    success: bool  # whether it rests in its receptacle
+    rest: NDArray[np.float64]  # final poses of all objects, (n, 7)
+    success: bool  # True if the released object is at rest in its receptacle
     incidents: tuple[tuple[int, EventKind, int], ...]  # other events: control step, kind and object
 
 
 def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle: ReceptacleGeometry) -> Fall:
-    """Release object `item` in physics, while the person stands; sleeping objects sleep on unless they are touched.
+    """Release an object in physics while the person stands. Sleeping objects stay asleep unless they are touched.
 
-    Leaves the kinematic world with an empty hand and the new sleep states.
+    Afterwards, the kinematic world has an empty hand and the new sleep states.
     """
     person = full.person
     options = person.options
     _enter(full, kinematic)
-    full.monitor.check(person.held)  # it is in the hand, for the last time
+    full.monitor.check(person.held)  # records that the hand holds the object for the last time
     person.grips.open(hand)
     kinematic.release(hand)
     held = [None if other == item else other for other in person.held]
@@ -62,7 +63,7 @@ def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle
 
 
 def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, int]]:
-    """Events of one control step, without physics if every object sleeps that no hand holds."""
+    """Simulate one control step, unless all released objects sleep, and return its events."""
     if not full.is_settled:
         full.person.rig.advance()
     events = list(full.monitor.check(held))
@@ -70,7 +71,7 @@ def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, in
 
 
 def _enter(full: Full, kinematic: KinematicWorld) -> None:
-    """Set the physics to a state without physics: velocities, commands, welds and sleep included."""
+    """Set the physics to the kinematic state, including velocities, commands, welds and sleep."""
     model, data, person = full.scene.model, full.data, full.person
     body, vector = kinematic.body, kinematic.state.vector
     hands, hand_speeds = vector[HANDS:HAND_SPEEDS], vector[HAND_SPEEDS:GRASPS]
@@ -87,7 +88,7 @@ def _enter(full: Full, kinematic: KinematicWorld) -> None:
         if grasp is not None:
             person.grips.close(hand, *grasp)
             _set_velocity(full, kinematic, hand, grasp[0])
-    mujoco.mj_makeM(model, data)  # of sleeping objects, too: one may wake in the middle of a step
+    mujoco.mj_makeM(model, data)  # also for sleeping objects, because one may wake up in the middle of a step
     mujoco.mj_factorM(model, data)
     _put_to_sleep(data, kinematic)
     mujoco.mj_forward(model, data)
@@ -95,7 +96,7 @@ def _enter(full: Full, kinematic: KinematicWorld) -> None:
 
 
 def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -> None:
-    """Let a held object move as its hand does."""
+    """Set the velocity of a held object to that of its hand."""
     data, body, dof = full.data, kinematic.body, int(full.scene.index.dofs[item])
     c, s = np.cos(body[HEADING]), np.sin(body[HEADING])
     first = HAND_SPEEDS + 3 * hand
@@ -111,9 +112,9 @@ def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -
 
 
 def _put_to_sleep(data: mujoco.MjData, kinematic: KinematicWorld) -> None:
-    """Mark everything that is at rest; takes effect with the next forward pass.
+    """Mark everything that is at rest, with effect from the next forward pass.
 
-    The engine updates its list of sleeping trees only when something wakes, so the person is made to wake.
+    The engine updates its list of sleeping trees only when a tree wakes up, so the person is made to wake up.
     """
     data.tree_asleep[:] = kinematic.asleep
     data.tree_awake[:] = data.tree_asleep < 0

@@ -1,6 +1,6 @@
-"""Everything in physics: walking, reaching, carrying, releasing.
+"""The tier `full`: walking, reaching, carrying and releasing by physics.
 
-MuJoCo's timers of every physics step are turned off. They would take a twentieth of a trial.
+MuJoCo's timers of physics steps are turned off, because they would take a twentieth of a trial's time.
 """
 
 import functools
@@ -29,14 +29,14 @@ from mjsim.world.fidelity.tier import EpisodeState, Tier
 from mjsim.world.health.monitor import Health, HealthMonitor, HealthSample
 from mjsim.world.state import PersonState, StateHash, WorldState, set_physics, take_physics
 
-# The next object may push a delivered one a little; farther out than this it has left its receptacle.
-_DISLODGED_MARGIN = 0.03  # m
+# Margin of a receptacle in which a delivered object stays delivered, because the next object may push it a little, m
+_DISLODGED_MARGIN = 0.03
 
 
 def stop_engine_clock() -> None:
-    """Have MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless a clock is set.
+    """Make MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless a clock is set.
 
-    `mujoco.set_mjcb_time(None)` brings MuJoCo's own clock back.
+    `mujoco.set_mjcb_time(None)` restores MuJoCo's own clock.
     """
     if mujoco.get_mjcb_time() is None:
         mujoco.set_mjcb_time(_no_time().ctypes)
@@ -53,8 +53,6 @@ def _zero() -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """A pick or place under way."""
-
     steps: Motion
     action: Pick | Place
     hand: int
@@ -63,7 +61,7 @@ class _Motion:
 
 
 class Full(Tier):
-    """The tier `full`; other tiers use its parts where they need physics."""
+    """Tier with everything in physics. The other tier uses its parts where it needs physics."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         stop_engine_clock()
@@ -80,36 +78,29 @@ class Full(Tier):
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
         return float(self.data.time)
 
     @property
     def busy(self) -> bool:
-        """Whether a pick or place is under way."""
         return self._motion is not None
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """A copy of the body."""
         return self.person.rig.body_state
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Where the hands are in the body's frame, m, shape (2, 3)."""
         return self.person.rig.pose[4:].reshape(2, 3).copy()
 
     @property
     def health(self) -> Health:
-        """Extremes of the physics since the last reset."""
         return self.monitor.snapshot()
 
     @property
     def health_sample(self) -> HealthSample:
-        """Health of the physics in the latest control step."""
         return self.monitor.sample
 
     def reset(self) -> None:
-        """Return to the episode's beginning."""
         mujoco.mj_resetData(self.scene.model, self.data)
         mujoco.mj_forward(self.scene.model, self.data)
         person = self.person
@@ -121,7 +112,6 @@ class Full(Tier):
         self.episode_state.reset()
 
     def step(self, action: StepAction) -> ActionResult | None:
-        """Advance by one control step."""
         result = self.resolve(action, busy=self.busy)
         if result is not None and result.applied:
             self._begin(result)
@@ -129,14 +119,13 @@ class Full(Tier):
         return result
 
     def answer(self, action: Pick | Place) -> ActionResult:
-        """What the answer to a pick or place would be now."""
         result = self.resolve(action, busy=self.busy)
         if result is None:
             raise ActionError(f"expected a Pick or Place, got {action!r}")
         return result
 
     def resolve(self, action: StepAction, *, busy: bool) -> ActionResult | None:
-        """Decide on a pick or place from the state of the physics; None for a move."""
+        """Answer a pick or place from the state of the physics. Return None for a move."""
         if isinstance(action, Move):
             return None
         if isinstance(action, Pick):
@@ -148,7 +137,7 @@ class Full(Tier):
         raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
 
     def hand_for(self, result: ActionResult) -> tuple[int, int]:
-        """Hand and object of a pick or place that is feasible: for a pick the free hand, or that on its side."""
+        """Return hand and object of a feasible action. A pick uses the free hand, or the hand on the object's side."""
         item = self.scene.index.position_of(str(result.object))
         if isinstance(result.action, Place):
             return self.episode_state.held.index(item), item
@@ -158,7 +147,7 @@ class Full(Tier):
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
     def _begin(self, result: ActionResult) -> None:
-        """Begin a feasible pick or place; the head looks afterwards where it looked before."""
+        """Start a feasible pick or place, after which the head looks to where it looked before."""
         hand, item = self.hand_for(result)
         pitch = self.person.rig.pitch_target
         if isinstance(result.action, Pick):
@@ -168,7 +157,7 @@ class Full(Tier):
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)
 
     def advance(self, move: Move) -> None:
-        """One control step of physics, walking or with the motion under way; `PhysicsError` where it fails."""
+        """Simulate one control step of walking or of the current motion. Raise a PhysicsError if the physics fails."""
         self.episode_state.events = []
         if self._motion is None:
             self.person.walk(move)
@@ -183,16 +172,13 @@ class Full(Tier):
             self.episode_state.dislodged(self.time, item)
 
     def observation(self) -> Observation:
-        """The present state."""
         rig, objects = self.person.rig, self.scene.index.poses(self.data.qpos)
         return self.episode_state.observation(self.time, rig.pose[:4], rig.rates[:2], objects, busy=self.busy)
 
     def state_hash(self) -> int:
-        """64 bits that differ whenever the state of the physics differs (up to chance)."""
         return self._hash.of(self.data)
 
     def state(self) -> WorldState:
-        """Everything that `restore` needs to continue from here."""
         person = self.person
         commands = PersonState(
             rig=person.rig.get_state(),
@@ -204,7 +190,6 @@ class Full(Tier):
         return WorldState(take_physics(self.scene.model, self.data), details)
 
     def restore(self, state: WorldState) -> None:
-        """Continue from a state; `StateError` where it does not fit."""
         person, commands = self.person, state.details.person
         if commands is None:
             raise StateError(
@@ -220,7 +205,7 @@ class Full(Tier):
         self.carrying.set_state(commands.carrying)
 
     def dislodged(self) -> list[int]:
-        """Delivered objects that have left their receptacles."""
+        """Find delivered objects that have left their receptacles."""
         if self.is_settled:
             return []
         return [
@@ -231,11 +216,11 @@ class Full(Tier):
 
     @property
     def is_settled(self) -> bool:
-        """Whether every object sleeps that no hand holds: the person is always awake, and wakes what it holds."""
+        """True if all objects outside the hands sleep. The person is always awake and wakes objects in the hands."""
         return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def poses(self) -> NDArray[np.float64]:
-        """Poses of all objects, m and wxyz, shape (n, 7)."""
+        """Return the poses of all objects, m and wxyz, (n, 7)."""
         return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
 
     def _in_place(self, item: int) -> bool:
@@ -260,7 +245,7 @@ class Full(Tier):
         self.person.moving_hand = None
 
     def _held_posture(self) -> tuple[float, float, float]:
-        """Held objects are drawn in to turn, and kept out of the way of a reaching hand."""
+        """Return the posture of loaded hands: close to the body for turns, and out of the way of a reaching hand."""
         if self._motion is None:
             return avatar.CARRY
         return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE

@@ -1,4 +1,4 @@
-"""Kernels of control steps without physics: the body walks, the hands keep their posture, held objects move along."""
+"""Kernels for kinematic control steps: the body walks, hands keep their postures, and held objects move along."""
 
 import math
 from typing import NamedTuple
@@ -19,12 +19,12 @@ from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, 
 
 Floats = NDArray[np.float64]
 
-# Layout of `KinematicState.vector`.
+# Layout of `KinematicState.vector`
 TIME = 0  # s
-BODY = 1  # the body of `mjsim.world.fidelity.kinematics`
-HANDS = BODY + BODY_SIZE  # both hands in the body frame, m
+BODY = 1  # body state, see `mjsim.world.fidelity.body_state`
+HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, m
 HAND_SPEEDS = HANDS + 6  # m/s
-GRASPS = HAND_SPEEDS + 6  # per hand: 2 * object + grip, or -1
+GRASPS = HAND_SPEEDS + 6  # for each hand: 2 * object + grip, or -1
 STATE_SIZE = GRASPS + 2
 
 REST, CARRY, TUCKED, ASIDE = 0, 1, 2, 3  # rows of `KinematicModel.postures`
@@ -35,33 +35,33 @@ _NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 
 
 class KinematicState(NamedTuple):
-    """Everything that changes from control step to control step; kernels change it in place."""
+    """The variable state. Kernels change it in place."""
 
-    vector: Floats  # time, body, hands and grasps, shape (STATE_SIZE,)
-    poses: Floats  # poses of the objects, m and wxyz, shape (n, 7)
+    vector: Floats  # time, body, hands and grasps, (STATE_SIZE,)
+    poses: Floats  # poses of the objects, m and wxyz, (n, 7)
 
 
 class KinematicModel(NamedTuple):
-    """Everything that stays the same."""
+    """The constants of a world."""
 
     gait: Gait  # limits and servos of the body
-    floor: Floor  # outlines that the trunk meets
-    grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, shape (n, 2, 7)
-    loads: Floats  # how far each object reaches sideways and down about its grip, m, shape (n, 2)
-    posture_pace: Floats  # as `Hands.pace`, shape (3,)
-    carrying: CarryingParameters  # how the person carries
-    # where an empty left hand belongs (`REST`), and one that holds something while walking (`CARRY`),
-    # turning (`TUCKED`) or when the other hand reaches (`ASIDE`), m, shape (4, 3)
+    floor: Floor  # outlines of obstacles for the trunk
+    grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, (n, 2, 7)
+    loads: Floats  # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
+    posture_pace: Floats  # `Hands.pace`, (3,)
+    carrying: CarryingParameters
+    # Postures of an empty left hand (`REST`), and of a loaded one while walking (`CARRY`), turning (`TUCKED`) or
+    # while the other hand reaches (`ASIDE`), m, (4, 3)
     postures: Floats
     clearance: ClearanceField  # clearance at the heights of carried objects
-    timestep: float  # of the physics, s
-    compliance: Floats  # compliance offsets of the hands, which touch nothing: all 0, m, shape (2, 2)
-    goals: Floats  # scratch space for the goals of the hands, m, shape (2, 3)
+    timestep: float  # physics timestep, s
+    compliance: Floats  # `Hands.compliance`, always 0 because there are no contacts, m, (2, 2)
+    goals: Floats  # buffer for `Hands.goals`, m, (2, 3)
 
 
 @kernel
 def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: StepStates) -> None:
-    """One control step per row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
+    """Execute a control step for each row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
     body = state.vector[BODY:HANDS]
     for row in range(len(moves)):
         kinematics.command(body, moves[row, 0], moves[row, 1], moves[row, 2], moves[row, 3], model.gait)
@@ -78,9 +78,9 @@ def follow_rows(
     moves: Floats,
     rows: StepStates,
 ) -> tuple[int, int]:
-    """Walk along a path until the walk has to stop; fills moves (n, 4) and rows.
+    """Walk along a path until the walk has to stop, and fill moves (n, 4) and rows.
 
-    Returns the number of control steps made, n at most, and the latest phase of the walk.
+    Returns the number of control steps, at most n, and the latest phase of the walk.
     """
     body, count = state.vector[BODY:HANDS], 0
     while True:
@@ -102,10 +102,10 @@ def follow_rows(
 
 @kernel
 def control_step(state: KinematicState, posture: int, moving: int, model: KinematicModel) -> None:
-    """One control step with the present commands, which changes `state`.
+    """Execute a control step with the current commands.
 
-    `posture` is the row of `KinematicModel.postures` for hands that hold something; `moving` is the hand that stays
-    where it was put, or -1.
+    `posture` is the row of `KinematicModel.postures` for loaded hands. `moving` is the hand that keeps its position, or
+    -1.
     """
     vector = state.vector
     body = vector[BODY:HANDS]
@@ -127,21 +127,21 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
         model.gait.dt,
     )
     kinematics.advance(body, model.gait, model.floor)
-    for _ in range(model.gait.substeps):  # the sum that the physics forms, to the last bit
+    for _ in range(model.gait.substeps):  # bit-identical to the sum in the physics
         vector[TIME] += model.timestep
     carry(state, model)
 
 
 @kernel
 def held_in(vector: Floats, hand: int) -> int:
-    """Object in a hand, or -1; the vector is that of a `KinematicState`, shape (STATE_SIZE,)."""
+    """Return the object in a hand, or -1. `vector` is `KinematicState.vector`."""
     grasp = int(vector[GRASPS + hand])
     return grasp // 2 if grasp >= 0 else -1
 
 
 @kernel
 def carry(state: KinematicState, model: KinematicModel) -> None:
-    """Put the held objects where the hands are."""
+    """Move held objects to their hands."""
     vector = state.vector
     heading = vector[BODY + HEADING]
     half = 0.5 * heading
@@ -166,7 +166,7 @@ def carry(state: KinematicState, model: KinematicModel) -> None:
 
 @kernel
 def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
-    """Write the present state into a row."""
+    """Write the current state into a row."""
     vector = state.vector
     rows.time[row] = vector[TIME]
     rows.position[row, 0], rows.position[row, 1] = vector[BODY + X], vector[BODY + Y]
@@ -174,7 +174,7 @@ def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
     rows.object_position[row] = state.poses[:, :3]
     rows.object_quaternion[row] = state.poses[:, 3:]
     rows.state_hash[row] = state_hash(state)
-    # Held objects are in line with their hands, and nothing else touches anything.
+    # Held objects are exactly at their hands, and nothing else touches anything.
     rows.health[row, :2], rows.health[row, 6] = 0.0, math.nan
     for hand in range(2):
         error = 0.0 if vector[GRASPS + hand] >= 0.0 else math.nan
@@ -183,12 +183,12 @@ def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
 
 @kernel
 def state_hash(state: KinematicState) -> np.uint64:
-    """64 bits over everything that changes."""
+    """Return a 64-bit hash of the state."""
     digest = np.uint64(0)
     for word in state.vector.view(np.uint64):
         digest = (digest ^ word) * _PRIME
         digest ^= digest >> _SHIFT
-    # Four chains side by side, which a processor works on at once.
+    # Four independent chains, which a processor computes in parallel
     words = state.poses.reshape(state.poses.size).view(np.uint64)
     lanes = np.array([1, 2, 3, 4], np.uint64)
     for i in range(len(words)):

@@ -1,4 +1,4 @@
-"""Person and objects without physics: their state, walking, and the data that a renderer or a ray needs."""
+"""Kinematic person and objects: their state, walking, and updates of the data for rendering and ray casts."""
 
 import mujoco
 import numpy as np
@@ -33,16 +33,18 @@ from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.world.walking.path_following import Walk
 
-# An object that accelerates by more than this from rest is not at rest, m/s^2; gravity is 9.8, solver noise 1.
+# Acceleration from rest above which an object is not at rest, m/s^2. Gravity is 9.8, and solver noise 1.
 _REST_ACCELERATION = 3.0
-MAX_ROWS = 256  # control steps in one call
+MAX_ROWS = 256  # largest number of control steps per call
 
 
 class KinematicWorld:
-    """One person and all objects, moved by `mjsim.world.fidelity.kinematic_steps`.
+    """A person and objects that are moved by `mjsim.world.fidelity.kinematic_steps`.
 
-    `state` is all that changes from step to step, `model` all that stays the same; `asleep` is the sleep state of each
-    kinematic tree, as in `MjData.tree_asleep`, where physics left it at rest.
+    Attributes:
+        state: Variable state.
+        model: Constants.
+        asleep: Sleep state of each kinematic tree, as in `MjData.tree_asleep`.
     """
 
     def __init__(self, full: Full, options: WorldOptions) -> None:
@@ -75,47 +77,44 @@ class KinematicWorld:
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
         return float(self.state.vector[TIME])
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """The person's body as in `mjsim.world.fidelity.kinematics`; a view of the state, shape (BODY_SIZE,)."""
+        """The person's body state, a view of shape (BODY_SIZE,)."""
         return self._body
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Where the hands are in the body's frame, m; a view of the state, shape (2, 3)."""
+        """Positions of the hands in the body frame, m, a view of shape (2, 3)."""
         return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
 
     @property
     def pitch_target(self) -> float:
-        """Commanded pitch of the head, rad."""
         return float(self._body[LOOK])
 
     @property
     def grasps(self) -> list[tuple[int, int] | None]:
-        """Object and grip that each hand holds."""
+        """Object and grip in each hand."""
         return [None if grasp < 0 else divmod(int(grasp), 2) for grasp in self.state.vector[GRASPS:]]
 
     def grasp(self, hand: int, item: int, grip: int) -> None:
-        """Put an object into a hand, in line with it."""
+        """Put an object into a hand, aligned with it."""
         self.wake(item)
         self.state.vector[GRASPS + hand] = 2 * item + grip
         carry(self.state, self.model)
 
     def release(self, hand: int) -> None:
-        """Empty a hand."""
         self.state.vector[GRASPS + hand] = -1
 
     def wake(self, item: int) -> None:
-        """Wake an object and all that came to rest together with it."""
+        """Wake an object and all objects that came to rest together with it."""
         tree = int(self._index.trees[item])
         while self.asleep[tree] >= 0:
             self.asleep[tree], tree = AWAKE, int(self.asleep[tree])
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Start from physics that was just reset and brought up to date (`mj_forward`)."""
+        """Start from physics after a reset and `mj_forward`."""
         rig, vector = self._rig, self.state.vector
         vector[TIME] = data.time
         self._body[:] = rig.body_state
@@ -131,10 +130,10 @@ class KinematicWorld:
         self.asleep[at_rest] = np.flatnonzero(at_rest)
 
     def write(self, data: mujoco.MjData) -> None:
-        """Bring poses of bodies, geoms, sites and cameras in step, for rendering and rays."""
+        """Update the poses of bodies, geoms, sites and cameras in `data`, for rendering and ray casts."""
         model, vector = self._model, self.state.vector
         if data.ntree_awake < model.ntree:
-            mujoco.mj_resetData(model, data)  # bodies that sleep do not follow their coordinates
+            mujoco.mj_resetData(model, data)  # sleeping bodies would not follow their coordinates
         data.time = vector[TIME]
         data.qpos[self._qpos] = self.state.poses.ravel()
         self._rig.pose[:4] = vector[BODY : BODY + 4]
@@ -144,37 +143,35 @@ class KinematicWorld:
         mujoco.mj_camlight(model, data)
 
     def walk(self, moves: NDArray[np.float64]) -> StepStates | None:
-        """One control step per row (n, 4): forward and left, m/s, turn and look, rad/s; the states between them."""
+        """Execute a control step for each row (n, 4), as in `walk_rows`, and return the states between them."""
         walk_rows(moves, self.state, self.model, self._rows)
         return self._passed(len(moves))
 
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int
     ) -> tuple[int, NDArray[np.float64], StepStates | None]:
-        """Walk along a path: the latest phase, the moves made, shape (n, 4), and the states between them."""
+        """Walk along a path. Return the latest phase, the moves (n, 4), and the states between them."""
         moves = np.empty((min(limit, MAX_ROWS), 4))
         count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
         return phase, moves[:count], self._passed(count)
 
     def play(self, trajectory: MotionTrajectory, start: int, end: int) -> StepStates | None:
-        """Go through the control steps `start` to `end` of a trajectory; the states between them."""
+        """Play the control steps `start` to `end` of a trajectory, and return the states between them."""
         play_rows(trajectory, start, end, self.state, self._rows)
         return self._passed(end - start)
 
     def _passed(self, count: int) -> StepStates | None:
-        """The states between `count` control steps that were just taken."""
         return None if count < 2 else StepStates._make(column[: count - 1].copy() for column in self._rows)
 
     def state_hash(self) -> int:
-        """64 bits that differ whenever the state differs (up to chance)."""
         return int(state_hash(self.state))
 
     def pack(self) -> NDArray[np.float64]:
-        """The whole state, shape (STATE_SIZE + 7 n + trees,)."""
+        """Return the whole state, (STATE_SIZE + 7 n + trees,)."""
         return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
 
     def unpack(self, values: NDArray[np.float64]) -> None:
-        """Continue from what `pack` gave, shape (STATE_SIZE + 7 n + trees,); `StateError` where it does not fit."""
+        """Restore a state that `pack` returned. Raise a StateError if it does not fit."""
         vector, poses = self.state
         sizes = (STATE_SIZE, poses.size, len(self.asleep))
         if values.shape != (sum(sizes),) or not np.isfinite(values).all():
@@ -190,14 +187,13 @@ class KinematicWorld:
 
 
 def _floor(scene: Scene) -> Floor:
-    """Outlines that the trunk meets, worked out once per house and radius."""
     radius = scene.person.body_radius
     house = compiled_house(scene.catalogue)
     return house.once(("floor", radius), lambda: Floor.of(scene.model, radius))
 
 
 def _grip_poses(scene: Scene) -> NDArray[np.float64]:
-    """Pose of each object in the frame of a hand that is in line with its grip 0 or 1, shape (n, 2, 7)."""
+    """Return the pose of each object in the frame of a hand aligned with its grip 0 or 1, (n, 2, 7)."""
     model, names = scene.model, scene.index.names
     poses = np.zeros((len(names), 2, 7))
     for item, name in enumerate(names):

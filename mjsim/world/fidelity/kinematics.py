@@ -1,9 +1,8 @@
-"""Walking without physics: the person's servos and trunk as numba kernels, one control step at a time.
+"""Kernels for kinematic walking: the person's servos and trunk, one control step at a time.
 
-A body is one array of `BODY_SIZE` numbers, laid out by the indices of `body_state`. `command` slews its commands as
-`Person.walk` does; `advance` lets the four servos follow them in steps of the physics, with the masses, gains and force
-limits of the compiled model. The trunk is a disc that slides along the outlines of the house and never enters them.
-Loose objects are no obstacles.
+A body state is an array of `BODY_SIZE` numbers. `command` changes its commands like `Person.walk`. `advance` lets the
+four servos follow them in steps of the physics, with the masses, gains and force limits of the compiled model. The
+trunk is a disc that slides along the outlines of the house. Loose objects are not obstacles.
 """
 
 import math
@@ -38,35 +37,35 @@ from mjsim.world.fidelity.trunk_contact import is_clear, slide
 
 
 class Gait(NamedTuple):
-    """Limits of walking and the servos that carry it out; SI units."""
+    """Limits of walking, and the servos for it, in SI units."""
 
-    # `fastest_walk`, `turning_speed`, `looking_speed`, `walking_acceleration`, `turning_acceleration` of the person
+    # `PersonParameters`: fastest walk, turning speed, looking speed, walking and turning acceleration
     max_speed: float
     max_turn: float
     max_look: float
     acceleration: float
     turn_acceleration: float
-    dt: float  # control step
-    substeps: int  # physics steps in it
-    mass: float  # of x and y, with the gain and the force limit of their velocity servos
+    dt: float  # duration of a control step
+    substeps: int  # number of physics steps per control step
+    mass: float  # mass moved along x and y, with gain and force limit of the velocity servos
     walk_gain: float
     walk_force: float
-    inertia: float  # of the yaw, with its velocity servo
+    inertia: float  # moment of inertia of the yaw, with gain and torque limit of its velocity servo
     turn_gain: float
     turn_force: float
-    head_inertia: float  # of the head, with its position servo
+    head_inertia: float  # moment of inertia of the head, with its position servo
     head_stiffness: float
     head_damping: float
     head_force: float
     lowest: float  # range of the head's pitch
     highest: float
-    radius: float  # of the trunk
-    eye_height: float  # above the floor
-    eye_forward: float  # in front of the body's axis
+    radius: float  # radius of the trunk
+    eye_height: float  # height of the eye above the floor
+    eye_forward: float  # distance of the eye in front of the body's axis
 
     @classmethod
     def of(cls, scene: Scene, options: WorldOptions) -> "Gait":
-        """Read a compiled scene with a person."""
+        """Read the values from a compiled scene with a person."""
         model, person = scene.model, scene.person
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -108,10 +107,7 @@ class Gait(NamedTuple):
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Slew the commands towards those of `Move(forward, left, turn, look)`, m/s and rad/s.
-
-    `advance` carries them out. The body has the shape (BODY_SIZE,).
-    """
+    """Change the commands towards `Move(forward, left, turn, look)`, m/s and rad/s, for `advance` to execute."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -120,7 +116,7 @@ def command(
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
-    """Slew the walk of a body, shape (BODY_SIZE,), to a stand and its yaw rate towards `turn`, rad/s."""
+    """Change the commands of a body, (BODY_SIZE,), towards standing, and its yaw rate towards `turn`, rad/s."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -128,16 +124,13 @@ def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
 
 @kernel
 def look_at(body: NDArray[np.float64], pitch: float, gait: Gait) -> None:
-    """Command a pitch of the head, rad, kept within what a neck can do; body of shape (BODY_SIZE,)."""
+    """Command a pitch of the head, rad, clamped to its range."""
     body[LOOK] = min(gait.highest, max(gait.lowest, pitch))
 
 
 @kernel
 def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
-    """One control step of the servos, ramped from the last commands to the present ones, and of the trunk.
-
-    The body has the shape (BODY_SIZE,).
-    """
+    """Advance the servos and the trunk by a control step, while servos ramp from the last commands to the new ones."""
     heading = body[HEADING] + 0.5 * body[TURN] * gait.dt
     c, s = math.cos(heading), math.sin(heading)
     to_x = c * body[FORWARD] - s * body[LEFT]
@@ -151,7 +144,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
     )
     walk, turn = _servo(gait.mass, gait.walk_gain, h), _servo(gait.inertia, gait.turn_gain, h)
     head = _servo(gait.head_inertia, gait.head_damping, h)
-    # No servo overshoots what it was told before or is told now.
+    # The speed of a servo never exceeds its last or its new command.
     reach_x = gait.radius + gait.dt * max(abs(body[VX]), abs(body[SERVO]), abs(to_x))
     reach_y = gait.radius + gait.dt * max(abs(body[VY]), abs(body[SERVO + 1]), abs(to_y))
     free = is_clear(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
@@ -176,7 +169,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
 
 @kernel
 def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
-    """Share of its speed that a servo keeps in a physics step, speed per force damped, and undamped."""
+    """Return the share of speed that a servo keeps in a physics step, and speed per force, damped and undamped."""
     return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 
@@ -184,7 +177,7 @@ def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
 def _driven(
     speed: float, push: float, damping: float, limit: float, servo: tuple[float, float, float]
 ) -> float:
-    """Speed after a step under the force `push - damping * speed`, implicit in the damping unless saturated."""
+    """Return the speed after a step under `push - damping * speed`, implicit in the damping unless saturated."""
     force = push - damping * speed
     if force > limit or force < -limit:
         return speed + servo[2] * min(limit, max(-limit, force))

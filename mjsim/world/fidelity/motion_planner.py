@@ -1,6 +1,6 @@
-"""Picks and places computed without physics, with the times and speeds of `mjsim.values.person_parameters`.
+"""Planner of picks and places without physics, with the times and speeds of the person's parameters.
 
-Only the fall of a released object is physics. Success is decided by the same test as in `world.body.hand_motions`.
+Only the fall of a released object is simulated. Success is determined as in `mjsim.world.body.hand_motions`.
 """
 
 import math
@@ -26,17 +26,17 @@ from mjsim.world.fidelity.motion_primitives import HandMovement, MotionTrajector
 
 Vector = NDArray[np.float64]
 
-_USUAL_STEPS = 200  # control steps of a motion; room for more is made when it is needed
-_REACH_LAG = 2  # control steps that a hand lags behind at the end of a reach
-_SEATING = 1  # control step in which a load is drawn into a hand that closes firmly
+_INITIAL_STEPS = 200  # initial capacity of a trajectory, in control steps
+_REACH_LAG = 2  # control steps by which a hand lags at the end of a reach
+_SEATING = 1  # control step in which a firm grip pulls the load in
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """A pick or place, computed in advance."""
+    """A pick or place that was computed in advance."""
 
-    trajectory: MotionTrajectory  # the state after each control step
-    success: bool = True  # whether the hand holds the object, or it rests in its receptacle
+    trajectory: MotionTrajectory  # state after each control step
+    success: bool = True  # True if the hand holds the object, or if it is at rest in its receptacle
     incidents: tuple[tuple[int, EventKind, int], ...] = ()  # other events: control step, kind and object
 
     @property
@@ -46,9 +46,9 @@ class PlannedMotion:
 
 
 class MotionPlanner:
-    """Computes motions from the present state of a kinematic world, which is left as it was.
+    """Computes motions from the current state of a kinematic world, without changing it.
 
-    The data of the physics must be up to date with it.
+    The data of the physics must be up to date.
     """
 
     def __init__(self, full: Full, kinematic: KinematicWorld) -> None:
@@ -57,10 +57,10 @@ class MotionPlanner:
         self._corners: dict[tuple[int, int], Vector] = {}
 
     def plan(self, result: ActionResult, hand: int, item: int) -> PlannedMotion:
-        """The whole pick or place."""
+        """Compute a whole pick or place."""
         state = self._kinematic.state
         before = state.vector.copy(), state.poses.copy()
-        self._hand, self._trajectory = hand, MotionTrajectory.empty(_USUAL_STEPS, len(state.poses))
+        self._hand, self._trajectory = hand, MotionTrajectory.empty(_INITIAL_STEPS, len(state.poses))
         if isinstance(result.action, Place):
             planned = self._place(item, self._full.scene.receptacles[str(result.receptacle)])
         else:
@@ -92,7 +92,7 @@ class MotionPlanner:
         return PlannedMotion(self._trajectory, fall.success, incidents)
 
     def _reach(self, item: int) -> int:
-        """Turn to an object and reach for it; the grip that is nearest then."""
+        """Turn to an object and reach for it. Return the closest grip after the turn."""
         grips, center = self._person.grips, self._person.center(item)
         self._face(center, math.nan, self._times.object_tolerance)
         heading = float(self._kinematic.body[HEADING])
@@ -103,7 +103,7 @@ class MotionPlanner:
         return grip
 
     def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
-        """Turn to a receptacle and bring the load over it; the slot, and how far below the hand the load ends, m."""
+        """Turn to a receptacle and move the load over it. Return the slot, and the load's extent below the hand, m."""
         heading = square_heading(self._person, receptacle)
         self._face(receptacle.center, heading, self._times.receptacle_tolerance)
         extent = self._load_extent(receptacle)
@@ -113,9 +113,8 @@ class MotionPlanner:
         return slot, low
 
     def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
-        """Extent of a load about the hand that holds it, in the receptacle's axes."""
         grasp = self._kinematic.grasps[self._hand]
-        if grasp is None:  # a place begins only with something in the hand
+        if grasp is None:  # for the type checker: a place starts only with a loaded hand
             return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
             self._corners[grasp] = self._corners_about_hand(*grasp)
@@ -135,12 +134,11 @@ class MotionPlanner:
 
     @property
     def _hand_position(self) -> Vector:
-        """The hand in the body frame, m, shape (3,)."""
         first = HANDS + 3 * self._hand
         return self._kinematic.state.vector[first : first + 3].copy()
 
     def _face(self, point: Vector, heading: float, tolerance: float) -> None:
-        """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad."""
+        """Stand still and turn to a point (3,), m, or to a heading, rad, unless it is NaN."""
         kinematic, steps = self._kinematic, self._steps(self._times.turn_timeout)
         room = self._room(steps)
         motion_primitives.face(
@@ -156,14 +154,14 @@ class MotionPlanner:
         *,
         in_house: bool = False,
     ) -> None:
-        """Move the hand to a goal (3,) m; see `HandMovement`. Without a gaze the head stays as it is."""
+        """Move the hand to a goal (3,), m, as in `HandMovement`. Without a gaze, the head keeps its pitch."""
         kinematic, room = self._kinematic, self._room(steps)
         gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
         movement = HandMovement(self._hand, goal, in_house, steps, order, gaze)
         motion_primitives.move_hand(kinematic.state, room, movement, self._times, kinematic.model)
 
     def _travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
-        """Up to the hover height, then across to the hover position (3,) in the receptacle's axes, m."""
+        """Move up to the hover height, then across to the hover position (3,) in the receptacle's axes, m."""
         goal, person = receptacle.center + receptacle.rotation @ hover, self._person
         start, above = self._hand_position, self._in_body(goal)
         up = np.array([start[0], start[1], max(start[2], above[2])])
@@ -172,13 +170,13 @@ class MotionPlanner:
         self._move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
 
     def _descend(self, receptacle: ReceptacleGeometry, release: Vector) -> None:
-        """Down to the release position (3,) in the receptacle's axes, m, and one step more to see what it touches."""
+        """Move down to the release position (3,) in the receptacle's axes, m, and take one more step."""
         goal = self._in_body(receptacle.center + receptacle.rotation @ release)
         self._move(goal, self._person.descent_steps(abs(float(goal[2] - self._hand_position[2]))))
         self._move(self._hand_position, 1)
 
     def _withdraw(self, fall: Fall, pitch: float) -> None:
-        """Withdraw the hand while the released object falls; the head looks to `pitch`, rad."""
+        """Withdraw the hand while the released object falls, and look to `pitch`, rad."""
         kinematic, room = self._kinematic, self._room(len(fall.poses))
         motion_primitives.withdraw(
             kinematic.state, room, self._hand, fall.poses, pitch, self._times, kinematic.model
@@ -186,11 +184,10 @@ class MotionPlanner:
         kinematic.state.poses[:] = fall.rest
 
     def _end(self) -> None:
-        """The control step in which the motion has ended."""
         motion_primitives.end(self._kinematic.state, self._room(1), self._kinematic.model)
 
     def _room(self, steps: int) -> MotionTrajectory:
-        """The trajectory, with room for more control steps."""
+        """Return the trajectory, with capacity for more control steps."""
         if int(self._trajectory.length[0]) + steps > len(self._trajectory.vectors):
             self._trajectory = self._trajectory.longer(steps)
         return self._trajectory
@@ -207,5 +204,5 @@ def _over(slot: Slot, height: float) -> Vector:
 
 
 def _towards(pitch: float) -> Vector:
-    """The gaze of a `HandMovement` that only looks to a pitch, rad."""
+    """Return the `HandMovement.gaze` for a pitch, rad."""
     return np.array([math.nan, math.nan, pitch])

@@ -1,4 +1,4 @@
-"""Kernels of the movements of picking and placing without physics, timed as in `mjsim.world.body`."""
+"""Kernels for the movements of kinematic picks and places, with the timing of `mjsim.world.body`."""
 
 import math
 from typing import NamedTuple
@@ -43,21 +43,20 @@ Floats = NDArray[np.float64]
 
 
 class MotionTrajectory(NamedTuple):
-    """StepStates of a motion that was worked out before it is played, one per control step."""
+    """States of a motion that is computed before it is played, one per control step."""
 
-    vectors: Floats  # `KinematicState.vector` after each step, shape (max, STATE_SIZE)
-    poses: Floats  # poses of the objects, m and wxyz, shape (max, n, 7)
-    length: NDArray[np.int64]  # number of control steps so far, shape (1,)
+    vectors: Floats  # `KinematicState.vector` after each step, (capacity, STATE_SIZE)
+    poses: Floats  # poses of the objects, m and wxyz, (capacity, n, 7)
+    length: NDArray[np.int64]  # number of control steps so far, (1,)
 
     @classmethod
     def empty(cls, max_steps: int, objects: int) -> "MotionTrajectory":
-        """Room for `max_steps` control steps."""
         return cls(
             np.empty((max_steps, STATE_SIZE)), np.empty((max_steps, objects, 7)), np.zeros(1, np.int64)
         )
 
     def longer(self, steps: int) -> "MotionTrajectory":
-        """The same with room for this many more control steps at least."""
+        """Return a copy with capacity for at least `steps` more control steps."""
         size, objects = len(self.vectors) + max(steps, len(self.vectors)), self.poses.shape[1]
         longer, length = MotionTrajectory.empty(size, objects), int(self.length[0])
         longer.vectors[:length], longer.poses[:length] = self.vectors[:length], self.poses[:length]
@@ -66,14 +65,14 @@ class MotionTrajectory(NamedTuple):
 
 
 class HandMovement(NamedTuple):
-    """Where a hand goes, and how."""
+    """A movement of a hand."""
 
-    hand: int  # the hand
-    goal: Floats  # where it ends, m, shape (3,)
-    in_house: bool  # whether the goal is in the frame of the house, else in that of the body
-    steps: int  # control steps that it takes
+    hand: int
+    goal: Floats  # final position, m, (3,)
+    in_house: bool  # True if the goal is in the house frame, False for the body frame
+    steps: int  # number of control steps
     order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.world.body.motion_profiles`
-    gaze: Floats  # point of the house to glance at, m, shape (3,); or NaN, NaN and the pitch to look to, rad
+    gaze: Floats  # point of the house to look at, m, (3,), or NaN, NaN and a pitch, rad
 
 
 @kernel
@@ -88,7 +87,7 @@ def _append(trajectory: MotionTrajectory, state: KinematicState) -> None:
 def play_rows(
     trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: StepStates
 ) -> None:
-    """Take the state through the control steps `start` to `end` of a trajectory."""
+    """Play the control steps `start` to `end` of a trajectory."""
     for row in range(start, end):
         state.vector[:] = trajectory.vectors[row]
         state.poses[:] = trajectory.poses[row]
@@ -106,7 +105,7 @@ def face(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Stand still and turn to a point (3,) m, or to a heading unless that is NaN, rad, as `Person.face`."""
+    """Stand still and turn to a point (3,), m, or to a heading, rad, unless it is NaN. Like `Person.face`."""
     body = state.vector[BODY:HANDS]
     for _ in range(max_steps):
         if _turn(body, point, heading, tolerance, motion, model.gait):
@@ -120,7 +119,7 @@ def face(
 def _turn(
     body: Floats, point: Floats, heading: float, tolerance: float, motion: MotionParameters, gait: Gait
 ) -> bool:
-    """Set the commands for the next control step of a turn; whether the person stands and the turn is complete."""
+    """Set the commands for the next control step of a turn. Return True if the person stands and faces the goal."""
     towards = math.atan2(point[1] - body[Y], point[0] - body[X]) if math.isnan(heading) else heading
     error = towards - body[HEADING]
     error = (error + math.pi) % (2.0 * math.pi) - math.pi
@@ -136,7 +135,6 @@ def _turn(
 
 @kernel
 def _glance(body: Floats, point: Floats, motion: MotionParameters, gait: Gait) -> None:
-    """Move the head's pitch towards a point of the house."""
     out = gait.eye_forward * math.cos(body[PITCH])
     dx = point[0] - body[X] - out * math.cos(body[HEADING])
     dy = point[1] - body[Y] - out * math.sin(body[HEADING])
@@ -146,7 +144,6 @@ def _glance(body: Floats, point: Floats, motion: MotionParameters, gait: Gait) -
 
 @kernel
 def _look_towards(body: Floats, pitch: float, motion: MotionParameters, gait: Gait) -> None:
-    """Move the head's pitch towards an angle, rad, at the pace of a glance."""
     limit = motion.look_speed * gait.dt
     change = min(limit, max(-limit, motion.look_gain * (pitch - body[LOOK])))
     kinematics.look_at(body, body[LOOK] + change, gait)
@@ -160,7 +157,7 @@ def move_hand(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand from where it is, at rest, to a goal."""
+    """Move a hand, which is at rest, to a goal."""
     vector, goal = state.vector, movement.goal
     body, first = vector[BODY:HANDS], HANDS + 3 * movement.hand
     start_f, start_l, start_u = vector[first], vector[first + 1], vector[first + 2]
@@ -194,7 +191,7 @@ def withdraw(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand up and then to its rest, while the objects go through `poses`, m and wxyz, (k, n, 7).
+    """Move a hand up and then to its rest posture, while the objects take the poses (k, n, 7), m and wxyz.
 
     The head looks to `pitch`, rad.
     """
@@ -215,7 +212,7 @@ def withdraw(
 
 @kernel
 def end(state: KinematicState, trajectory: MotionTrajectory, model: KinematicModel) -> None:
-    """The control step in which a motion has ended: the hands go to their postures."""
+    """Add the control step after the end of a motion, in which the hands move to their postures."""
     state.vector[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
     control_step(state, CARRY, -1, model)
     _append(trajectory, state)

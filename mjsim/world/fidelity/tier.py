@@ -1,4 +1,4 @@
-"""What all tiers of fidelity have in common."""
+"""Interface and bookkeeping of the tiers of fidelity."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 class EpisodeState:
-    """Bookkeeping of one running world: hands, status of each object, and events of the present control step."""
+    """Hands, statuses of the objects, and events of the current control step."""
 
     def __init__(self, scene: Scene, capacity: int) -> None:
         self._capacity = capacity
@@ -39,45 +39,44 @@ class EpisodeState:
         self.reset()
 
     def reset(self) -> None:
-        """Empty hands, nothing put away."""
+        """Empty the hands and mark all objects as loose."""
         self._set(Inventory(capacity=self._capacity))
         self.status = [ObjectStatus.LOOSE] * len(self._index.names)
         self.events: list[WorldEvent] = []
 
     def report(self, time: float, kind: EventKind, item: int, receptacle: str | None = None) -> None:
-        """Record an event of object `item`."""
         self.events.append(WorldEvent(time, kind, self._index.names[item], receptacle))
 
     def picked(self, time: float, hand: int, item: int, success: bool) -> None:
-        """A pick has ended."""
+        """Record the end of a pick."""
         if success:
             self._set(self.inventory.take(hand, self._index.names[item]))
             self.status[item] = ObjectStatus.CARRIED
         self.report(time, EventKind.PICKED if success else EventKind.PICK_FAILED, item)
 
     def placed(self, time: float, item: int, receptacle: str | None, success: bool) -> None:
-        """A place has ended."""
+        """Record the end of a place."""
         self._let_go(item)
         self.status[item] = ObjectStatus.DELIVERED if success else ObjectStatus.LOOSE
         self.report(time, EventKind.PLACED if success else EventKind.PLACE_FAILED, item, receptacle)
 
     def lost(self, time: float, item: int) -> None:
-        """An object has slipped out of a hand."""
+        """Record that an object has slipped out of a hand."""
         self._let_go(item)
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.GRIP_LOST, item)
 
     def dislodged(self, time: float, item: int) -> None:
-        """A delivered object has left its receptacle."""
+        """Record that a delivered object has left its receptacle."""
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.DISLODGED, item, self._targets[self._index.names[item]])
 
     def observation(
         self, time: float, person: Floats, velocity: Floats, objects: tuple[Floats, Floats], *, busy: bool
     ) -> Observation:
-        """The present state.
+        """Compose an observation.
 
-        `person` is x, y, yaw and pitch of the head, m and rad, (4,); `velocity` that in the house frame, m/s, (2,);
+        `person` is x, y, yaw and pitch of the head, m and rad, (4,). `velocity` is in the house frame, m/s, (2,).
         `objects` are origins, m, (n, 3), and orientations wxyz, (n, 4).
         """
         x, y, heading, pitch = person.tolist()
@@ -97,11 +96,10 @@ class EpisodeState:
         )
 
     def details(self, health: HealthState, person: PersonState | None = None) -> StateDetails:
-        """Hands and statuses as part of a world's state."""
         return StateDetails(self.inventory.hands, tuple(self.status), health, person)
 
     def restore(self, details: StateDetails) -> None:
-        """Continue from hands and statuses of a world's state; `StateError` where it is of other objects."""
+        """Continue from the hands and statuses of a world's state. Raise a StateError if its objects differ."""
         if len(details.status) != len(self._index.names) or not {*details.hands} <= {
             None,
             *self._index.names,
@@ -126,24 +124,24 @@ class EpisodeState:
 
 
 class Tier(ABC):
-    """One way to advance the person and the objects by control steps."""
+    """A way to advance the person and the objects by control steps."""
 
-    episode_state: EpisodeState  # hands, statuses, and the events of the latest control step
+    episode_state: EpisodeState
 
     @property
     @abstractmethod
     def busy(self) -> bool:
-        """Whether a pick or place is under way."""
+        """True while a pick or place is under way."""
 
     @property
     @abstractmethod
     def body(self) -> NDArray[np.float64]:
-        """A copy of the body as `mjsim.world.fidelity.body_state` lays it out, shape (BODY_SIZE,)."""
+        """Copy of the body state, laid out as in `mjsim.world.fidelity.body_state`, (BODY_SIZE,)."""
 
     @property
     @abstractmethod
     def hands(self) -> NDArray[np.float64]:
-        """Where the left and the right hand are in the body's frame, m, a copy of shape (2, 3)."""
+        """Positions of the left and the right hand in the body frame, m, a copy of shape (2, 3)."""
 
     @property
     @abstractmethod
@@ -152,26 +150,26 @@ class Tier(ABC):
 
     @abstractmethod
     def step(self, action: StepAction) -> ActionResult | None:
-        """Advance by one control step; its events are in `episode_state` afterwards."""
+        """Advance by one control step, and store its events in `episode_state`."""
 
     @abstractmethod
     def answer(self, action: Pick | Place) -> ActionResult:
-        """What the answer to a pick or place would be now; nothing changes."""
+        """Return the answer that a pick or place would get now, without changing anything."""
 
     @abstractmethod
     def observation(self) -> Observation:
-        """The present state."""
+        """Return the current state."""
 
     @abstractmethod
     def state_hash(self) -> int:
-        """64 bits that differ whenever the state differs (up to chance)."""
+        """Return a 64-bit hash of the physics."""
 
     def follow(self, walk: Walk, progress: NDArray[np.float64], limit: int) -> tuple[int, Steps | None]:
-        """Walk along a path for up to `limit` control steps, until a step brings events or the walk has to stop.
+        """Walk along a path for up to `limit` control steps, until an event occurs or the walk has to stop.
 
-        Where loose objects may move, a path that no display shows is walked one step at a time: the person looks where
-        it leads. `progress` is that of a `Walker`, shape (2,); updated. Returns the latest phase of the walk, and the
-        steps, None where the person has arrived already.
+        A path that is not shown by a display takes one step per call, because the person looks where the path leads
+        and may see other objects. `progress` of a `Walker`, (2,), is updated. Returns the latest phase of the walk, and
+        the steps, or None if the person has already arrived.
         """
         arguments, phase, first = plain(walk), WALKING, True
 
@@ -188,13 +186,13 @@ class Tier(ABC):
         return phase, steps
 
     def wait(self, limit: int) -> Steps:
-        """Idle until no pick or place is under way or a step brings events; one control step if none is."""
+        """Idle until the pick or place under way ends or an event occurs, or for one control step if there is none."""
         busy = self.busy
         steps = self._step_each(lambda _: IDLE if self.busy or not busy else None, limit if busy else 1)
         return cast(Steps, steps)
 
     def _step_each(self, choose: Callable[[Observation], Move | None], limit: int) -> Steps | None:
-        """Up to `limit` control steps, until there is no move for the state, or a step brings events."""
+        """Take up to `limit` control steps, until `choose` returns None or an event occurs."""
         seen, moves = [self.observation()], list[Move]()
         hashes, health = list[int](), list[tuple[float, ...]]()
 

@@ -1,4 +1,4 @@
-"""The trunk against the house: a disc that slides along outlines and never enters them, as numba kernels."""
+"""Kernels for the contact of the trunk, a disc, with the house: it slides along outlines and never enters them."""
 
 import math
 
@@ -9,16 +9,16 @@ from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
 from mjsim.world.fidelity.body_state import VX, VY, X, Y
 
-_MAX_STEP = 0.05  # m; a disc of 0.20 m cannot jump over a wall in steps of this length
+_MAX_STEP = 0.05  # longest step in which a disc of 0.20 m cannot jump over a wall, m
 _MAX_ROUNDS = 12
 _TOUCHING = 1e-7  # m
 
 
 @kernel
 def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
-    """Whether no outline comes within these distances along x and y."""
+    """Return True if no outline is within the given distances along x and y."""
     if max(reach_x, reach_y) > radius + MARGIN:
-        return False  # farther than a cell covers
+        return False  # beyond what a cell of the grid covers
     start, end = _near(x, y, floor)
     for entry in range(start, end):
         box = floor.boxes[floor.near[entry]]
@@ -29,7 +29,7 @@ def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, 
 
 @kernel
 def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
-    """First and last entry of `Floor.near` for the cell of a point."""
+    """Return the first and the last entry of `Floor.near` for the cell of a point."""
     i, j = math.floor((x - floor.origin_x) / CELL), math.floor((y - floor.origin_y) / CELL)
     if not (0 <= i < floor.rows and 0 <= j < floor.columns):
         return 0, 0
@@ -39,7 +39,7 @@ def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
 
 @kernel
 def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
-    """Move the trunk of a body, shape (BODY_SIZE,), by its velocity for `h` s, sliding along what it meets."""
+    """Move the trunk of a body, (BODY_SIZE,), by its velocity for `h` seconds, sliding along outlines."""
     length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
     parts = 1 + int(length / _MAX_STEP)
     for _ in range(parts):
@@ -48,13 +48,13 @@ def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> N
         body[Y] += body[VY] * (h / parts)
         start, end = _near(x, y, floor)
         if start < end and not _push_out(body, radius, floor, start, end):
-            # Wedged between walls: stay where it was.
+            # Stuck between walls: stay at the previous position.
             body[X], body[Y], body[VX], body[VY] = x, y, 0.0, 0.0
 
 
 @kernel
 def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int, end: int) -> bool:
-    """Move the disc out of the polygons near[start:end], and turn its velocity along them; whether that is possible."""
+    """Move the disc out of the polygons near[start:end], and turn its velocity along them. Return True on success."""
     for _ in range(_MAX_ROUNDS):
         free = True
         for entry in range(start, end):
@@ -85,7 +85,7 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 def gap_to(
     x: float, y: float, edges: NDArray[np.float64], first: int, last: int
 ) -> tuple[float, float, float]:
-    """Signed distance of a point, m, to a convex polygon, m, negative inside, and the unit vector away from it.
+    """Return the signed distance of a point to a convex polygon, m, negative inside, and the unit vector away from it.
 
     `edges` are those of `Floor`, (e, 5), of which the polygon has `first` to `last`, exclusive.
     """
@@ -94,7 +94,7 @@ def gap_to(
     for edge in range(first, last):
         dx, dy = x - edges[edge, 0], y - edges[edge, 1]
         ex, ey = edges[edge, 2], edges[edge, 3]
-        beside = dx * ey - dy * ex  # positive outside, to the right of the edge
+        beside = dx * ey - dy * ex  # positive outside, which is to the right of the edge
         if beside > depth:
             depth, out_x, out_y = beside, ey, -ex
         along = min(edges[edge, 4], max(0.0, dx * ex + dy * ey))

@@ -1,4 +1,1 @@
-"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/metrics.md).
-
-Serves the tiers, which measure it, and the records and benchmarks that report it.
-"""
+"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/health.md)."""

@@ -1,4 +1,4 @@
-"""Objects that move as nothing should: ejections and tunnelling, which `docs/metrics.md` defines."""
+"""Detection of ejected objects and of tunnelling (docs/health.md)."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -13,29 +13,29 @@ from mjsim.values.actions import EventKind
 from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.world.health.settle_times import SettlingObject
 
-CHECK_DISTANCE = 0.02  # m from its anchor, beyond which an object's path is checked
+CHECK_DISTANCE = 0.02  # distance from its anchor at which the path of an object is checked, m
 
-MAX_FLIGHT = 1.0  # m from the release, horizontally
+MAX_FLIGHT = 1.0  # largest horizontal distance from the release, m
 _MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # m
 
 
 @dataclass(frozen=True, eq=False)
 class AnomalyState:
-    """What an `AnomalyDetector` remembers, as a value."""
+    """State of an `AnomalyDetector`."""
 
-    anchors: NDArray[np.float64]  # where each object's centre was when its path was last checked, m, (n, 3)
+    anchors: NDArray[np.float64]  # see `AnomalyDetector`
     ejected: tuple[int, ...]  # objects that count as ejected until a hand holds them again
-    ejections: int  # number so far
-    tunnellings: int  # number so far
+    ejections: int
+    tunnellings: int
 
 
 class AnomalyDetector:
     """Finds and counts ejections and tunnelling of objects.
 
     Attributes:
-        anchors: Where each object's centre was when its path was last checked, m, shape (n, 3).
-        ejections: How many so far.
-        tunnellings: How many so far.
+        anchors: Centre of each object when its path was last checked, m, shape (n, 3).
+        ejections: Number of ejections so far.
+        tunnellings: Number of objects so far that passed through something solid.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -43,13 +43,13 @@ class AnomalyDetector:
         self.anchors = np.zeros((len(self._bodies), 3))
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Start from the present state, with nothing counted."""
+        """Start from the current state, with counts of 0."""
         self.move_anchors(data)
         self._ejected: set[int] = set()
         self.ejections = self.tunnellings = 0
 
     def move_anchors(self, data: mujoco.MjData) -> None:
-        """Check no paths up to the present state."""
+        """Set the anchors to the current state, so that the paths up to it are not checked."""
         self.anchors[:] = data.xipos[self._bodies]
 
     def find(
@@ -59,7 +59,7 @@ class AnomalyDetector:
         settling: Mapping[int, SettlingObject],
         gripped: Collection[int],
     ) -> list[tuple[EventKind, int]]:
-        """Ejections and tunnelling in this control step, each with the number of the object."""
+        """Find ejections and tunnelling in this control step. Return each with the index of its object."""
         found = []
         self._ejected.difference_update(gripped)
         far = {item for item, release in settling.items() if self._flew_off(data, item, release)}
@@ -79,13 +79,11 @@ class AnomalyDetector:
         return found + [(EventKind.EJECTED, item) for item in ejected]
 
     def get_state(self) -> AnomalyState:
-        """Everything, as a value."""
         return AnomalyState(
             self.anchors.copy(), tuple(sorted(self._ejected)), self.ejections, self.tunnellings
         )
 
     def set_state(self, state: AnomalyState) -> None:
-        """Restore what `get_state` returned."""
         self.anchors[:] = state.anchors.reshape(self.anchors.shape)
         self._ejected = set(state.ejected)
         self.ejections, self.tunnellings = state.ejections, state.tunnellings
@@ -95,7 +93,7 @@ class AnomalyDetector:
         return bool(np.hypot(x - release.x, y - release.y) > MAX_FLIGHT)
 
     def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
-        """Whether something static that collides lies between the object's anchor and its centre."""
+        """Return True if a static colliding geom is between the object's anchor and its centre."""
         body = int(self._bodies[item])
         start = self.anchors[item]
         path = data.xipos[body] - start

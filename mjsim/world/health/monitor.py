@@ -1,7 +1,7 @@
-"""Checks the physics after every control step: warnings, penetration, weld errors, settling times and anomalies.
+"""Health monitor: checks warnings, penetration, weld errors, settle times and anomalies after every control step.
 
-`docs/metrics.md` defines every term. A state that cannot be trusted any further is a `PhysicsError`; anything less is
-counted, and reported as an event.
+docs/health.md defines all terms. A state that is no longer valid raises a `PhysicsError`. Anything less is counted, and
+reported as an event.
 """
 
 import math
@@ -23,24 +23,23 @@ from mjsim.world.health.anomalies import CHECK_DISTANCE, AnomalyDetector, Anomal
 from mjsim.world.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
 from mjsim.world.health.settle_times import SettleTimer, SettleTimerState
 
-_KICK = 2.0  # times the walking speed: a light object that bounces off a walking person
-_FALL = 5.6  # m/s, from the height at which objects are carried
+_KICK = 2.0  # speed of a light object that bounces off a walking person, as a multiple of the walking speed
+_FALL = 5.6  # speed after a fall from the height at which objects are carried, m/s
 _NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
 Pair = tuple[float, float]
 NOTHING: Pair = (math.nan, math.nan)
 
 
 class HealthSample(NamedTuple):
-    """The physics at the end of one control step.
+    """Health of the physics after a control step.
 
     Attributes:
-        penetration_m: Deepest overlap of an object with anything but the person, m. The person's foot is left out
-            because it is soft on purpose: it pushes and never launches.
+        penetration_m: Deepest overlap of an object with anything but the person, m. Contacts of the person's foot do
+            not count because it is soft on purpose.
         trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
-        weld_error_m: Distance between each hand and the grip that it carries, m; NaN where it carries nothing.
-        weld_error_rad: Angle between each hand and the grip that it carries, rad; NaN where it carries nothing.
-        settle_s: Time from release to rest of an object that has come to rest in this step, the longest if there
-            are several, s; NaN if there is none.
+        weld_error_m: Distance between each hand and the grip in it, m, or NaN if it is empty.
+        weld_error_rad: Angle between each hand and the grip in it, rad, or NaN if it is empty.
+        settle_s: Longest time from release to rest of an object that came to rest in this step, s, or NaN.
     """
 
     penetration_m: float = 0.0
@@ -51,7 +50,7 @@ class HealthSample(NamedTuple):
 
     @property
     def row(self) -> tuple[float, ...]:
-        """Seven numbers in the order of the attributes, left hand before right."""
+        """The seven numbers in the order of the attributes, left hand before right."""
         overlaps = (self.penetration_m, self.trunk_penetration_m)
         return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
 
@@ -63,12 +62,12 @@ class Health:
     Attributes:
         max_penetration_m: Largest `HealthSample.penetration_m`.
         max_trunk_penetration_m: Largest `HealthSample.trunk_penetration_m`.
-        max_weld_error_m: Largest `HealthSample.weld_error_m`; 0 if nothing was carried.
-        max_weld_error_rad: Largest `HealthSample.weld_error_rad`; 0 if nothing was carried.
-        settle_times: Seconds from each release to rest, in order.
-        ejections: Objects that flew off, out of the house, or faster than anything can fall or be kicked.
-        tunnellings: Objects that passed through something solid.
-        warnings: Number of MuJoCo warnings; any one ends the simulation with a `PhysicsError`.
+        max_weld_error_m: Largest `HealthSample.weld_error_m`, or 0 if nothing was carried.
+        max_weld_error_rad: Largest `HealthSample.weld_error_rad`, or 0 if nothing was carried.
+        settle_times: Times from each release to rest, s, in order.
+        ejections: Number of objects that flew off, left the house, or were faster than by falls and kicks.
+        tunnellings: Number of objects that passed through something solid.
+        warnings: Number of MuJoCo warnings. Any warning ends the simulation with a `PhysicsError`.
     """
 
     max_penetration_m: float = 0.0
@@ -83,21 +82,21 @@ class Health:
 
 @dataclass(frozen=True, eq=False)
 class HealthState:
-    """What a `HealthMonitor` has accumulated, as a value."""
+    """State of a `HealthMonitor`."""
 
-    # Deepest overlap of an object and of the trunk, m; largest weld error, m and rad; shape (4,).
+    # Deepest overlap of an object and of the trunk, m, and largest weld errors, m and rad, shape (4,)
     extremes: NDArray[np.float64]
     settle_times: tuple[float, ...]  # see `Health.settle_times`
-    sample: HealthSample  # the latest control step
-    anomalies: AnomalyState  # objects that flew off or passed through something
-    settling: SettleTimerState  # objects between release and rest
+    sample: HealthSample  # latest control step
+    anomalies: AnomalyState
+    settling: SettleTimerState
 
 
 class HealthMonitor:
     """Accumulates `Health` over control steps.
 
     Attributes:
-        sample: What the latest control step was like.
+        sample: Health after the latest control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
@@ -135,7 +134,7 @@ class HealthMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; the state is that of the episode's beginning."""
+        """Clear all results, in the initial state of the episode."""
         self._extremes[:] = 0.0
         self._settle_times: list[float] = []
         self.sample = QUIET
@@ -143,7 +142,7 @@ class HealthMonitor:
         self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Take the latest control step into account; ejections and tunnelling, each with the object's number.
+        """Include the latest control step. Return ejections and tunnelling, each with the index of its object.
 
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
@@ -165,7 +164,6 @@ class HealthMonitor:
         self._anomalies.move_anchors(self._rig.data)
 
     def get_state(self) -> HealthState:
-        """Everything accumulated, as a value."""
         return HealthState(
             extremes=self._extremes.copy(),
             settle_times=tuple(self._settle_times),
@@ -175,7 +173,6 @@ class HealthMonitor:
         )
 
     def set_state(self, state: HealthState) -> None:
-        """Restore what `get_state` returned."""
         self._extremes[:] = state.extremes
         self._settle_times = list(state.settle_times)
         self.sample = state.sample
@@ -183,7 +180,7 @@ class HealthMonitor:
         self._settling.set_state(state.settling)
 
     def snapshot(self) -> Health:
-        """Extremes and counts since the last reset."""
+        """Return extremes and counts since the last reset."""
         deepest, deepest_trunk, stretched, twisted = self._extremes.tolist()
         return Health(
             max_penetration_m=deepest,
@@ -197,10 +194,10 @@ class HealthMonitor:
         )
 
     def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
-        """Fill sample and flags; whether any object may be ejected or have tunnelled."""
+        """Fill sample and flags. Return True if an object may be ejected or may have tunnelled."""
         geoms, distances = _NO_GEOMS, _NO_DISTANCES
         if data.ncon:
-            # Strides differ with the number of contacts, and kernels with the strides.
+            # Contiguous copies, because strides depend on the number of contacts, and kernels on the strides
             geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
         found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
         if found == WARNED:
@@ -216,8 +213,8 @@ def _warning_text(data: mujoco.MjData) -> str:
         f"{mujoco.mjtWarning(int(k)).name} (detail {int(data.warning.lastinfo[k])})" for k in kinds
     )
     return (
-        f"MuJoCo warned at t = {data.time:.3f} s: {found}. The state is no longer trustworthy; reset the world, and "
-        "replay the recorded actions up to this time to look at the cause"
+        f"MuJoCo warned at t = {data.time:.3f} s: {found}. The state is no longer valid: reset the world, and replay "
+        "the recorded actions up to this time to find the cause"
     )
 
 
@@ -225,8 +222,8 @@ def _not_finite_text(model: mujoco.MjModel, data: mujoco.MjData) -> str:
     bad = np.flatnonzero(~np.isfinite(data.qvel))
     where = model.body(int(model.dof_bodyid[bad[0]])).name if bad.size else "a position"
     return (
-        f"the state is not finite at t = {data.time:.3f} s, first at {where!r}; reset the world, and replay the "
-        "recorded actions up to this time to look at the cause"
+        f"the state is not finite at t = {data.time:.3f} s, first at {where!r}: reset the world, and replay the "
+        "recorded actions up to this time to find the cause"
     )
 
 

@@ -1,4 +1,4 @@
-"""One pass over the state, the objects, the hands and the contacts after a control step, as a numba kernel."""
+"""A numba kernel that scans the state, objects, hands and contacts once after a control step."""
 
 import math
 from typing import Any, NamedTuple
@@ -16,19 +16,18 @@ from mjsim.world.body.grips import site_angle, site_gap
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-OUTSIDE = 0.3  # m; rooms end at their walls, and doorways lie in between
+OUTSIDE = 0.3  # distance from the rooms that is still inside, because doorways are between rooms, m
 
 _TOLERANCE = 1e-6  # m
 
-# What a scan finds.
+# Results of a scan
 NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
-# Flags of an object: farther than a distance from its anchor, faster than a speed, slower than another, and touched
-# by the person's foot.
+# Flags of an object: far from its anchor, fast, slow, and touched by the person's foot (see `ScanArrays.limits`)
 DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
 
 
 def static_boxes(scene: Scene) -> Floats:
-    """Lowest and highest corner of a box around each colliding geom of the house, m, shape (k, 6)."""
+    """Return the lowest and highest corner of a box around each colliding geom of the house, m, (k, 6)."""
     return compiled_house(scene.catalogue).once(("static boxes",), lambda: _static_boxes(scene.model))
 
 
@@ -44,44 +43,39 @@ def _static_boxes(model: mujoco.MjModel) -> Floats:
 
 
 class ScanArrays(NamedTuple):
-    """What a scan reads and writes, for one simulation: views of its state, its model, and the results."""
+    """Inputs and outputs of scans of a simulation: views of its state, its model, and the results."""
 
     qpos: Floats  # positions, (nq,)
     qvel: Floats  # velocities, (nv,)
     xipos: Floats  # centres of mass of all bodies, m, (nbody, 3)
     site_xpos: Floats  # positions of all sites, m, (nsite, 3)
-    site_xmat: Floats  # their frames, (nsite, 9)
-    warnings: Ints  # how often MuJoCo has warned, by kind, (nwarning,)
+    site_xmat: Floats  # frames of all sites, (nsite, 9)
+    warnings: Ints  # number of MuJoCo's warnings by kind, (nwarning,)
     bodies: Ints  # body of each object, (n,)
     dofs: Ints  # first degree of freedom of each object, (n,)
     geom_owner: Ints  # object of each geom, or -1, (ngeom,)
-    trunk: int  # the person's trunk and foot, geoms
+    trunk: int  # geoms of the person
     foot: int
-    # Squares of the distance from its anchor, m, beyond which an object is `DISPLACED`, of the speed, m/s, beyond
-    # which it is `FAST`, and of the speed below which it is `SLOW`, (3,).
+    # Squares of three limits: distance from the anchor beyond which an object is `DISPLACED`, m, speed beyond which
+    # it is `FAST`, and speed below which it is `SLOW`, m/s, (3,)
     limits: Floats
     boxes: Floats  # `static_boxes`
     rooms: tuple[Floats, Floats, Floats]  # `RoomMap.rectangles`
     grip_sites: NDArray[np.intp]  # `Grips.sites`
-    # Where each object was when its path was last checked, m, (n, 3); moved along where `boxes` show the path to be
-    # clear.
-    anchors: Floats
-    flags: NDArray[np.uint8]  # flags of each object, (n,); overwritten
-    # The deepest overlap of an object with anything but the person, and that of the trunk with the house, both in m
-    # and not negative; how far the weld of either hand is stretched, m, and twisted, rad, NaN for a hand that carries
-    # nothing; shape (6,), overwritten.
+    anchors: Floats  # `AnomalyDetector.anchors`, moved along if `boxes` show that the path is clear
+    flags: NDArray[np.uint8]  # flags of each object, (n,), overwritten
+    # Deepest overlap of an object with anything but the person, and of the trunk with the house, m, at least 0. Weld
+    # errors of the left and the right hand, m and then rad, or NaN for an empty hand. (6,), overwritten
     sample: Floats
-    extremes: (
-        Floats  # largest sample so far: overlaps, m, weld error of either hand, m and rad, (4,); changed
-    )
+    extremes: Floats  # largest overlaps and weld errors of either hand so far, m, m, m and rad, (4,), updated
 
 
 @kernel
 def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
-    """Scan the state, objects, hands and contacts once: `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
+    """Scan the state, objects, hands and contacts. Return `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
 
-    Takes the fields of `ScanArrays` as a plain tuple, which numba accepts from Python in half the time, geoms (ncon, 2)
-    and distances (ncon,), m, of the contacts, and which hands carry something.
+    `fields` are those of `ScanArrays` as a plain tuple, which numba unpacks in half the time. `geoms` (ncon, 2) and
+    `distances` (ncon,), m, are those of contacts. `left` and `right` are True for hands that hold an object.
     """
     arrays = ScanArrays(*fields)
     for count in arrays.warnings:
@@ -104,7 +98,7 @@ def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -
             sample[4 + hand] = site_angle(arrays.site_xmat, sites[hand, 0], sites[hand, 1])
     for k in range(6):
         extreme = k if k < 2 else k // 2 + 1
-        if sample[k] > arrays.extremes[extreme]:  # not if it is NaN
+        if sample[k] > arrays.extremes[extreme]:  # False for NaN
             arrays.extremes[extreme] = sample[k]
     return state
 
@@ -136,7 +130,7 @@ def _flag_objects(arrays: ScanArrays) -> int:
 
 @kernel
 def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
-    """Whether the box around two points (3,), m, overlaps none of some boxes."""
+    """Return True if the box around two points (3,), m, overlaps none of the boxes."""
     low_x, high_x = min(start[0], end[0]), max(start[0], end[0])
     low_y, high_y = min(start[1], end[1]), max(start[1], end[1])
     low_z, high_z = min(start[2], end[2]), max(start[2], end[2])
@@ -152,7 +146,7 @@ def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
 
 @kernel
 def _overlaps(arrays: ScanArrays, geoms: Ints, distances: Floats) -> tuple[float, float]:
-    """Deepest overlap of an object and of the trunk, m; flags what the foot touches."""
+    """Return the deepest overlap of an object and of the trunk, m, and flag objects that the foot touches."""
     trunk, foot, owner = arrays.trunk, arrays.foot, arrays.geom_owner
     deepest = deepest_trunk = 0.0
     for c in range(len(distances)):

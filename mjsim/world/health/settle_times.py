@@ -1,4 +1,4 @@
-"""Released objects, until they are at rest; `docs/metrics.md` defines release, rest and settle time."""
+"""Settle times of released objects (docs/health.md)."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -16,38 +16,37 @@ from mjsim.world.health.scan import PUSHED, SLOW
 class SettlingObject:
     """An object between its release and rest."""
 
-    time: float  # when a hand last held it, s
-    x: float  # where its centre was then, m
+    time: float  # time at which a hand last held it, s
+    x: float  # position of its centre at that time, m
     y: float
-    still_steps: int = 0  # control steps in a row for which it has been slow or asleep
-    still_since: float = 0.0  # when the first of them ended, s
+    still_steps: int = 0  # number of consecutive control steps for which it has been slow or asleep
+    still_since: float = 0.0  # time at the end of the first of these steps, s
 
 
 @dataclass(frozen=True)
 class SettleTimerState:
-    """What a `SettleTimer` remembers, as a value."""
+    """State of a `SettleTimer`."""
 
     objects: tuple[
         tuple[int, SettlingObject], ...
-    ]  # number and state of each released object that is not at rest
-    # Number of each held object, when it was last seen in the hand, s, and where its centre was, m, (3,).
+    ]  # index and state of released objects that are not at rest
+    # Index of each held object, when it was last seen in the hand, s, and position of its centre then, m, (3,)
     gripped: tuple[tuple[int, float, list[float]], ...]
 
 
 class SettleTimer:
-    """Follows objects from their release until they rest, a hand grips them again, or the person's foot pushes them."""
+    """Tracks objects from release until they rest, a hand grips them again, or the person's foot pushes them."""
 
     def __init__(self, scene: Scene) -> None:
         self._bodies, self._trees = scene.index.bodies.tolist(), scene.index.trees
         self.reset()
 
     def reset(self) -> None:
-        """Start with empty hands and everything at rest."""
         self.objects: dict[int, SettlingObject] = {}
-        self._gripped: dict[int, tuple[float, list[float]]] = {}  # when and where, last
+        self._gripped: dict[int, tuple[float, list[float]]] = {}  # latest time and position in a hand
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
-        """Settle times, s, of objects that come to rest with this step; `gripped` ones are welded to a hand."""
+        """Return the settle times, s, of objects that came to rest in this step. `gripped` are those in hands."""
         if not (gripped or self._gripped or self.objects):
             return []
         for item, (last, (x, y, _)) in self._gripped.items():
@@ -70,11 +69,9 @@ class SettleTimer:
         return settled
 
     def get_state(self) -> SettleTimerState:
-        """Everything, as a value."""
         objects = tuple((item, replace(settling)) for item, settling in self.objects.items())
         return SettleTimerState(objects, tuple((item, *last) for item, last in self._gripped.items()))
 
     def set_state(self, state: SettleTimerState) -> None:
-        """Restore what `get_state` returned."""
         self.objects = {item: replace(settling) for item, settling in state.objects}
         self._gripped = {item: (time, center) for item, time, center in state.gripped}

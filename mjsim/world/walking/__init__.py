@@ -1,4 +1,1 @@
-"""How a person follows a path on the floor: looks ahead, slows down at corners, passes objects beside the feet.
-
-It serves `mjsim.world.world`, which carries out the action `FollowPath`, and participants that measure along paths.
-"""
+"""Path following: looking ahead, slowing down at corners, and walking around objects on the floor."""

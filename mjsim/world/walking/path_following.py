@@ -1,6 +1,6 @@
-"""Kernels of walking along a polyline, one control step at a time.
+"""Kernels for walking along a polyline, one control step at a time.
 
-Every tier of fidelity runs the same kernels, one by one or many in a call, so the numbers are the same to the last bit.
+All tiers of fidelity run the same kernels, one or many steps per call, so results are bit-identical.
 """
 
 import math
@@ -23,27 +23,26 @@ from mjsim.world.walking.polyline import (
     rest_of,
 )
 
-ARRIVED_WITHIN = 0.06  # m from the end of its path, a walk is over
+ARRIVED_WITHIN = 0.06  # distance from the end of a path at which a walk ends, m
 
 WALKING, TURNING, ARRIVED, BLOCKED, CHANGED = range(5)  # phases of a walk
-SHORTEST_LEFT, SINCE = range(2)  # progress of a walk: shortest distance left so far, m, and when that was, s
+SHORTEST_LEFT, SINCE = range(2)  # indices of progress: shortest remaining distance so far, m, and its time, s
 
 Floats = NDArray[np.float64]
 
 
 class Pace(NamedTuple):
-    """How fast a person walks and turns, and how wide it is."""
+    """Speeds and clearances of a person who walks."""
 
-    speed: float  # usual walk, m/s
-    braking: float  # deceleration planned for, m/s^2
+    speed: float  # preferred speed, m/s
+    braking: float  # planned deceleration, m/s^2
     turning_speed: float  # fastest turn, rad/s
     clearance: float  # distance kept from the middle of objects on the floor, m
-    patience: float  # time without progress until the person is blocked, s
-    walking: WalkingParameters  # how it follows a path
+    patience: float  # time without progress after which the person is blocked, s
+    walking: WalkingParameters
 
     @classmethod
     def of(cls, person: PersonParameters) -> "Pace":
-        """That of a person."""
         walking = person.walking
         braking = walking.braking_share * person.walking_acceleration
         clearance = person.body_radius + walking.object_clearance
@@ -51,16 +50,16 @@ class Pace(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """The objects and walls that a walker keeps clear of."""
+    """Objects and walls that a walking person avoids."""
 
-    positions: Floats  # object positions, m, shape (n, 2 or more)
-    is_loose: NDArray[np.bool_]  # whether the object lies on the floor, shape (n,)
-    target: int  # the object that the walk is about, which is no obstacle; -1 for none
-    walls: Floats  # outline of the navigable floor, ends x, y, x, y of its edges, m, shape (e, 4)
+    positions: Floats  # positions of all objects, m, (n, 2 or more)
+    is_loose: NDArray[np.bool_]  # True for objects on the floor, (n,)
+    target: int  # index of the object to pick or place, which is not an obstacle, or -1
+    walls: Floats  # edges x, y, x, y of the navigable floor, m, (e, 4)
 
 
 class Walk(NamedTuple):
-    """`FollowPath` for kernels: its attributes, whether to face the goal at the end, the pace, and the obstacles."""
+    """`FollowPath` for kernels, with the person's pace and the obstacles."""
 
     path: Floats
     goal: tuple[float, float]
@@ -74,7 +73,7 @@ class Walk(NamedTuple):
 
 @kernel
 def wrap_angle(angle: float) -> float:
-    """Wrap to [-pi, pi)."""
+    """Wrap an angle, rad, to [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -82,7 +81,7 @@ def wrap_angle(angle: float) -> float:
 def turn_towards(
     heading: float, x: float, y: float, to_x: float, to_y: float, pace: Pace
 ) -> tuple[float, float]:
-    """Yaw rate, rad/s, that turns `heading` towards a point, and the angle still to turn (rad)."""
+    """Return the yaw rate, rad/s, for turning `heading` towards a point, and the remaining angle, rad."""
     error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
     fastest = pace.turning_speed
     return min(max(pace.walking.turn_gain * error, -fastest), fastest), error
@@ -90,7 +89,7 @@ def turn_towards(
 
 @kernel
 def is_free(x: float, y: float, walls: Floats) -> bool:
-    """Whether a person can stand at (x, y), given the outline of the navigable floor, m, shape (e, 4), if any."""
+    """Return True if (x, y) is inside the outline of the navigable floor, m, (e, 4), or if there is no outline."""
     inside = len(walls) == 0
     for k in range(len(walls)):
         if (walls[k, 1] > y) != (walls[k, 3] > y):
@@ -109,11 +108,12 @@ def sidestep(
     obstacles: Obstacles,
     pace: Pace,
 ) -> tuple[float, float]:
-    """Where to walk instead of straight to `target` so that objects on the floor stay beside the feet, m.
+    """Return the point to walk to, m, instead of straight to `target`, in order to pass objects on the floor.
 
-    Passes the nearest object ahead on its free side; on the other side if that is blocked and no detour is needed;
-    else straight over it. The person is at x, y, m. `beyond`, farther along the path, m, decides what is in the way
-    and on which side, and keeps the person on that side, because it lies behind the object.
+    The person at x, y, m, passes the nearest object ahead on its free side. If that side is blocked and the other one
+    needs no detour, the other one. Otherwise straight over the object. `beyond`, a point farther along the path, m,
+    determines which object is in the way and on which side. It keeps the person on that side because it is behind the
+    object.
     """
     clearance, walking = pace.clearance, pace.walking
     reach = distance(x, y, beyond[0], beyond[1])
@@ -151,11 +151,11 @@ def sidestep(
 def follow(
     path: Path, x: float, y: float, heading: float, obstacles: Obstacles, pace: Pace
 ) -> tuple[float, float, float]:
-    """One control step along `path`, stopping at its end: velocities forward and left (m/s), and yaw rate (rad/s).
+    """Walk one control step along `path`, to its end. Return velocities forward and left, m/s, and yaw rate, rad/s.
 
-    The body turns towards the look-ahead point and walks straight at it, so that it leaves the path neither at
-    corners nor while it turns; the pace drops with the angle still to turn and with the distance left. The path has
-    shape (k, 2), k >= 1, m; the person is at x, y, m, and faces `heading`, rad.
+    The body turns towards the look-ahead point and walks straight to it, so it stays on the path at corners and while
+    it turns. The speed decreases with the remaining angle and the remaining distance. The path is (k, 2), k >= 1, m,
+    and the person at x, y, m, has a `heading`, rad.
     """
     arc, gap = project(path, x, y)
     left = max(path_length(path) - arc, 0.0) + gap
@@ -169,7 +169,7 @@ def follow(
 
 @kernel
 def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats, pace: Pace) -> bool:
-    """Whether a walk along `path` got on within the person's patience; updates `progress`, shape (2,)."""
+    """Return True if the remaining distance decreased within the person's patience. Updates `progress`, (2,)."""
     arc, gap = project(path, x, y)
     left = path_length(path) - arc + gap
     if left < progress[SHORTEST_LEFT] - pace.walking.least_progress or left > progress[SHORTEST_LEFT] + 1.0:
@@ -182,10 +182,9 @@ def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floa
 def next_step(
     walk: Walk, x: float, y: float, heading: float, time: float, progress: Floats
 ) -> tuple[int, float, float, float]:
-    """The next control step of a walk from x, y, m, and `heading`, rad, at `time`, s.
+    """Compute the next control step of a walk from x, y, m, with a `heading`, rad, at `time`, s.
 
-    Updates `progress`, the shortest distance left so far, m, and when that was, s; (2,). Returns the phase of the walk,
-    velocities forward and left (m/s), and the yaw rate (rad/s).
+    Updates `progress` (2,). Returns the phase of the walk, velocities forward and left, m/s, and the yaw rate, rad/s.
     """
     path = rest_of(walk.path, x, y) if walk.shown else walk.path
     at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
@@ -203,7 +202,7 @@ def next_step(
 def later_step(
     walk: Walk, x: float, y: float, heading: float, time: float, progress: Floats
 ) -> tuple[int, float, float, float]:
-    """As `next_step` for the later steps of an action: `CHANGED` if the person has left the path or is blocked."""
+    """Like `next_step`, for all but the first step. Return `CHANGED` if the person has left the path or is blocked."""
     if project(walk.path, x, y)[1] > walk.tolerance:
         return CHANGED, 0.0, 0.0, 0.0
     step = next_step(walk, x, y, heading, time, progress)
@@ -214,9 +213,9 @@ def later_step(
 def step_from_python(
     walk: Any, position: Floats, heading: float, time: float, progress: Floats, places: Floats, first: bool
 ) -> tuple[int, float, float, float]:  # fmt: skip
-    """`next_step` or `later_step`; `CHANGED` also if a loose object is not where it was, in `places` (n, 3), m.
+    """Call `next_step` or `later_step`. Return `CHANGED` also if a loose object is not at its place (n, 3), m.
 
-    Takes `plain` tuples, which numba unpacks in half the time of named ones.
+    `walk` consists of `plain` tuples, which numba unpacks in half the time of named tuples.
     """
     path, goal, stop_distance, face_goal, shown, tolerance, pace, obstacles = walk
     speed, braking, turning_speed, clearance, patience, walking = pace
@@ -234,6 +233,6 @@ def step_from_python(
 
 
 def plain(walk: Walk) -> Any:
-    """A walk as nested tuples, for `step_from_python`."""
+    """Convert a walk to nested tuples, for `step_from_python`."""
     pace = (*walk.pace[:-1], tuple(walk.pace.walking))
     return (*walk[:-2], pace, tuple(walk.obstacles))

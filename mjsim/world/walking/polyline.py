@@ -1,6 +1,6 @@
-"""Polylines on the floor: lengths, projections, and what is left of them.
+"""Kernels for polylines on the floor: lengths, projections and remainders.
 
-Points are passed as two numbers, polylines as arrays (k, 2), k >= 1, in m. All functions are compiled.
+Points are passed as two numbers, polylines as arrays (k, 2), k >= 1, in m.
 """
 
 import math
@@ -12,18 +12,17 @@ from mjsim.support.kernels import kernel
 
 Path = NDArray[np.float64]
 
-AT_THE_END = 1e-9  # m
+AT_THE_END = 1e-9  # distances below this count as zero, m
 
 
 @kernel
 def distance(x: float, y: float, to_x: float, to_y: float) -> float:
-    """Distance of two points, m."""
     return math.sqrt((to_x - x) * (to_x - x) + (to_y - y) * (to_y - y))
 
 
 @kernel
 def project(path: Path, x: float, y: float) -> tuple[float, float]:
-    """Arc length of the point of `path` nearest to (x, y), and the distance to it, both m."""
+    """Return the arc length of the point of `path` nearest to (x, y), and the distance to it, both m."""
     nearest_arc, nearest_gap = 0.0, distance(x, y, path[0, 0], path[0, 1])
     arc = 0.0
     for k in range(len(path) - 1):
@@ -50,7 +49,7 @@ def path_length(path: Path) -> float:
 
 @kernel
 def point_along(path: Path, arc: float) -> tuple[float, float]:
-    """Point of `path` at arc length `arc` m, clamped to its ends."""
+    """Point of `path` at an arc length, m, clamped to its ends."""
     passed = 0.0
     if arc <= 0.0:
         return path[0, 0], path[0, 1]
@@ -66,7 +65,7 @@ def point_along(path: Path, arc: float) -> tuple[float, float]:
 
 @kernel
 def rest_of(path: Path, x: float, y: float) -> Path:
-    """What is left of `path` from its point nearest to (x, y) on, m, shape (k, 2)."""
+    """Return the part of `path` after its point nearest to (x, y), m, (k, 2)."""
     arc, _ = project(path, x, y)
     if path_length(path) - arc < AT_THE_END:
         return path[-1:].copy()
@@ -82,7 +81,7 @@ def rest_of(path: Path, x: float, y: float) -> Path:
 
 @kernel
 def first_off_path(path: Path, positions: NDArray[np.float64], first: int, gap: float) -> int:
-    """Index of the first position (n, 2), from `first` on, farther than `gap` m from `path`; -1 if none is."""
+    """Return the first index, from `first` on, of a position (n, 2) farther than `gap` m from `path`, or -1."""
     for k in range(first, len(positions)):
         if project(path, positions[k, 0], positions[k, 1])[1] > gap:
             return k

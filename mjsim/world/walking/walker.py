@@ -1,4 +1,4 @@
-"""The memory of a walk from one action to the next: its progress, and backing off where there is none."""
+"""State of a walk between actions: its progress, and backing off if it is blocked."""
 
 import math
 
@@ -23,10 +23,10 @@ BACK_OFF_TIME = 0.6  # s
 
 
 class Walker:
-    """Walks for a person who follows paths one after the other.
+    """Executes `FollowPath` actions, one after the other.
 
-    A walk that leads to another pick or place starts afresh; one without counts as part of the one before. `walls`
-    are the edges x, y, x, y of the floor on which objects may be passed, m, (e, 4); none where all of it is free.
+    A walk to another pick or place starts again. A walk without one continues the previous walk. `walls` are the edges
+    x, y, x, y of the floor on which the person may walk around objects, m, (e, 4), or empty for the whole floor.
     """
 
     def __init__(self, person: PersonParameters, walls: NDArray[np.float64]) -> None:
@@ -36,16 +36,17 @@ class Walker:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all walks."""
+        """Clear the progress."""
         self._visit: Pick | Place | None = None
         self._back_off_until = -math.inf
         self.progress = np.array([np.inf, 0.0])
         self.blocked = False
 
     def walk(self, action: FollowPath, seen: Observation) -> Walk | None:
-        """The walk for kernels; None while the person backs off.
+        """Return the walk for kernels, or None while the person backs off.
 
-        Only on the way to a pick or place: a participant that is blocked elsewhere takes another path at once.
+        A person backs off only on the way to a pick or place. A participant that is blocked elsewhere takes another
+        path at once.
         """
         if action.then is not None and action.then != self._visit:
             self._visit = action.then
@@ -66,14 +67,14 @@ class Walker:
         )
 
     def note(self, phase: int, time: float) -> None:
-        """Take note of how the first control step of a walk went, taken at `time`, s."""
+        """Record the phase after the first control step of a walk, which started at `time`, s."""
         self.blocked = phase == BLOCKED
         if self.blocked:
             self._back_off_until = time + BACK_OFF_TIME
             self.progress[:] = np.inf, self._back_off_until
 
     def step(self, action: FollowPath, seen: Observation) -> StepAction:
-        """The next control step of a walk, for worlds that are stepped by others."""
+        """Compute the next control step, for worlds that are stepped elsewhere."""
         walk = self.walk(action, seen)
         if walk is None:
             return BACK_OFF
@@ -84,7 +85,6 @@ class Walker:
         return action.then or IDLE if phase == ARRIVED else Move(*velocities)
 
     def _obstacles(self, seen: Observation) -> Obstacles:
-        """The objects on the floor, but for the one that the present or last pick or place is about."""
         if seen.object_status != self._status:
             self._status = seen.object_status
             self._is_loose = np.array([s is ObjectStatus.LOOSE for s in seen.object_status], np.bool_)
