@@ -184,7 +184,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """Kind of an event: outcome of a motion, lost or dislodged object, or anomaly (docs/health.md)."""
+    """Kind of an event: outcome of a motion, lost or dislodged object, or anomaly (docs/metrics.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"

@@ -25,7 +25,7 @@ class WorldOptions:
         settle_speed: Slower objects are at rest, m/s.
         volume_margin: A centre this far outside a receptacle's volume still counts as inside, m.
         fidelity: `full`, everything in physics, or `event`, kinematic except for the fall of released objects
-            (docs/fidelity.md).
+            (docs/simulation.md).
         capacity: Number of objects that can be carried: 2, or 1 with only the right hand.
 
     Raises:

@@ -63,7 +63,7 @@ class World:
 
     Attributes:
         scene: The composed episode, whose model is never modified.
-        options: Options of the world, including its fidelity (docs/fidelity.md).
+        options: Options of the world, including its fidelity (docs/simulation.md).
 
     Example:
         >>> import mjsim

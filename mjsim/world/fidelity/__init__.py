@@ -1,4 +1,4 @@
-"""The two tiers of fidelity: `full` physics, and `event`, which simulates only falling objects (docs/fidelity.md)."""
+"""The two tiers of fidelity: `full` physics, and `event`, which simulates only falling objects (docs/simulation.md)."""
 
 from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions

@@ -1,1 +1,1 @@
-"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/health.md)."""
+"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/metrics.md)."""

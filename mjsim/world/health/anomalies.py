@@ -1,4 +1,4 @@
-"""Detection of ejected objects and of tunnelling (docs/health.md)."""
+"""Detection of ejected objects and of tunnelling (docs/metrics.md)."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

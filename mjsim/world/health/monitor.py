@@ -1,6 +1,6 @@
 """Health monitor: checks warnings, penetration, weld errors, settle times and anomalies after every control step.
 
-docs/health.md defines all terms. A state that is no longer valid raises a `PhysicsError`. Anything less is counted, and
+docs/metrics.md defines all terms. A state that is no longer valid raises a `PhysicsError`. Anything less is counted, and
 reported as an event.
 """
 

@@ -1,4 +1,4 @@
-"""Settle times of released objects (docs/health.md)."""
+"""Settle times of released objects (docs/metrics.md)."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
