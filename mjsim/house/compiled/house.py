@@ -59,18 +59,18 @@ class NavigableBuilder(Protocol):
         ...
 
 
-def installed_builder(group: str = GROUP) -> NavigableBuilder:
+def installed_builder() -> NavigableBuilder:
     """Load the builder of an installed package, the first by name. Raise a SamplingError if there is none."""
-    offers = sorted(entry_points(group=group), key=lambda e: e.name)
+    offers = sorted(entry_points(group=GROUP), key=lambda e: e.name)
     if not offers:
         raise SamplingError(
-            f"no installed package offers the entry point {group!r}, without which no house can be sampled; "
+            f"no installed package offers the entry point {GROUP!r}, without which no house can be sampled; "
             "install the project (pip install -e .), pass navigable=..., or pass episodes=[...] sampled before"
         )
     try:
         builder: NavigableBuilder = offers[0].load()
     except (ImportError, AttributeError) as error:
-        raise SamplingError(f"cannot load {offers[0].value!r}, which offers {group!r}: {error}") from error
+        raise SamplingError(f"cannot load {offers[0].value!r}, which offers {GROUP!r}: {error}") from error
     return builder
 
 

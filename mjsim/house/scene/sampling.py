@@ -120,17 +120,16 @@ def sample_points(
     *,
     count: int,
     rng: np.random.Generator,
-    min_distance: float = MIN_DISTANCE,
 ) -> NDArray[np.float64]:
     """Draw navigable points (count, 2), m, that are apart from each other and from `keep_away` (k, 2), by rejection."""
     best = 0
     for _ in range(PACKINGS):
-        points = _pack(navigable, keep_away, count, rng, min_distance)
+        points = _pack(navigable, keep_away, count, rng)
         if len(points) == count:
             return points
         best = max(best, len(points))
     raise SamplingError(
-        f"only {best} of {count} points fit at least {min_distance} m from each other and from "
+        f"only {best} of {count} points fit at least {MIN_DISTANCE} m from each other and from "
         f"{len(keep_away)} receptacles, after {PACKINGS * DRAWS - best} rejections; "
         "ask for fewer points (--points) or use a larger house"
     )
@@ -138,7 +137,7 @@ def sample_points(
 
 def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
     """Return the number of points, at most `count`, that fit into the house in one attempt."""
-    return len(_pack(navigable, keep_away, count, np.random.default_rng(0), MIN_DISTANCE))
+    return len(_pack(navigable, keep_away, count, np.random.default_rng(0)))
 
 
 def _pack(
@@ -146,7 +145,6 @@ def _pack(
     keep_away: NDArray[np.float64],
     count: int,
     rng: np.random.Generator,
-    min_distance: float,
 ) -> NDArray[np.float64]:
     """Collect at most `count` points in `DRAWS` draws, m, shape (k, 2)."""
     taken = np.empty((len(keep_away) + count, 2))
@@ -156,7 +154,7 @@ def _pack(
         if filled == len(taken):
             break
         point = navigable.sample(rng)
-        if (np.hypot(*(taken[:filled] - point).T) >= min_distance).all():
+        if (np.hypot(*(taken[:filled] - point).T) >= MIN_DISTANCE).all():
             taken[filled] = point
             filled += 1
     return taken[len(keep_away) : filled]

@@ -1,7 +1,7 @@
 """Health monitor: checks warnings, penetration, weld errors, settle times and anomalies after every control step.
 
-docs/metrics.md defines all terms. A state that is no longer valid raises a `PhysicsError`. Anything less is counted, and
-reported as an event.
+docs/metrics.md defines all terms. An invalid state raises a `PhysicsError`. Anything less is counted, and reported as
+an event.
 """
 
 import math
