@@ -24,7 +24,8 @@ def test_firefox_shows_the_task_and_turns(tmp_path):
     ):
         browser.goto(server.url)
         browser.hold("Enter")
-        browser.wait_for("document.querySelector('[name=phase][value=story]')")
+        story = "document.querySelector('[name=phase][value=story]')"
+        browser.wait_for(f"{story} && document.activeElement.matches('button')")
         browser.hold("Enter")
         browser.wait_for(f"{TITLE} === 'Training' && document.activeElement.textContent.startsWith('Start')")
         browser.hold("Enter")
