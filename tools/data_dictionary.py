@@ -12,23 +12,23 @@ from experiments.trials.dictionary import described, trial_columns
 _HEAD = """\
 # Data dictionary
 
-Made from the types by `make data-dictionary`; change it there. Lengths are metres, times simulated seconds, angles
-radians, z is up.
+This page is made from the types by `make data-dictionary`. Lengths are in metres, times in simulated seconds, angles in
+radians; z is up.
 
 ## metrics.json
 
-One object per run. All but the last three rows follow from event log and trajectory; `mjsim metrics` computes them
-anew and `mjsim replay` checks them. [metrics.md](metrics.md) defines the metrics and the health of the physics.
+One object per run. `mjsim metrics` computes all fields except the last three from event log and trajectory, and
+`mjsim replay` checks them. [Metrics](metrics.md) has the definitions.
 """
 _TABLES = """\
 ## trials.parquet, trials.csv
 
-One row per trial of a batch. The columns are the rows of `metrics.json` under the same names, with null (in CSV:
-nothing) where a value is not known. CSV leaves out columns that are null throughout.
+One row per trial of a batch, with the fields of `metrics.json` as columns. Unknown values are null, or empty in CSV. CSV
+leaves out columns that are null throughout.
 
 ## trials/*.sqlar
 
-Packed trials ([batches.md](batches.md#packed-trials)): SQLite databases with one table, `sqlar`, and one row per file.
+[Packed trials](batches.md#packed-trials): SQLite databases with one table, `sqlar`, and one row per file.
 
 | column | type | what |
 |---|---|---|
@@ -41,7 +41,7 @@ Packed trials ([batches.md](batches.md#packed-trials)): SQLite databases with on
 _EVENTS = """\
 ## events.jsonl
 
-One JSON object per line, in the order in which things happened. Every line has
+One JSON object per line, in order of time. Every line has
 
 | field | type | what |
 |---|---|---|
@@ -60,10 +60,10 @@ def data_dictionary() -> str:
         _EVENTS.rstrip(),
     ]
     lines += _rows(described(LoggedEvent))
-    lines.append("| `event` | str | Kind of the event, one of those below. |")
+    lines.append("| `event` | str | Kind of event, as in the headings below. |")
     for kind in TYPES:
         lines += ["", f"### {kind.__struct_config__.tag}", "", _summary(kind), "", *_table(kind)]
-    lines += ["", "### What happened in the world", "", "| event | when |", "|---|---|"]
+    lines += ["", "### Events of the world", "", "| event | when |", "|---|---|"]
     lines += [f"| `{kind.value}` | {when} |" for kind, when in OUTCOMES.items()]
     lines += ["", "Each has", "", *_table(OutcomeEvent)]
     return "\n".join(lines) + "\n"
