@@ -23,8 +23,8 @@ One object per run. `mjsim metrics` computes all fields except the last three fr
 _TABLES = """\
 ## trials.parquet, trials.csv
 
-One row per trial of a batch, with the fields of `metrics.json` as columns. Unknown values are null, or empty in CSV. CSV
-leaves out columns that are null throughout.
+One row per trial of a batch, with the fields of `metrics.json` as columns. Unknown values are null, or empty in CSV.
+CSV leaves out columns that are null throughout.
 
 ## trials/*.sqlar
 
