@@ -40,7 +40,7 @@ CHECK_PERIOD = 5.0  # s between two looks whether who watches may still do so
 PAGE_SIZE = 100  # participants on a page of the list
 MAX_WANTED = 1_000_000  # people of a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
-UNKNOWN = "Not found", "There is no such page."
+UNKNOWN = "Not found", "This page does not exist."
 _PAGE = re.compile(r"\d{1,9}", re.ASCII)
 Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
@@ -121,8 +121,8 @@ class ResearcherServer:
             if who is None:
                 return RedirectResponse("/login", 303)
             if not may(who, role):
-                text = f"This is for {role}s; {who.name} is {who.role}."
-                return self._message(request, 403, "You may not do this", text)
+                text = f"This page is for {role}s. You are logged in as {who.role}."
+                return self._message(request, 403, "Not allowed", text)
             return await handler(request, who)
 
         return endpoint
@@ -152,7 +152,7 @@ class ResearcherServer:
             return page(request, "researcher/login", 429, title=title, note=note)
         token = await self._access.log_in(request, name, form.get("password", ""))
         if token is None:
-            LOG.warning("somebody failed to log in to the researcher's page")
+            LOG.warning("failed login to the researcher's page")
             note = "Name or password is wrong."
             return page(request, "researcher/login", 403, title=title, note=note)
         await self._store.audit(name, "logged in")
@@ -258,7 +258,7 @@ class ResearcherServer:
         """Change the state of the study, if it is still what the researcher saw."""
         state = (await self._store.study()).state
         if before is not None and state != before:
-            return self._message(request, 409, "Not changed", f"The study is {state} by now.")
+            return self._message(request, 409, "Not changed", f"The study is now {state}.")
         await self._store.set_state(after, who.name)
         LOG.info("the study is %s", after)
         return RedirectResponse("/", 303)
@@ -267,10 +267,10 @@ class ResearcherServer:
         form = await sent_form(request)
         numbers = [form.get(name, "") for name in ("cell", "wanted")]
         if not all(text.isascii() and text.isdecimal() and len(text) < 10 for text in numbers):
-            return self._message(request, 400, "Not changed", "A quota is a number of people from 0 on.")
+            return self._message(request, 400, "Not changed", "The quota must be a whole number from 0.")
         cell, wanted = map(int, numbers)
         if cell >= len(self._study.cells) or wanted > MAX_WANTED:
-            return self._message(request, 400, "Not changed", "There is no such cell, or that are too many.")
+            return self._message(request, 400, "Not changed", "The cell does not exist, or the quota is too high.")
         await self._store.set_quota(cell, wanted, who.name)
         return RedirectResponse("/", 303)
 
@@ -296,7 +296,7 @@ class ResearcherServer:
     async def _out_of_order(self, request: Request, error: Exception) -> Response:
         LOG.error("%s", error)
         return self._message(
-            request, 503, "Not possible now", "The database says no; its words are in the log."
+            request, 503, "Database unavailable", "The request failed. The log has the reason."
         )
 
 

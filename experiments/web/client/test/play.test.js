@@ -286,8 +286,8 @@ describe("a lost link", () => {
 });
 
 test.each([
-  [{ type: "occupied" }, "This session is open in another page", "Continue here"],
-  [{ type: "replaced" }, "This session continues in another page", "Continue here"],
+  [{ type: "occupied" }, "This session is open on another page", "Continue here"],
+  [{ type: "replaced" }, "This session continues on another page", "Continue here"],
   [{ type: "error", code: "idle", message: "" }, "You were away for a long time", "Continue"],
   [{ type: "state", phase: "failed", reason: "The disk is full", input: 0 }, "Something went wrong", "Try again"],
   [{ type: "state", phase: "paused", reason: "taken over", input: 0 }, "Paused", "Continue"],

@@ -32,7 +32,7 @@ test("the state and the view of the person are shown, also what comes while the 
   say({ type: "state", phase: "running", reason: "", input: 0 });
   say(SCENE);
   say(SNAPSHOT);
-  expect([part("play").dataset.phase, part("note").textContent, part("world").hidden]).toEqual(["running", "p00001: the house is being loaded", false]);
+  expect([part("play").dataset.phase, part("note").textContent, part("world").hidden]).toEqual(["running", "p00001: loading the apartment", false]);
   await later();
   expect(part("note").textContent).toBe("p00001");
   expect(world.setObjects.mock.lastCall).toEqual([{ cup: { model: "mug", pose: SNAPSHOT.objects.cup } }]);
@@ -43,7 +43,7 @@ test("the state and the view of the person are shown, also what comes while the 
 test("a session that stops is looked for again, and nothing is ever sent", async () => {
   const socket = FakeSocket.latest();
   socket.onclose({ code: 1006 });
-  expect(part("note").textContent).toContain("looks again");
+  expect(part("note").textContent).toContain("reconnects");
   await later(3000);
   expect(FakeSocket.latest()).not.toBe(socket);
   say({ type: "state", phase: "paused", reason: "asked", input: 0 });

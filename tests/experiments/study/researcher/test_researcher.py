@@ -70,7 +70,7 @@ def test_who_is_logged_in_sees_the_study_and_who_is_not_sees_the_login(site):
 def test_participants_are_listed_a_page_at_a_time_and_found_by_name_status_or_phase(site, monkeypatch):
     monkeypatch.setattr("experiments.study.researcher.app.PAGE_SIZE", 2)
     owner = site.logged_in("owner")
-    assert "Nobody has come yet" in owner.get("/people").text
+    assert "No participants yet" in owner.get("/people").text
     for _ in range(5):
         site.begin(site.client())
     site.ask(site.store.withdraw(4, delete=False))

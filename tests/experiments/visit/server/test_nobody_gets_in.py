@@ -327,7 +327,7 @@ def test_who_knows_the_platforms_id_of_somebody_does_not_get_their_visit(tmp_pat
                 ids = {"params" if method == "GET" else "data": {**other, **wrong}}
                 answer = client.request(method, path, **ids)
                 assert answer.status_code == 403 and "location" not in answer.headers
-                assert token not in answer.text and "Did you begin in another browser?" in answer.text
+                assert token not in answer.text and "Did you start in another browser?" in answer.text
         assert site.begin(client, **other, token=token) == link
 
 

@@ -489,7 +489,7 @@ def test_questions_about_the_story_are_answered_as_often_as_needed(tmp_path, poo
         for wrong in ({}, {"question_1": "two"}, {"question_1": "one", "question_2": "a"}):
             page = send(client, link, "comprehension", **wrong)
             assert page.status_code == 200 and 'role="alert"' in page.text
-        assert "Not all answers are right" in page.text
+        assert "Some answers are wrong" in page.text
         assert send(client, link, "comprehension", question_1="two", question_2="a").status_code == 303
         assert 'data-trial="training"' in client.get(link).text
 
@@ -520,7 +520,7 @@ def test_film_and_training_last_their_time(tmp_path, pool):
 def test_a_participant_may_leave_and_have_everything_deleted(client, tmp_path):
     link = new_visit(client)
     play_trial(client, link, "training")
-    assert "Leave, and delete what I did so far" in client.get(f"{link}/withdrawal").text
+    assert "Leave and delete my data" in client.get(f"{link}/withdrawal").text
     client.post(f"{link}/withdrawal", headers={"Origin": ORIGIN}, data={"data": "delete"})
     assert "You have left" in client.get(link).text and not list(tmp_path.glob("*/visit.json"))
 

@@ -129,7 +129,7 @@ def test_three_wrong_comprehension_checks_end_the_study(client, study):
     go_to(client, link, study, "comprehension")
     wrong = {**right_answers(study), "hands": "One"}
     for _ in range(2):
-        assert "Not all answers are right" in post(client, link, phase="comprehension", **wrong).text
+        assert "Some answers are wrong" in post(client, link, phase="comprehension", **wrong).text
         assert phase(client, link) == "comprehension"
     post(client, link, phase="comprehension", **wrong)
     assert phase(client, link) is None

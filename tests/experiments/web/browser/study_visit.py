@@ -61,7 +61,7 @@ class StudyVisit:
         self._answer_questions()
         self._play()
         self._answer_survey()
-        self._heading("What this study is about")
+        self._heading("About this study")
         self._page.click("form .button")
         self._heading("Thank you")
 

@@ -68,7 +68,7 @@ def visit(browser, server, look):
 
 def begin(page, check=lambda: None):
     """Leave the first pages by Enter on their buttons, which have the focus as soon as the page was drawn."""
-    page.locator("button:focus", has_text="Begin").wait_for()
+    page.locator("button:focus", has_text="Start").wait_for()
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="Your task").wait_for()
     page.locator("button:focus", has_text="Continue").wait_for()
@@ -90,14 +90,14 @@ def elsewhere(browser, server, page, look):
         assert "You are number 1 in the queue" in waiting.locator("#queue").inner_text()
     second = page.context.new_page()
     second.goto(page.url)
-    second.get_by_role("heading", name="This session is open in another page").wait_for()
+    second.get_by_role("heading", name="This session is open on another page").wait_for()
     found += violations(second)
     second.keyboard.press("Enter")
-    page.get_by_role("heading", name="This session continues in another page").wait_for()
+    page.get_by_role("heading", name="This session continues on another page").wait_for()
     found += violations(page)
     second.get_by_role("heading", name="Paused").wait_for()
     page.keyboard.press("Enter")  # this one is loaded again, and asks in its turn
-    page.get_by_role("heading", name="This session is open in another page").wait_for()
+    page.get_by_role("heading", name="This session is open on another page").wait_for()
     second.close()
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="Paused").wait_for()

@@ -45,7 +45,7 @@ def test_a_trial_in_german_has_no_english_word_and_fits_all_windows(german, chro
     page = chromium.new_page()
     page.set_default_timeout(1000.0 * PATIENCE)
     page.goto(german)
-    page.get_by_role("button", name="Beginnen").press("Enter")
+    page.get_by_role("button", name="Starten").press("Enter")
     page.get_by_role("heading", name="Übung").wait_for()
     assert page.evaluate("document.documentElement.lang") == "de"
     page.get_by_role("button", name="Übung starten").press("Enter")

@@ -65,13 +65,13 @@ def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look, monkeypatch):
     log_in(page, site)
     found += violations(page)
     site.ask(site.store.ledger.decide(1, "reward", 150, "USD", "p00001-reward"))
-    page.get_by_label("people wanted").fill("7")
+    page.get_by_label("participants wanted").fill("7")
     page.get_by_role("button", name="Change").press("Enter")
     page.get_by_role("cell", name="7", exact=True).wait_for()
     for button in ("Pause", "Continue", "Stop the study", "Reopen"):
         page.get_by_role("button", name=button, exact=True).press("Enter")
         found += violations(page)
-    for name in ("People", "Audit log"):
+    for name in ("Participants", "Audit log"):
         page.get_by_role("link", name=name).press("Enter")
         page.get_by_role("heading", name=name).wait_for()
         found += violations(page)
@@ -81,7 +81,7 @@ def test_no_page_breaks_a_rule_of_axe_core(site, chromium, look, monkeypatch):
         page.goto(f"{site.researcher_url}people/1")
         found += violations(page)
         page.get_by_role("link", name="Watch").press("Enter")
-        page.get_by_text("reads the instructions").wait_for()
+        page.get_by_text("reading the instructions").wait_for()
         found += violations(page)
         socket.send('{"type": "run", "until": null}')
         page.locator("[data-phase=running]").wait_for()
@@ -106,7 +106,7 @@ def test_numbers_change_by_themselves_and_a_session_is_watched(site, request, br
     page.wait_for(counted)
     with reading(site, link):
         page.goto(f"{site.researcher_url}people/1/watch")
-        page.wait_for("document.body.textContent.includes('reads the instructions')")
+        page.wait_for("document.body.textContent.includes('reading the instructions')")
     assert page.faults == []
 
 
@@ -118,7 +118,7 @@ def test_all_works_without_scripts(site, chromium, monkeypatch):
     log_in(plain, site)
     plain.get_by_role("button", name="Pause").press("Enter")
     plain.get_by_text("The study is paused").wait_for()
-    plain.get_by_role("link", name="People").press("Enter")
+    plain.get_by_role("link", name="Participants").press("Enter")
     assert plain.get_by_role("link", name="p00001").is_visible()
     plain.get_by_role("link", name="Next page").press("Enter")
     plain.get_by_role("link", name="p00002").wait_for()

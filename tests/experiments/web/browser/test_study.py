@@ -67,7 +67,7 @@ def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
 
     page.goto(url)
     found += violations(page)
-    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("button", name="Start").press("Enter")
     page.get_by_role("heading", name="Your consent").wait_for()
     found += violations(page)
     send()
@@ -94,7 +94,7 @@ def test_no_page_breaks_a_rule_of_axe_core(served, chromium, look):
     page.get_by_role("heading", name="Leave the study?").wait_for()
     found += violations(page)
     page.get_by_role("link", name="Stay").press("Enter")
-    page.get_by_role("heading", name="What this study is about").wait_for()
+    page.get_by_role("heading", name="About this study").wait_for()
     send()
     assert page.get_by_text("DONE").is_visible()
     assert found == []
@@ -112,13 +112,13 @@ def test_pages_of_a_task_in_a_frame_break_no_rule_of_axe_core(served, chromium):
         assert page.get_by_text("This is a preview").is_visible()
         found += violations(page)
         page.goto(f"{url}?assignmentId=3ASSIGNMENT&workerId={worker}&{TASK}")
-        page.get_by_role("button", name="Begin").press("Enter")
+        page.get_by_role("button", name="Start").press("Enter")
         page.get_by_role("heading", name="Your consent").wait_for()
         for status, said in ends:
             at_phase(folder, "completion", status)
             page.reload()
             assert said in page.get_by_role("heading").inner_text()
-            assert page.get_by_text("give the task back").is_visible() is (status != "finished")
+            assert page.get_by_text("return the task").is_visible() is (status != "finished")
             found += violations(page)
         form = page.locator("form").get_attribute("action")
         assert form == "https://worker.example.org/mturk/externalSubmit"
@@ -132,7 +132,7 @@ def test_in_a_lab_the_next_person_finds_nothing_of_the_last(served, chromium):
     page.set_default_timeout(1000.0 * PATIENCE)
     kept = "JSON.stringify([{...localStorage}, {...sessionStorage}, document.cookie])"
     page.goto(url)
-    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("button", name="Start").press("Enter")
     page.get_by_role("heading", name="Your consent").wait_for()
     link = page.url
     page.evaluate(
@@ -140,17 +140,17 @@ def test_in_a_lab_the_next_person_finds_nothing_of_the_last(served, chromium):
     )
     at_phase(folder, "completion", "finished")
     page.reload()
-    page.get_by_role("link", name="Next participant").wait_for()
+    page.get_by_role("link", name="Start with the next participant").wait_for()
     assert violations(page) == []
-    page.get_by_role("link", name="Next participant").press("Enter")
+    page.get_by_role("link", name="Start with the next participant").press("Enter")
     page.get_by_role("heading", name="A small study").wait_for()
     for leave in (lambda: None, page.reload):
         leave()
         assert page.get_by_role("link").count() == 0 and page.evaluate(kept) == '[{},{},""]'
     page.go_back()
-    page.get_by_role("link", name="Next participant").wait_for()
+    page.get_by_role("link", name="Start with the next participant").wait_for()
     assert page.locator("form").count() == 0 and page.evaluate(kept) == '[{},{},""]'
-    page.get_by_role("link", name="Next participant").press("Enter")
-    page.get_by_role("button", name="Begin").press("Enter")
+    page.get_by_role("link", name="Start with the next participant").press("Enter")
+    page.get_by_role("button", name="Start").press("Enter")
     page.get_by_role("heading", name="Your consent").wait_for()
     assert page.url != link

@@ -1,4 +1,4 @@
-// Shows what a person sees, while they play. Nothing is sent: a server closes the connection of who says anything.
+// Shows what a participant sees during a trial. This page sends nothing: the server closes a connection that does.
 
 /** @import { Frame, ToBrowser } from "../protocol.js" */
 
@@ -8,8 +8,8 @@ import { DrawnView } from "../drawn_view.js";
 import { Hud } from "../hud.js";
 import { Screen } from "../screen.js";
 
-const AGAIN = 2000; // ms until the next attempt
-const STATES = { loading: "loading", ready: "reads the instructions", running: "", paused: "paused", over: "the trial is over", failed: "the session has failed" };
+const AGAIN = 2000; // delay before reconnecting, in ms
+const STATES = { loading: "loading", ready: "reading the instructions", running: "", paused: "paused", over: "the trial is over", failed: "the session has failed" };
 
 const page = byId("play", HTMLElement);
 const note = byId("note", HTMLElement);
@@ -17,18 +17,18 @@ const [name = ""] = (note.textContent ?? "").split(":");
 const hud = new Hud(() => "");
 const screen = new Screen(byId("screen", HTMLCanvasElement), (frame) => hud.reached(frame.step), () => say("this browser cannot decode the frames"));
 const drawn = world();
-let loaded = Promise.resolve(); // once the house is there
-let state = ""; // of the session, in words
+let loaded = Promise.resolve(); // resolved once the house is loaded
+let state = ""; // the session's state as shown
 
 /** @param {string} text */
 function say(text) {
   note.textContent = text ? `${name}: ${text}` : name;
 }
 
-/** The view that this browser draws, if it can. */
+/** The view drawn by this browser, or null without WebGL 2. */
 function world() {
   try {
-    return new DrawnView(byId("world", HTMLCanvasElement), () => {}, () => say("this browser has stopped drawing: reload the page"));
+    return new DrawnView(byId("world", HTMLCanvasElement), () => {}, () => say("this browser stopped drawing. Reload the page"));
   } catch {
     return null;
   }
@@ -47,12 +47,12 @@ function take(message) {
       screen.show(message);
       break;
     case "scene":
-      if (!drawn) return say("this browser cannot draw what the person's browser draws");
+      if (!drawn) return say("this browser cannot draw the apartment");
       byId("world", HTMLElement).hidden = false;
-      say("the house is being loaded");
-      loaded = drawn.load(message).then(() => say(state), () => say("the house cannot be loaded"));
+      say("loading the apartment");
+      loaded = drawn.load(message).then(() => say(state), () => say("the apartment cannot be loaded"));
       break;
-    case "snapshot": // those that come while the house is loaded are taken in order after that
+    case "snapshot": // snapshots that arrive while the house loads are handled in order afterwards
       loaded.then(() => drawn?.take(message, performance.now()));
       hud.reached(message.step);
       break;
@@ -77,18 +77,18 @@ function open() {
   socket.onmessage = ({ data }) => take(typeof data === "string" ? JSON.parse(data) : readFrame(data));
   socket.onclose = () => {
     page.dataset.phase = "loading";
-    say("is not playing on this server now; this page looks again by itself");
+    say("not playing on this server. This page reconnects automatically");
     screen.reset();
     setTimeout(open, AGAIN);
   };
 }
 
 if (drawn) {
-  new ResizeObserver(() => drawn.world.resize()).observe(byId("world", HTMLElement)); // it is hidden until it is drawn
+  new ResizeObserver(() => drawn.world.resize()).observe(byId("world", HTMLElement)); // the canvas is hidden before the first scene
   drawn.world.onFrame((now) => {
     const seen = drawn.draw(now);
     if (seen) hud.moveReach(seen.reach);
   });
 }
-byId("list-title", HTMLElement).textContent = "Not begun yet";
+byId("list-title", HTMLElement).textContent = "Not started yet";
 open();
