@@ -1,1 +1,1 @@
-"""What surrounds the visits of a study: its file, recruitment, payments, data, rehearsal and the researcher's page."""
+"""Studies with people: study file, recruitment, payments, data, rehearsal and the researcher's page."""

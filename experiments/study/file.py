@@ -1,4 +1,4 @@
-"""The file of a study with people: a design (docs/batches.md) with a table `[study]`. Errors name its lines."""
+"""The study file: a design (docs/batches.md) with a table `[study]`. Errors name the line."""
 
 import hashlib
 import itertools
@@ -28,9 +28,11 @@ PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
-Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]  # scheme, host, port
+Site = Annotated[
+    str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")
+]  # origin: scheme, host and port
 
-HERE = ("localhost", "127.0.0.1", "::1")  # what is sent there stays on this machine
+HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be addressed without TLS
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -38,27 +40,27 @@ class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Pay(_Table, frozen=True):
-    """What people receive; amounts in units of the currency."""
+    """Payment of participants, in units of the currency."""
 
     currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
     reward: Money = 0.0  # for the whole study
-    screen_out: Money = 0.0  # for who is screened out
-    bonus_for_all: Money = 0.0  # for putting everything away
-    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # of the platform, a share of the pay
-    wage: Money = 0.0  # an hour, below which `mjsim study check` calls the pay too low
-    partial: bool = False  # whether who leaves, or never returns, once the task has begun receives a share
+    screen_out: Money = 0.0  # for screened-out participants
+    bonus_for_all: Money = 0.0  # for putting all objects away
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee, as a share of the pay
+    wage: Money = 0.0  # hourly wage below which `mjsim study check` reports the pay as too low
+    partial: bool = False  # pay a share to participants who leave after the task has started
 
 
 class Recruitment(_Table, frozen=True):
-    """Where people come from, and what their platform expects back."""
+    """Recruitment platform, with the codes and ids that it expects."""
 
     platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
-    completed: Code = ""  # codes of the platform
+    completed: Code = ""  # completion codes of the platform
     screened_out: Code = ""
     no_consent: Code = ""
-    study_id: Code = ""  # the platform's own; people of another one are refused
-    sites: tuple[Site, ...] = ()  # of the platform's pages; those of an ExternalQuestion embed it
-    api_url: str = ""  # of the platform's interface for programs
+    study_id: Code = ""  # the platform's study id; participants of its other studies are refused
+    sites: tuple[Site, ...] = ()  # origins of the platform's pages; an ExternalQuestion is embedded in them
+    api_url: str = ""  # the platform's API, if not the default
 
     def __post_init__(self) -> None:
         url = urlsplit(self.api_url)
@@ -110,32 +112,32 @@ class Settings(_Table, frozen=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the design: the trial of each place in it."""
+    """A cell of the design, with one trial per place."""
 
     trials: Sequence[TrialConfig]
 
     @property
     def label(self) -> str:
-        """Its condition, such as `optimal, 6 objects`."""
+        """Condition and number of objects, such as `optimal, 6 objects`."""
         return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
 
     def trial(self, place: int) -> TrialConfig:
-        """The trial of a place, counted from 0; places beyond the last take the trials again."""
+        """Return the trial of a place, counted from 0. Places beyond the last repeat the trials."""
         return self.trials[place % len(self.trials)]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study with people."""
+    """A study file that was read and checked, with its texts."""
 
     path: Path
-    sha256: str  # of the file
+    sha256: str  # hash of the file
     settings: Settings
     cells: Sequence[Cell]
     texts: Texts
     story: str
     exclusions: Exclusions | None
-    rehearsal: bool = False  # whether all its people are simulated
+    rehearsal: bool = False  # True if all participants are simulated
 
     @property
     def people(self) -> int:
@@ -143,10 +145,10 @@ class Study:
 
 
 def read_people_study(path: Path) -> Study:
-    """Read the file of a study with people.
+    """Read a study file.
 
     Raises:
-        ConfigError: It cannot be read or used; the message names the file, the line and the value.
+        ConfigError: The file is missing or not valid. The message names the file, the line and the value.
     """
     design = read_design(path)
     content = read_bytes(path)
@@ -191,7 +193,7 @@ class _File(msgspec.Struct):
 
 
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
-    """The trial of a real person in place of a simulated one; `story` is read where the file names none."""
+    """Return a trial played by a person. `story` is used if the file names none."""
     before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
     settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
     if story is not None and trial.story is None:
@@ -221,7 +223,7 @@ _KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
 
 
 def at_line(path: Path, text: str, message: str) -> str:
-    """A message of msgspec about a value, with file and line where they can be told."""
+    """Prefix a msgspec error message with the file and, if found, the line of the value."""
     found = _PATH.search(message)
     wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
     if unknown := re.search(r"unknown field `([^`]+)`", message):
@@ -231,7 +233,7 @@ def at_line(path: Path, text: str, message: str) -> str:
 
 
 def line_of(text: str, wanted: str) -> int | None:
-    """The line of a key such as `study.pay.reward`, or of the innermost table around it that the file names."""
+    """Return the line of a key such as `study.pay.reward`, or else of its innermost table in the file."""
     table, best, depth = "", None, 0
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):

@@ -1,4 +1,4 @@
-"""The plan of the visits of a study."""
+"""The visit plan of a study."""
 
 import math
 from collections.abc import Mapping

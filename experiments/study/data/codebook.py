@@ -1,4 +1,4 @@
-"""What each column of an export means."""
+"""The codebook of an export: the meaning of each column."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -30,11 +30,10 @@ OWN = {
 
 @dataclass(frozen=True)
 class Variable:
-    """A column.
+    """A column of the codebook.
 
     Attributes:
-        description: What it means.
-        levels: Values by meaning, where there are few.
+        levels: Values with their meanings, for columns with few values.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The tidy table of a study with people: a row for each person, from the store and the runs."""
+"""The tidy table of a study with people: one row per participant, from the store and the runs."""
 
 import csv
 import hashlib
@@ -25,21 +25,21 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
-FREE = ("line", "text")  # kinds of items whose answers are written freely
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # how what a spreadsheet would compute begins
+FREE = ("line", "text")  # kinds of items with free-text answers
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # first characters of spreadsheet formulas
 Row = TypeVar("Row", Answer, PhaseRow)
 _NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Collected:
-    """What was found.
+    """Data of a study, ready to be written.
 
     Attributes:
-        rows: Of people whose task is over, with what they did and answered.
-        texts: What people wrote freely: person, item and text.
-        unfinished: How many people there are by status of those without a row.
-        unusable: Why a run of somebody cannot be used, by person.
+        rows: Participants who ended the task, with measures and answers.
+        texts: Free-text answers as participant, item and text.
+        unfinished: Number of participants without a row, by status.
+        unusable: Reasons why runs cannot be read, by participant.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -49,9 +49,9 @@ class Collected:
 
 
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
-    """The rows of all people of a study whose runs lie in `folder`; nobody's platform id is in them.
+    """Collect the rows of all participants of a study whose runs are in `folder`.
 
-    A person who wanted their data deleted is not in them either.
+    Platform ids are left out, and so are participants who asked for their data to be deleted.
     """
     people = [person for person in await store.people() if not person.delete_wanted]
     check_people(study, people)
@@ -79,15 +79,14 @@ async def collect(study: Study, store: Store, folder: Path) -> Collected:
 
 
 def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
-    """Group rows by person; they are in the order of people."""
     return {person: list(mine) for person, mine in groupby(rows, attrgetter("person_id"))}
 
 
 def check_people(study: Study, people: Sequence[Person]) -> None:
-    """Keep people and those of rehearsals apart.
+    """Check that real and simulated participants are not mixed.
 
     Raises:
-        RecordError: Somebody is simulated and the study is no rehearsal, or the other way round.
+        RecordError: A study has simulated participants, or a rehearsal has real ones.
     """
     simulated = sum(person.platform == REHEARSAL for person in people)
     if simulated and not study.rehearsal:
@@ -100,7 +99,7 @@ def check_people(study: Study, people: Sequence[Person]) -> None:
 
 
 def collect_visits(folder: Path) -> Collected:
-    """The rows of everybody whose task is over in a folder of `mjsim play`, or of several; nobody's link is in them."""
+    """Collect the finished tasks in one or several folders of `mjsim play`. Links are left out."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     under_way = 0
@@ -129,17 +128,17 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 
 
 def person_name(person: Person) -> str:
-    """The name of a person in tables: the number in the store."""
+    """Return the name of a participant in tables, such as `p00012`."""
     return f"p{person.id:05d}"
 
 
 def visit_name(folder: str) -> str:
-    """The name in tables of a visit without a store, whose folder's name is the hash of its link."""
+    """Return the name in tables of a visit without a store, from the name of its folder."""
     return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
 
 
 def person_number(name: str) -> int:
-    """The number in the store of a person with a name in tables; a ConfigError where that is none."""
+    """Return the number of a participant from a name such as `p00012`. Raises ConfigError for any other text."""
     found = _NAME.fullmatch(name)
     if found is None:
         raise ConfigError(f"{name!r} is no person; tables name people like p00012")
@@ -147,7 +146,7 @@ def person_number(name: str) -> int:
 
 
 def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula."""
+    """Escape a text that a spreadsheet would evaluate as a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
 
 
@@ -164,7 +163,11 @@ def _about(person: Person, trial: TrialRow, phases: Sequence[PhaseRow]) -> dict[
 
 
 def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]:
-    """Columns of final answers: `likert_NAME` of scales, `answer_NAME` of others; those of other phases by phase."""
+    """Return columns of final answers.
+
+    They are named `likert_NAME` for scales, `answer_NAME` for other survey items and `PHASE_NAME` for numbers of other
+    phases.
+    """
     given = {(answer.phase, answer.item): answer.value for answer in answers if answer.final}
     columns: dict[str, Any] = {}
     for item in items:
@@ -197,6 +200,6 @@ def _texts(
 
 
 def _complete(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Rows with the columns of all, in order of first appearance."""
+    """Give every row all columns, in order of first appearance."""
     columns = dict.fromkeys(name for row in rows for name in row)
     return [{name: row.get(name) for name in columns} for row in rows]

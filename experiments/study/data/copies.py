@@ -1,4 +1,4 @@
-"""Lists of what was written with a study's data, so that a person who is erased is erased there, too."""
+"""The list of copies made of a study's data, so that erasing a participant reaches them too."""
 
 from collections.abc import Collection
 from datetime import UTC, datetime
@@ -9,14 +9,14 @@ import msgspec
 
 from mjsim.support.files import write_text_atomically
 
-INDEX = "copies.jsonl"  # in the study's folder, and in its tables and exports for what was made of those
+INDEX = "copies.jsonl"  # in the study's folder; tables and exports have a list of their own
 
 DATABASES = ("backup", "database")
 Kind = Literal["backup", "database", "export", "table", "analysis", "film", "page", "metrics"]
 
 
 class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A copy: what it is, where it was written and when, and the part of the folder that it was made of."""
+    """A copy: its kind, path and time, and the part of the study's folder that it was made from."""
 
     kind: Kind
     path: str
@@ -33,7 +33,7 @@ def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
 
 
 def note_derived(source: Path, kind: Kind, path: Path) -> None:
-    """Record what is made of a run or a table, if it is in a folder that lists its copies."""
+    """Record a file made from a run or table if its folder, or a parent of it, has a list of copies."""
     source = source.absolute()
     for folder in (source, *source.parents):
         if (folder / INDEX).is_file():
@@ -41,7 +41,7 @@ def note_derived(source: Path, kind: Kind, path: Path) -> None:
 
 
 def copies(folder: Path) -> list[Copy]:
-    """All copies that were made, each path once."""
+    """Return all recorded copies, each path once."""
     path = folder / INDEX
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = [msgspec.json.decode(line, type=Copy) for line in lines if line.endswith(b"}")]
@@ -49,7 +49,7 @@ def copies(folder: Path) -> list[Copy]:
 
 
 def forget_copies(folder: Path, paths: Collection[str]) -> None:
-    """Remove copies that were deleted from the list."""
+    """Remove deleted copies from the list."""
     if not paths:
         return
     left = [copy for copy in copies(folder) if copy.path not in paths]

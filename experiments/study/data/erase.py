@@ -1,4 +1,4 @@
-"""Deleting a person from a study: copies and files first, then the rows that name them."""
+"""Erasing a participant from a study: first copies and files, then the database rows."""
 
 import asyncio
 import csv
@@ -18,24 +18,24 @@ from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.store import Person, Store, change_database
 from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
-LEFTOVER_S = 3600.0  # for which unfinished work may be that of a command on another machine
+LEFTOVER_S = 3600.0  # age from which temporary files are considered abandoned, in seconds
 
 
 async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
-    """Delete a person whose runs lie in the study's `folder`, also from backups, tables and exports that it knows of.
+    """Erase a participant from the study, and from its listed backups, tables and exports.
 
     Args:
-        store: The store.
-        folder: Folder of the study.
-        name: Name of the person in tables, such as `p00012`.
+        store: Store of the study.
+        folder: Folder of the study, with the runs.
+        name: Name of the participant in tables, such as `p00012`.
         who: Name of the researcher, for the audit log.
 
     Returns:
-        A line for each copy that held the person, or that is no longer where it was written.
+        One line per copy that was changed or is missing.
 
     Raises:
-        ConfigError: That is no name of a person.
-        StoreError: There is no such person, or the person is owed something, or a copy cannot be changed.
+        ConfigError: `name` is not a participant's name.
+        StoreError: There is no such participant, a payment is still owed, or a copy cannot be changed.
         OSError: A file cannot be changed.
     """
     person = await store.person(person_number(name))
@@ -56,10 +56,8 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
 
 
 async def _erase_from_copies(store: Store, folder: Path, person: Person, who: str) -> list[str]:
-    """Delete a person from the copies that the study lists. Return a line for each that was changed or is missing."""
-
     async def gone(other: Store) -> bool:
-        # After an older backup was restored, the same number may be that of another person.
+        # After an older backup is restored, the number may belong to another participant.
         same = {one.id for one in await other.people() if one.created == person.created} & {person.id}
         for number in same:
             await other.erase(number, who, unpaid=True)
@@ -73,7 +71,7 @@ async def _erase_from_copies(store: Store, folder: Path, person: Person, who: st
 async def change_databases(
     store: Store, folder: Path, work: Callable[[Store], Awaitable[bool]], name: str
 ) -> list[str]:
-    """Change the backups and restored databases of a study. Return a line for each that was changed or is missing."""
+    """Change the listed backups and restored databases of a study. Return one line per changed or missing copy."""
     study, told = await store.study(), []
     for copy in copies(folder):
         path = Path(copy.path)
@@ -86,9 +84,9 @@ async def change_databases(
 
 
 def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
-    """Take a person, by all of their names, out of the files that a folder lists. Return a line for each of them."""
+    """Remove a participant, under all their names, from the listed files of a folder. Return one line per file."""
     told, deleted, listed = list[str](), set[str](), copies(folder)
-    if (usual := folder / ANALYSIS).is_dir():  # which earlier versions did not list
+    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not list it
         listed.append(Copy("analysis", str(usual), ""))
     for place in {folder, *(Path(copy.path).parent for copy in listed)}:
         for left in place.glob(f"{WORK}*"):
@@ -126,7 +124,7 @@ def _shown(copy: Copy) -> str:
 
 
 def _remove_from_tables(folder: Path, names: Sequence[str]) -> bool:
-    """Take a person out of the tables and runs of an export or a table; whether the person was in it."""
+    """Remove a participant from the tables and runs of a folder. Return True if any were found."""
     found = False
     if (parquet := folder / f"{NAME}.parquet").is_file():
         rows = read_rows(parquet)

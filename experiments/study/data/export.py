@@ -1,4 +1,4 @@
-"""The export of a study: tidy tables, runs and a codebook in a folder that follows Psych-DS (psych-ds.github.io)."""
+"""The export of a study: tables, runs and a codebook in a folder that follows Psych-DS (psych-ds.github.io)."""
 
 import csv
 import io
@@ -27,12 +27,12 @@ Table = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class Exported:
-    """What an export holds.
+    """Summary of an export.
 
     Attributes:
-        people: In its main table.
-        runs: Run directories.
-        collected: The main table, with what could not be used.
+        people: Number of participants in the main table.
+        runs: Number of run directories.
+        collected: Main table, with the reasons why runs were left out.
     """
 
     people: int
@@ -41,20 +41,20 @@ class Exported:
 
 
 async def export(study: Study, store: Store, folder: Path, out: Path, *, replace: bool = False) -> Exported:
-    """Write an export to `out`, whole or not at all.
+    """Write an export to `out` atomically.
 
-    People are numbers in it. Ids of platforms, links, their hashes and addresses are not in it, nor anybody who did
-    not agree or wanted the data deleted.
+    Participants are numbered. Platform ids, links, their hashes and addresses are left out, and so are participants who
+    did not consent or asked for their data to be deleted.
 
     Args:
         study: The study.
-        store: Its store.
-        folder: Of the study, with the runs.
-        out: Folder to make.
-        replace: Whether an earlier export may be replaced.
+        store: Store of the study.
+        folder: Folder of the study, with the runs.
+        out: Folder to create.
+        replace: True if an earlier export may be replaced.
 
     Raises:
-        RecordError: Something is in the way, or nobody has finished the task.
+        RecordError: `out` exists and cannot be replaced, or no participant has finished the task.
     """
     check_export(out, replace=replace)
     found = await collect(study, store, folder)
@@ -88,7 +88,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
 
 
 def check_export(out: Path, *, replace: bool) -> None:
-    """Raise a RecordError if something is in the way of an export."""
+    """Raise RecordError if an export cannot be written to `out`."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     if not (out / DESCRIPTION).is_file():
@@ -122,7 +122,7 @@ async def _phases(store: Store, people: Mapping[int, Person]) -> Table:
 
 
 def _answers(study: Study, answers: Iterable[Answer]) -> Iterable[dict[str, Any]]:
-    """Answers to what was asked, without texts; what pages send besides is left out, but for numbers."""
+    """Yield the rows of answers. Free texts are left out, and so are other values of pages unless they are numbers."""
     kinds = {(name, item.name): item.kind for name, section in study.texts.items() for item in section.items}
     for answer in answers:
         kind, value = kinds.get((answer.phase, answer.item)), answer.value
@@ -148,7 +148,7 @@ def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
 
 
 def csv_text(table: Table) -> str:
-    """A table as CSV that no spreadsheet computes anything of."""
+    """Return a table as CSV with formulas escaped."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""Deleting by date who people are: `keep_days` of the study file."""
+"""Deletion of identifying data by date (`keep_days` of the study file)."""
 
 import asyncio
 import datetime
@@ -15,18 +15,18 @@ from experiments.study.data.erase import change_databases, erase, remove_from_fi
 from experiments.visit.store import Person, Store, utc_now
 
 LOG = logging.getLogger("mjsim.study")
-WHO = "keep_days"  # in the audit log
-DAY = 86400.0  # s
+WHO = "keep_days"  # author in the audit log
+DAY = 86400.0  # seconds
 
 
 @dataclass(frozen=True)
 class Retained:
-    """What was deleted.
+    """Names of the participants whose data were deleted or kept.
 
     Attributes:
-        forgotten: People of whom nobody can tell any more who they are.
-        erased: People who wanted their data deleted, and of whom nothing is left.
-        unpaid: People who are kept until they are paid.
+        forgotten: No longer identifiable.
+        erased: Deleted completely, as they had asked.
+        unpaid: Kept until they are paid.
     """
 
     forgotten: tuple[str, ...]
@@ -37,17 +37,17 @@ class Retained:
 async def forget_old(
     store: Store, visits: Path, keep_days: int, *, dry: bool = False, now: datetime.datetime | None = None
 ) -> Retained:
-    """Delete who people are `keep_days` after their last sign: ids of platforms, keys and links.
+    """Delete platform ids, keys and links of participants `keep_days` after their last activity.
 
-    People who wanted their data deleted are erased; of the others, what they did and answered stays under their
-    number. Who is owed a payment is kept until it is made. Backups that the study knows of are written anew.
+    Participants who asked for deletion are erased. Measures and answers of the others stay under their number.
+    Participants with an unpaid payment are skipped. Listed backups are changed, too.
 
     Args:
-        store: The store.
-        visits: The folder of visits in the study's folder.
-        keep_days: Days.
-        dry: Only say what would be deleted.
-        now: The time, with its zone.
+        store: Store of the study.
+        visits: Folder of visits in the study's folder.
+        keep_days: Days since the last activity.
+        dry: Only report what would be deleted.
+        now: Current time, with a timezone.
     """
     before = (now or utc_now()) - datetime.timedelta(days=keep_days)
     owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
@@ -55,7 +55,7 @@ async def forget_old(
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
     played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
-    # People whose runs are on another host are forgotten there.
+    # Participants whose runs are on another host are forgotten there.
     places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
     kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
@@ -71,19 +71,19 @@ async def forget_old(
 
 
 async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
-    """Do so once a day, for as long as the server runs."""
+    """Run `forget_old` once a day until cancelled."""
     while True:
         try:
             found = await forget_old(store, visits, keep_days)
             if found.forgotten or found.erased:
                 LOG.info("%d people forgotten, %d erased", len(found.forgotten), len(found.erased))
-        except (StoreError, OSError) as error:  # tomorrow it may work
+        except (StoreError, OSError) as error:  # try again tomorrow
             LOG.warning("%s", error)
         await asyncio.sleep(DAY)
 
 
 async def _names(store: Store, people: Sequence[Person]) -> dict[int, str]:
-    """New names for the hashes of links: with the study's secret, these follow from the platform's ids."""
+    """Return new folder names by participant. The hash of a link would allow a participant to be recognized."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
@@ -100,10 +100,10 @@ async def _forget(store: Store, visits: Path, people: Sequence[Person], names: M
         return bool(identified)
 
     await change_databases(store, visits.parent, gone, "them")
-    for person in people:  # what was made of a folder of visits names the hash of the link
+    for person in people:  # files made from a folder of visits contain the hash of the link
         traces = (person.token_hash, visit_name(person.token_hash))
         await asyncio.to_thread(remove_from_files, visits.parent, traces)
-    for person in people:  # done again after a stop: who is moved already is not there
+    for person in people:  # after an interruption, some folders are already renamed
         if (folder := visits / person.token_hash).is_dir():
             await asyncio.to_thread(folder.rename, visits / names[person.id])
     await store.forget(numbers, [names[number] for number in numbers], WHO)

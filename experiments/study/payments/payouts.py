@@ -1,4 +1,4 @@
-"""Letting a platform pay what the ledger says is owed: never twice, whatever fails in between."""
+"""Payouts: sends the owed payments to the recruitment platform, each at most once."""
 
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sent:
-    """What became of a payment that was to be sent.
+    """Outcome of sending a payment.
 
     Attributes:
-        key: Names the payment in the ledger.
-        state: `paid`, `refused` (it can be sent again), or `in doubt`: the platform may have paid.
-        text: The platform's own name for it, or why it was not paid.
-        stops: Whether the platform can pay nobody at the moment.
+        key: Key of the payment in the ledger.
+        state: `paid`, `refused` (it can be sent again), or `in doubt` (the platform may have paid).
+        text: The platform's reference, or the reason why it was not paid.
+        stops: True if the platform cannot pay anyone at the moment.
     """
 
     key: str
@@ -30,22 +30,22 @@ class Sent:
 
 
 class Sender:
-    """Sends what is owed.
+    """Sends owed payments.
 
-    That a payment is being sent is on the disk before the platform is asked. Where an attempt has no outcome, the
-    platform is asked what it knows, once it is sure to know, before anything is sent again.
+    Each attempt is recorded in the ledger before the platform is asked. If the outcome of an attempt is unknown, the
+    platform is asked for it before the payment is sent again, but not until its lists are up to date.
 
     Args:
-        study: Name of the study, which is part of the names of its payments on the platform.
-        store: Its store.
-        payer: The platform's client.
+        study: Name of the study, part of the payment keys on the platform.
+        store: Store of the study.
+        payer: Client of the platform.
     """
 
     def __init__(self, study: str, store: Store, payer: Payer) -> None:
         self._study, self._ledger, self._identity, self._payer = study, store.ledger, store.identity, payer
 
     async def send(self) -> AsyncIterator[Sent]:
-        """Let the platform pay all that is owed, and tell what became of each payment."""
+        """Send all owed payments, and yield the outcome of each."""
         for last in await self._ledger.owed(in_doubt_after=timedelta()):
             done = await self._settle(last) if last.in_doubt else None
             if done is None:
@@ -58,7 +58,7 @@ class Sender:
                 return
 
     async def _settle(self, last: PaymentEvent) -> Sent | None:
-        """Ask about an attempt without an outcome; None if the platform did certainly not pay."""
+        """Resolve an attempt without an outcome. Return None if the platform did not pay."""
         later = last.at + max(IN_DOUBT_AFTER, self._payer.listed_after)
         if later > await self._ledger.now():
             again = f"{later:%Y-%m-%d %H:%M} UTC"
@@ -77,7 +77,6 @@ class Sender:
         return Sent(last.key, "in doubt", "another process is sending it")
 
     async def _send(self, key: str, order: Order) -> Sent:
-        """Send a payment that the ledger has as being sent."""
         try:
             reference = await _understood(self._payer.send(order))
         except UnsureError as error:
@@ -94,7 +93,7 @@ class Sender:
         return Sent(key, "paid", reference)
 
     async def _made_before(self, order: Order) -> str | None:
-        """The platform's name for a payment that it refused because it was made before, such as by hand."""
+        """Return the platform's reference of a payment that it refused because it had been made, such as by hand."""
         try:
             return await _understood(self._payer.find(order))
         except (DeclinedError, UnsureError):
@@ -113,7 +112,7 @@ class Sender:
 
 
 async def _understood(answer: Awaitable[T]) -> T:
-    """What a platform answered; an UnsureError where that has another form than is known."""
+    """Await a platform's answer. Raises UnsureError if it has an unknown form."""
     try:
         return await answer
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -121,7 +120,7 @@ async def _understood(answer: Awaitable[T]) -> T:
 
 
 def _without_ids(text: str, order: Order) -> str:
-    """A text without the platform's ids of the person."""
+    """Remove the participant's platform ids from a text."""
     for value in filter(None, order.identity.values()):
         text = text.replace(value, "...")
     return text

@@ -1,4 +1,4 @@
-"""Paying people through their platform: what every platform's client is, and how platforms are asked."""
+"""The interface of recruitment platforms for payments, and their HTTP client."""
 
 import asyncio
 import os
@@ -12,36 +12,39 @@ import httpx
 from experiments.errors import ConfigError, ExperimentError
 from experiments.visit.store.values import PaymentKind
 
-TIMEOUT = 30.0  # s for an answer; well below the ten minutes after which the ledger lets others ask
-TRIES, LONGEST_WAIT = 4, 60.0  # of requests that come too fast; s
+TIMEOUT = 30.0  # for a response, in seconds; less than the ten minutes after which another process may retry
+TRIES, LONGEST_WAIT = (
+    4,
+    60.0,
+)  # retries of rate-limited requests, and the longest delay before one, in seconds
 LISTED_AFTER = timedelta(minutes=10)
-MAX_TEXT = 300  # characters of what a platform says
+MAX_TEXT = 300  # maximum length of a platform's message
 TOO_MANY = 429
 
 
 class DeclinedError(ExperimentError):
-    """The platform did certainly not do what it was asked for; the message says why."""
+    """The platform did not carry out the request. The message has its reason."""
 
 
 class StoppedError(DeclinedError):
-    """The platform can pay nobody at the moment: it is not reached, or does not accept the secret."""
+    """The platform cannot pay anyone: it is unreachable, or rejects the secret."""
 
 
 class UnsureError(ExperimentError):
-    """Nobody knows whether the platform did what it was asked for."""
+    """The outcome of the request is unknown."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """A payment as a platform is asked for it.
+    """A payment to be made by a platform.
 
     Attributes:
-        key: Names the payment; the same for all attempts, and another one for every other payment of any study.
+        key: Key of the payment, unique among all studies and the same for all attempts.
         attempt: Number of the attempt to send it.
-        cents: Hundredths of the currency; 0 for a rejection.
-        why: For the person, in words.
-        identity: What the platform said of the person on arrival.
-        others: Cents of bonuses that the person is known to have received already.
+        cents: Hundredths of the currency, 0 for a rejection.
+        why: Reason, shown to the participant.
+        identity: Ids that the platform sent when the participant arrived.
+        others: Bonuses that the participant has already received, in cents.
     """
 
     key: str
@@ -54,14 +57,14 @@ class Order:
 
     @property
     def amount(self) -> str:
-        """In units of the currency, such as `7.50`."""
+        """Amount in units of the currency, such as `7.50`."""
         return f"{self.cents // 100}.{self.cents % 100:02}"
 
     def id(self, name: str) -> str:
-        """One of the platform's ids of the person.
+        """Return one of the platform's ids of the participant.
 
         Raises:
-            DeclinedError: The person did not come from the platform, or the ids are erased.
+            DeclinedError: The participant did not come from the platform, or the ids are erased.
         """
         if not (value := self.identity.get(name, "")):
             raise DeclinedError(f"the person's {name} is not known; pay by hand")
@@ -69,34 +72,34 @@ class Order:
 
 
 class Payer(Protocol):
-    """A platform's client. The methods raise DeclinedError and UnsureError.
+    """Client of a recruitment platform. Its methods raise DeclinedError and UnsureError.
 
     Attributes:
-        listed_after: How long after the platform was asked its lists are sure to show what it did.
-        shortest_reason: Characters that it wants to read when somebody is rejected.
+        listed_after: Time after a request until the platform's lists are sure to show its outcome.
+        shortest_reason: Minimum length of the reason for a rejection, in characters.
     """
 
     listed_after: timedelta
     shortest_reason: int
 
     async def find(self, order: Order) -> str | None:
-        """The platform's own name for the payment if it has made it."""
+        """Return the platform's reference of the payment, or None if it has not made it."""
         ...
 
     async def send(self, order: Order) -> str:
-        """Let the platform pay; its own name for the payment. An UnsureError is raised where it may have paid."""
+        """Pay, and return the platform's reference. Raises UnsureError if the platform may have paid."""
         ...
 
     async def close(self) -> None: ...
 
 
 class Api:
-    """A platform's interface for programs, over HTTP.
+    """HTTP client of a platform's API.
 
     Args:
-        url: Where it is.
-        headers: Of all requests.
-        timeout: For a whole answer, s.
+        url: Base URL.
+        headers: Headers of all requests.
+        timeout: Timeout for a complete response, in seconds.
     """
 
     def __init__(self, url: str, headers: Mapping[str, str], timeout: float = TIMEOUT) -> None:
@@ -104,11 +107,11 @@ class Api:
         self._timeout = timeout
 
     async def ask(self, method: str, path: str, **request: Any) -> Any:
-        """The JSON of the answer, or None where it is empty.
+        """Send a request and return the JSON of the response, or None if it is empty.
 
         Raises:
-            DeclinedError: It was not done: the platform was not reached, or says no.
-            UnsureError: It may have been done: there is no answer, or none of a platform that is in order.
+            DeclinedError: The request was not carried out, because the platform was unreachable or refused it.
+            UnsureError: The request may have been carried out, because there is no valid response.
         """
         for attempt in range(1, TRIES + 1):
             answer = await self._answer(method, path, request)
@@ -124,7 +127,7 @@ class Api:
             raise DeclinedError(f"the platform says {said}")
         try:
             return answer.json() if answer.content else None
-        except ValueError as error:  # a proxy's page, perhaps
+        except ValueError as error:  # perhaps the page of a proxy
             raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:
@@ -141,7 +144,7 @@ class Api:
 
 
 def secret(name: str) -> str:
-    """A secret from the environment; a ConfigError names one that is missing or cannot be sent."""
+    """Return a secret from the environment. Raises ConfigError if it is missing or cannot be sent."""
     if not (value := os.environ.get(name, "").strip()):
         raise ConfigError(f"{name} is not set in the environment; it holds the platform's secret for paying")
     if not (value.isascii() and value.isprintable()):
@@ -150,5 +153,5 @@ def secret(name: str) -> str:
 
 
 def _pause(text: str) -> float:
-    """How long a platform wants one to wait, s."""
+    """Return the platform's requested delay, in seconds."""
     return min(LONGEST_WAIT, float(text)) if text.isdecimal() else 1.0

@@ -1,4 +1,4 @@
-"""Who of a study gets what, and why; the ledger of the store remembers it for ever."""
+"""Payment rules of a study. Decided payments are recorded in the ledger."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from experiments.visit.store.values import PaymentKind
 
 @dataclass(frozen=True)
 class Due:
-    """What somebody gets.
+    """A payment that follows from the rules.
 
     Attributes:
-        key: Names the payment in the ledger.
+        key: Key of the payment in the ledger.
         cents: Hundredths of the currency.
-        why: In words.
+        why: Reason, in words.
     """
 
     person_id: int
@@ -35,9 +35,9 @@ class Due:
 def due(
     study: Study, people: Sequence[Person], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """What people get by the rules of the study file, in order of arrival.
+    """Return the payments by the rules of the study file, in order of arrival.
 
-    Those still under way and those who were rejected get nothing.
+    Active and rejected participants get nothing.
     """
     pay, phases = study.settings.pay, study.settings.phases
     delivered = {row.person_id for row in trials if row.phase == TASK and row.ended == ALL_DELIVERED}
@@ -71,7 +71,7 @@ def due(
 
 
 def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[Due]:
-    """Payments that the ledger does not have yet; what it has stays, whatever the rules say now."""
+    """Return payments that are not in the ledger. Recorded payments stay, even if the rules have changed."""
     known = {event.key for event in history}
     once = {event.person_id for event in history if event.kind in ONCE}
     return [
@@ -80,7 +80,7 @@ def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[
 
 
 async def decide(store: Store, payments: Sequence[Due]) -> int:
-    """Note in the ledger what people get; how many payments are new. Doing it again changes nothing."""
+    """Record due payments in the ledger, and return the number of new ones. Repeated calls add nothing."""
     new = 0
     for payment in undecided(payments, await store.ledger.history()):
         person, kind, cents = payment.person_id, payment.kind, payment.cents
@@ -89,10 +89,10 @@ async def decide(store: Store, payments: Sequence[Due]) -> int:
 
 
 async def reject(store: Store, person: Person, currency: str, why: str) -> None:
-    """Note that somebody who finished is to be rejected, which the platform is told with the payments.
+    """Record the rejection of a finished participant. The platform receives it with the payments.
 
     Raises:
-        StoreError: The person did not finish, or is to be paid already.
+        StoreError: The participant did not finish, or a payment is already decided.
     """
     name = person_name(person)
     if person.status != "finished":

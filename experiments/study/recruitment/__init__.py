@@ -1,4 +1,4 @@
-"""Recruitment: one module for each platform, behind one interface for arrival and one for paying."""
+"""Recruitment platforms, one module each, with a common interface for arrival and one for payment."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from experiments.study.recruitment.external_question import ExternalQuestion, Ex
 from experiments.study.recruitment.prolific import Prolific, ProlificPayer
 from experiments.visit.recruiter import OpenLink, Recruiter
 
-# Settings without which people of a platform cannot be served.
+# Settings that each platform requires.
 NEEDED: Mapping[str, Sequence[str]] = {
     "prolific": ("completed", "screened_out", "no_consent"),
     "connect": ("completed",),
@@ -20,7 +20,7 @@ PAY_DOLLARS = ("connect", "external-question")
 
 
 def recruiter(settings: Recruitment) -> Recruiter:
-    """The platform of a study, from which people come and to which they return.
+    """Return the recruiter of a study's platform.
 
     Raises:
         ConfigError: A setting that the platform needs is missing.
@@ -40,10 +40,10 @@ def recruiter(settings: Recruitment) -> Recruiter:
 
 
 def payer(settings: Settings) -> Payer:
-    """The client through which the platform of a study pays.
+    """Return the client that pays through a study's platform.
 
     Raises:
-        ConfigError: The platform pays nobody, or not in the study's currency, or the environment lacks its secret.
+        ConfigError: The platform makes no payments, or not in this currency, or the environment lacks its secret.
     """
     recruitment, currency = settings.recruitment, settings.pay.currency
     if recruitment.platform in PAY_DOLLARS and currency != "USD":

@@ -1,8 +1,8 @@
-"""CloudResearch Connect: links with three parameters, the page of completion, and its API (v1).
+"""CloudResearch Connect: links with three parameters, the completion page, and its API (v1).
 
-The platform's researchers' help documents links and completion. Its API is documented for customers alone; what is
-used here is what public clients of it use: an approval, a rejection and a bonus for an assignment, and the list of a
-project's assignments. Amounts are US dollars.
+The platform's public help documents links and completion. The API is documented only for customers. This module uses
+the calls that public clients use: approve, reject and pay a bonus for an assignment, and list the assignments of a
+project. Amounts are US dollars.
 """
 
 import re
@@ -20,10 +20,10 @@ _ID = re.compile(r"[0-9A-Za-z-]{4,64}")
 
 
 class Connect:
-    """People of one project of the platform.
+    """Recruiter for one project of the platform.
 
     Args:
-        settings: With the code of the project, which is also part of the address of the page of completion.
+        settings: Settings with the project's completion code, which is part of the URL of the completion page.
     """
 
     platform = "connect"
@@ -36,7 +36,6 @@ class Connect:
         self._site = (*settings.sites, SITE)[0]
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
-        """Who comes, by the id of the person; another project's people are refused."""
         ids = {name: query.get(name, "") for name in self.parameters}
         if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
             return Refusal(f"{bad[0]} is missing or is no id")
@@ -45,14 +44,13 @@ class Connect:
         return Arrival(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
-        """The page of completion; who leaves otherwise returns the project there."""
         if how != "finished":
             return WayBack(gives_back=True)
         return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
 
 
 class ConnectPayer:
-    """Approves and rejects assignments, and pays bonuses; the platform pays the reward that its project promises."""
+    """Approves and rejects assignments, and pays bonuses. An approval makes the platform pay the project's reward."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -63,7 +61,7 @@ class ConnectPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """By the status of the assignment, or the sum of its bonuses."""
+        """Look the payment up by the assignment's status or the sum of its bonuses."""
         listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
         mine: Mapping[str, Any] = next(
             (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}
@@ -75,7 +73,7 @@ class ConnectPayer:
         return "listed with the assignment" if paid >= sum(order.others) + order.cents else None
 
     async def send(self, order: Order) -> str:
-        """Approve, reject or pay a bonus; the platform refuses a second request with the same token."""
+        """Approve, reject or pay a bonus. The platform refuses a second request with the same token."""
         action = {"reward": "approve", "rejection": "reject"}.get(order.kind, "bonus")
         row = {"id": order.id(ASSIGNMENT), "message": order.why}
         body: Mapping[str, Any] = {"participants": [row]}

@@ -1,8 +1,8 @@
-"""ExternalQuestion, as Mechanical Turk had it: the study in a frame of the platform's page, and a form at the end.
+"""ExternalQuestion, as on Mechanical Turk: the study runs in a frame of the platform's page and ends with a form.
 
-Mechanical Turk closed on 2026-09-30. A platform that does the same is named in the study file: `sites`, whose pages
-embed the study and take its form, and `api_url`, where the operations of Mechanical Turk's API (2017-01-17) are
-asked for as JSON, with a secret in `Authorization` in place of a signature.
+Mechanical Turk closed on 2026-09-30. Platforms with the same interface are configured in the study file: `sites`, whose
+pages embed the study and receive its form, and `api_url`. The client calls the operations of Mechanical Turk's API
+(2017-01-17) as JSON. A secret in `Authorization` replaces the signature.
 """
 
 import json
@@ -24,10 +24,10 @@ _ID = re.compile(r"[0-9A-Za-z]{4,64}")
 
 
 class ExternalQuestion:
-    """People of one task (HIT) of a platform that embeds the study.
+    """Recruiter for one task (HIT) of a platform that embeds the study.
 
     Args:
-        settings: With the sites of the platform.
+        settings: Settings with the platform's sites.
     """
 
     platform = "external-question"
@@ -38,7 +38,7 @@ class ExternalQuestion:
         self.embedded_by, self._task = settings.sites, settings.study_id
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
-        """Who comes; before the task is accepted, somebody who looks. A form is sent to no site but the platform's."""
+        """Return a Preview before the task is accepted. A form is only sent to one of the platform's sites."""
         if query.get(ASSIGNMENT) == PREVIEW:
             return Preview()
         ids = {name: query.get(name, "") for name in self.parameters}
@@ -52,7 +52,6 @@ class ExternalQuestion:
         return Arrival(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """The form that ends the task; who leaves otherwise returns the task on the platform's page."""
         site = identity.get(SITE, "")
         if how != "finished" or site not in self.embedded_by:
             return WayBack(gives_back=True)
@@ -60,7 +59,7 @@ class ExternalQuestion:
 
 
 class ExternalQuestionPayer:
-    """Approves and rejects assignments, and pays bonuses; the platform pays the reward that its task promises."""
+    """Approves and rejects assignments, and pays bonuses. An approval makes the platform pay the task's reward."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -76,7 +75,7 @@ class ExternalQuestionPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """By the status of the assignment, or the key in the reason of one of its bonuses."""
+        """Look the payment up by the assignment's status or the key in the reason of a bonus."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
         if done is not None:
@@ -87,7 +86,7 @@ class ExternalQuestionPayer:
         return "bonus" if named else None
 
     async def send(self, order: Order) -> str:
-        """Approve, reject or pay a bonus; the platform refuses a second bonus with the same token."""
+        """Approve, reject or pay a bonus. The platform refuses a second bonus with the same token."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         if order.kind in ("reward", "rejection"):
             operation = "ApproveAssignment" if order.kind == "reward" else "RejectAssignment"

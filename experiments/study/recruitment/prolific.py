@@ -1,4 +1,4 @@
-"""Prolific: links with three parameters, completion codes in the address to which people return, and its API (v1)."""
+"""Prolific: links with three parameters, completion codes in the return URL, and its API (v1)."""
 
 import re
 from collections.abc import Mapping
@@ -17,10 +17,10 @@ _ID = re.compile(r"[0-9A-Za-z]{8,64}")
 
 
 class Prolific:
-    """People of one study of the platform.
+    """Recruiter for one study of the platform.
 
     Args:
-        settings: With the codes of the platform's study.
+        settings: Settings with the completion codes of the platform's study.
     """
 
     platform = "prolific"
@@ -38,7 +38,6 @@ class Prolific:
         self._site = (*settings.sites, SITE)[0]
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
-        """Who comes, by the id of the person; another study's people are refused."""
         ids = {name: query.get(name, "") for name in self.parameters}
         if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
             return Refusal(f"{bad[0]} is missing or is no id")
@@ -47,7 +46,6 @@ class Prolific:
         return Arrival(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
-        """The platform's page with the code; who leaves otherwise returns the submission there."""
         code = self._codes.get(how, "")
         if not code:
             return WayBack(gives_back=True)
@@ -55,11 +53,11 @@ class Prolific:
 
 
 class ProlificPayer:
-    """Approves and rejects submissions, and pays bonuses; the platform pays the reward that its study promises.
+    """Approves and rejects submissions, and pays bonuses. An approval makes the platform pay the study's reward.
 
-    Who is screened out gets what the platform's study promises for it. A share is paid as a bonus, which people who
-    returned their submission can get, too. Paying a prepared bonus twice pays twice, and a payment takes minutes to be
-    listed, so the list of a submission is what tells whether one was made.
+    Screened-out participants get the amount that the platform's study sets for them. A partial payment is a bonus.
+    Bonuses can also be paid for a returned submission. Paying a prepared bonus twice pays twice, and a payment is
+    listed only after some minutes. So the submission's list of bonuses decides whether one was paid.
     """
 
     listed_after = timedelta(hours=1)
@@ -72,7 +70,7 @@ class ProlificPayer:
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
-        """By the status of the submission, or the amounts of its bonuses."""
+        """Look the payment up by the submission's status or the amounts of its bonuses."""
         submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
         done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
         if done is not None:
@@ -100,7 +98,7 @@ class ProlificPayer:
         await self._api.close()
 
     async def _prepare(self, order: Order) -> str:
-        """Set a bonus up, which pays nothing yet; its number."""
+        """Prepare a bonus, which does not pay it yet, and return its number."""
         row: Mapping[str, Any] = {
             "study_id": order.id(STUDY),
             "csv_bonuses": f"{order.id(SUBMISSION)},{order.amount}",

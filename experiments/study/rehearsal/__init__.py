@@ -1,1 +1,1 @@
-"""Rehearsals: simulated people go through a study's real server, before real people do."""
+"""Rehearsals: simulated participants on the study's real server."""

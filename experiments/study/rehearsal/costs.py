@@ -1,4 +1,4 @@
-"""What a study costs, how long it takes, and which effects it can find."""
+"""Cost and duration of a study, and the effects that it can detect."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,26 +20,28 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases.base import Phase
 
-CHOOSING = 2.65  # s to answer an item: think, point, click (Card, Moran and Newell, CACM 23, 1980)
-WRITING = 20.0  # s to answer an item freely, a guess
-PEOPLE = 2  # simulated in each cell
-GUEST = "guest"  # takes part where the file simulates nobody
+CHOOSING = (
+    2.65  # time to answer an item, in seconds: think, point, click (Card, Moran and Newell, CACM 23, 1980)
+)
+WRITING = 20.0  # time to write a free-text answer, in seconds (a guess)
+PEOPLE = 2  # number of simulated participants per cell
+GUEST = "guest"  # participant if the file names no simulated one
 
 
 @dataclass(frozen=True)
 class Played:
-    """How long simulated people play, s."""
+    """Mean durations of simulated trials, in seconds."""
 
     training: float
-    tasks: Mapping[str, float]  # means of cells
+    tasks: Mapping[str, float]  # by cell
 
 
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Played:
-    """Run trials of simulated people, whose runs are left in `folder`.
+    """Run trials of simulated participants, and leave their runs in `folder`.
 
     Args:
         study: The study.
-        folder: An empty one.
+        folder: An empty folder.
         on_trial: Called before each trial with its name.
     """
     trials = [_simulated(cell, study.path) for cell in study.cells]
@@ -59,7 +61,7 @@ def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Pla
 
 
 def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
-    """The first people of a cell as the file simulates them, quickly."""
+    """Return the first trials of a cell, with the file's simulated participants at the fastest settings."""
     wanted = {(trial.house_seed, trial.person_seed, trial.order_seed) for trial in cell.trials[:PEOPLE]}
     usual: dict[str, Any] = {"fidelity": "event", "regret": False, "phases": TASK}
     first = cell.trials[0]
@@ -75,9 +77,9 @@ def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
 def durations(
     study: Study, phases: Sequence[Phase], words: Mapping[str, int], played: Played
 ) -> dict[str, float]:
-    """How long each phase takes, s: reading and answering, the film, trials; not less than its minimum time.
+    """Return the expected duration of each phase, in seconds.
 
-    The task is the mean of all cells.
+    It adds reading, answering, the film and trials (the mean of all cells), and is at least the phase's minimum time.
     """
     found = {}
     for phase in phases:
@@ -95,13 +97,13 @@ def durations(
 
 @dataclass(frozen=True)
 class Cost:
-    """What a study costs, in units of its currency.
+    """Cost of a study, in units of its currency.
 
     Attributes:
-        rewards: Of everybody who is wanted.
-        bonuses: If everybody gets one.
-        fee: Of the platform, on both; None where the file does not say it.
-        hourly: Reward for the minutes that people are told, per hour.
+        rewards: Rewards of all wanted participants.
+        bonuses: Bonuses, if every participant gets one.
+        fee: Platform fee on both, or None if the file does not state one.
+        hourly: Reward per hour, for the announced minutes.
     """
 
     rewards: float
@@ -111,7 +113,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """All together, at most; nobody who is screened out is in it."""
+        """Upper limit of the cost, without payments for screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 
@@ -123,7 +125,7 @@ def cost(study: Study) -> Cost:
 
 
 def detectable(study: Study) -> dict[str, float]:
-    """The smallest partial eta squared of each effect that the study finds with a chance of 80 %, at a level of 5 %."""
+    """Return the smallest partial eta squared per effect that is detected with a power of 80 % at a level of 5 %."""
     conditions = {cell.trials[0].assistance for cell in study.cells}
     levels = {cell.trials[0].objects for cell in study.cells}
     if len(conditions) * len(levels) != len(study.cells) or study.people <= len(study.cells):

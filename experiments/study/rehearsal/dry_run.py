@@ -1,4 +1,4 @@
-"""A dry run: a rehearsal in a temporary folder, in which one participant goes each way through a study."""
+"""A dry run: a rehearsal in a temporary folder, with one participant for each way out of a study."""
 
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -27,11 +27,11 @@ from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
 from experiments.web.server.pool import WorkerPool
 
-MINIMUM_S = 1.0  # longest minimum time of a phase
-TASK_S = 1.0  # duration of the task
-PLACES = 10  # in place of each one, so that there is one for every participant
-FACTOR = 1e6  # by which the participants read faster
-TIMEOUT_S = 400.0  # for an answer, the compiling of kernels on a loaded machine included
+MINIMUM_S = 1.0  # upper limit of minimum times, in seconds
+TASK_S = 1.0  # duration of the task, in seconds
+PLACES = 10  # number by which places are multiplied, so that every participant gets one
+FACTOR = 1e6  # speed-up of reading
+TIMEOUT_S = 400.0  # HTTP timeout, in seconds; kernels may be compiled first
 
 Photograph = Callable[[str, str], Awaitable[None]]  # takes a name and a URL
 
@@ -52,10 +52,10 @@ class Walked:
 async def dry_run(
     study: Study, platform: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
 ) -> Walked:
-    """Send simulated participants through a study: one to the end, the others out of it on each way that there is.
+    """Send simulated participants through a study: one to the end, and one to each other exit.
 
-    Every phase has to refuse wrong and early forms, and to accept a correct one once. Minimum times are at most a
-    second, and the task ends after a second.
+    Every phase must refuse wrong and early forms, and accept a correct one once. Minimum times are at most one second,
+    and the task ends after a second.
     """
     study = rehearsed(_shortened(study), 1.0)
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
@@ -95,7 +95,6 @@ def _shortened(study: Study) -> Study:
 
 
 def _ways(procedure: Procedure) -> Iterator[Planned]:
-    """Plan a participant for each way out of the study."""
     ways: list[tuple[Leaving | None, str]] = [(None, "")]
     ways += [("refuses", CONSENT), ("gives up", DEVICE)]
     check = next((phase for phase in procedure.phases if phase.name == COMPREHENSION), None)
@@ -109,14 +108,13 @@ def _ways(procedure: Procedure) -> Iterator[Planned]:
 
 
 class _Walk:
-    """Sends participants, and compares what they see with what the store says."""
+    """Sends participants and compares the pages they get with the store."""
 
     def __init__(self, procedure: Procedure, around: Surroundings, photograph: Photograph) -> None:
         self._procedure, self._around, self._photograph = procedure, around, photograph
         self.walked = Walked()
 
     async def send(self, planned: Planned) -> None:
-        """Let a participant go the planned way."""
         shown: list[str] = []
 
         async def watch(name: str, page: httpx.Response) -> None:

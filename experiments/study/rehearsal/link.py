@@ -1,4 +1,4 @@
-"""The WebSocket of a simulated participant: plays a trial, over a connection that may be bad."""
+"""The WebSocket client of a simulated participant, which plays a trial over a good or bad connection."""
 
 import asyncio
 import contextlib
@@ -13,26 +13,26 @@ from websockets.typing import Origin
 
 from experiments.study.rehearsal.player import STEPS, Player
 
-ANSWER_TIMEOUT = 2.0  # s without a new state after which it decides again
-DELAYED = 15  # messages that are delayed
-OPENING_TIMEOUT = 600.0  # s that others may keep the place
+ANSWER_TIMEOUT = 2.0  # time to wait for a new state before sending the next input, in seconds
+DELAYED = 15  # number of delayed messages
+OPENING_TIMEOUT = 600.0  # how long another page may hold the session, in seconds
 VIEW = {"type": "view", "width": 1280, "height": 720, "codec": "none"}
 
 
 class LostError(Exception):
-    """The server ended the connection, or does not answer."""
+    """The server closed the connection or does not answer."""
 
 
 class Link:
-    """One connection to a trial; :func:`connected` makes it.
+    """A connection to a trial, made by `connected`.
 
     Args:
         socket: The connection.
-        player: Decides.
+        player: Chooses the inputs.
 
     Attributes:
-        decisions: How many were sent.
-        refused: Messages `error` of the server.
+        decisions: Number of inputs sent.
+        refused: Texts of the server's `error` messages.
     """
 
     def __init__(self, socket: ClientConnection, player: Player) -> None:
@@ -44,19 +44,19 @@ class Link:
         self.refused: list[str] = []
 
     async def occupied(self) -> None:
-        """Wait until the server says that another page has the session."""
+        """Wait until the server reports that another page has the session."""
         await self._wait(lambda: self._occupied, OPENING_TIMEOUT)
 
     def cut(self) -> None:
         self._socket.transport.abort()
 
     async def play(self, decisions: int, delay: float) -> bool:
-        """Play until the trial is saved, which gives True, or so many decisions were sent, which gives False.
+        """Play until the trial is saved or `decisions` inputs were sent. Return True if it was saved.
 
-        `delay` is how long the first messages take on their way, s.
+        `delay` is the delay of the first messages, in seconds.
 
         Raises:
-            LostError: The connection is gone.
+            LostError: The connection is lost.
         """
         await self._wait(
             lambda: self._phase in ("ready", "paused", "over") or self._occupied, OPENING_TIMEOUT
@@ -76,7 +76,7 @@ class Link:
         return True
 
     async def _decide(self, delay: float) -> None:
-        """Send what to do for some control steps, and wait for the state after them."""
+        """Send an input, and wait for the state after its control steps."""
         player, step = self._player, self._player.step
         self._number += 1
         self.decisions += 1
@@ -100,14 +100,13 @@ class Link:
         await self._news.wait()
 
     async def say(self, **message: Any) -> None:
-        """Send a message; a LostError if the connection is gone."""
+        """Send a message. Raises LostError if the connection is lost."""
         try:
             await self._socket.send(json.dumps(message))
         except WebSocketException as error:
             raise LostError(str(error)) from error
 
     async def receive(self) -> None:
-        """Take what the server sends until the connection is gone."""
         try:
             async for text in self._socket:
                 await self._take(json.loads(text))
@@ -139,14 +138,14 @@ class Link:
 
 @asynccontextmanager
 async def connected(base: str, path: str, trial: str, tab: str, player: Player) -> AsyncIterator[Link]:
-    """Connect a page to a trial; both are closed at the end.
+    """Connect a page to a trial, and disconnect it at the end.
 
     Args:
         base: URL of the server.
-        path: Of the person's pages.
+        path: Path of the participant's pages.
         trial: `training` or `task`.
         tab: Name of the page.
-        player: Decides.
+        player: Chooses the inputs.
     """
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:

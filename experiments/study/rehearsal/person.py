@@ -1,4 +1,4 @@
-"""A simulated person, who goes through the pages of a study by HTTP and plays its trials by WebSocket."""
+"""A simulated person, who visits a study's pages by HTTP and plays its trials by WebSocket."""
 
 import asyncio
 import re
@@ -20,27 +20,27 @@ from experiments.visit.plan import COMPREHENSION
 from experiments.visit.texts.items import Item
 
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
-READING = 15.0  # s of the study's time that a page takes, on average
-AWAY = 600.0  # s of the study's time that somebody who returns is away, at most
-DELAY = 0.2  # s that the first messages of a bad connection take
-CUTS = 3  # of a bad connection in a trial
-TRIES = 20  # connections to a trial, or sendings of a form, before somebody gives up
-QUEUED = 'http-equiv="refresh"'  # of the page of somebody who waits for a place
-QUEUE_PAUSE = 3.0  # s between two looks at it
-PAUSE = 0.5  # s before the next connection to a trial
+READING = 15.0  # mean reading time of a page, in seconds of study time
+AWAY = 600.0  # longest absence of a returning person, in seconds of study time
+DELAY = 0.2  # delay of the first messages of a bad connection, in seconds
+CUTS = 3  # number of cuts of a bad connection per trial
+TRIES = 20  # attempts to connect to a trial or to submit a form
+QUEUED = 'http-equiv="refresh"'  # marks the queue page
+QUEUE_PAUSE = 3.0  # polling period of the queue page, in seconds
+PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
 
 
 @dataclass
 class Rehearsed:
-    """What came of a person.
+    """Progress and outcome of a simulated person.
 
     Attributes:
-        number: Of the plan.
-        link: Path of the person's pages; empty before there are any.
-        outcome: `finished`, how the person left, or `stuck`; empty while the person is under way.
-        answers: Forms that were accepted, by phase.
-        faults: What went wrong, in words.
-        refused: How many messages were refused in trials.
+        number: Number in the plan.
+        link: Path of the personal link, empty before the visit starts.
+        outcome: `finished`, the way of leaving, or `stuck`. Empty during the visit.
+        answers: Accepted forms, by phase.
+        faults: Descriptions of faults.
+        refused: Number of refused messages in trials.
     """
 
     number: int
@@ -60,22 +60,24 @@ async def _ignore(name: str, page: httpx.Response) -> None:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What all people of a rehearsal share: the server, the study's phases, house and platform, and how time runs."""
+    """Server, study and time scale, shared by all people of a rehearsal."""
 
     base: str
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
     house: House
-    parameters: Mapping[str, str]  # of the platform's links; an empty value is an id of the person
-    minimum: Mapping[str, float]  # seconds, as the server has them
-    attempts: int  # at the comprehension check
-    factor: float  # by which waiting is shorter
-    hasty: bool = False  # send forms before their minimum time as well, which has to be refused
+    parameters: Mapping[
+        str, str
+    ]  # parameters of the platform's links; an empty value stands for an id of the person
+    minimum: Mapping[str, float]  # minimum times on the server, in seconds
+    attempts: int  # allowed attempts at the comprehension check
+    factor: float  # speed-up of waiting
+    hasty: bool = False  # also submit forms before their minimum time, which the server must refuse
     watch: Watch = _ignore  # receives the name of each page and the page
 
 
 class Person:
-    """Goes through the study as planned."""
+    """Visits the study according to the plan."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed
@@ -85,7 +87,7 @@ class Person:
         self._headers = {"Origin": around.base, "X-Forwarded-For": f"10.0.{number // 250}.{number % 250 + 1}"}
 
     async def begin(self) -> None:
-        """Come to the study, perhaps twice; the link is known then."""
+        """Start a visit, or start it twice if planned so, and store its link."""
         number = self._planned.number
         ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
         await self._around.watch("welcome", await self._get("/", ids))
@@ -98,7 +100,7 @@ class Person:
             self.rehearsed.link = link
 
     async def go(self) -> None:
-        """Go on from the page that is shown to the end, as planned."""
+        """Continue from the current page to the end."""
         self.rehearsed.outcome = await self._go()
 
     async def _go(self) -> str:
@@ -136,7 +138,6 @@ class Person:
         return "stuck"
 
     async def _send_early(self, phase: Phase) -> None:
-        """Submit a form at once, which a phase with a minimum time has to refuse."""
         if self._around.minimum.get(phase.name, 0.0) > 0.0:
             answer = await self._post(self.rehearsed.link, form_of(phase, self._rng))
             if answer.status_code == httpx.codes.SEE_OTHER:
@@ -151,7 +152,7 @@ class Person:
         return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
-        """Read, answer, send; some send wrong answers first, or all of it twice."""
+        """Read a page, answer and submit. Some people submit a wrong form first, or every form twice."""
         rng, link, factor = self._rng, self.rehearsed.link, self._around.factor
         await asyncio.sleep(float(rng.exponential(READING)) / factor)
         form = form_of(phase, rng)
@@ -190,7 +191,7 @@ class Person:
         return how
 
     async def _play(self, trial: str, leaves: bool) -> bool:
-        """Play a trial to its end, over several connections if need be; False for somebody who leaves in it."""
+        """Play a trial, reconnecting after planned breaks. Return False if the person leaves during it."""
         planned, rng = self._planned, self._rng
         breaks = [(moment(trial, rng), "cut") for _ in range(CUTS * planned.bad)]
         breaks += [(moment(trial, rng), "second page")] * planned.twice
@@ -226,7 +227,7 @@ class Person:
         return True
 
     async def _break(self, link: Link, what: str, trial: str, tab: str) -> str:
-        """Interrupt a trial; the name of the page in which it goes on."""
+        """Interrupt a trial, and return the name of the page that continues it."""
         if what == "cut":
             link.cut()
             return tab
@@ -249,7 +250,7 @@ class Person:
     async def _answered(self, method: str, path: str, **more: Any) -> httpx.Response:
         try:
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
-        except httpx.TransportError as error:  # people load the page again
+        except httpx.TransportError as error:  # a person would reload the page
             self._fault(f"{method} of a page was not answered: {type(error).__name__}")
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
         if answer.is_server_error:
@@ -264,7 +265,7 @@ MARK = "Rehearsal: drawn at random"
 
 
 def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
-    """A form that the phase accepts; a phase of the study's own without items gets an empty one."""
+    """Return a form that the phase accepts. It is empty for a custom phase without items."""
     example: dict[str, Any] = getattr(phase, "example", dict)()
     items = phase.items if isinstance(phase, FormPhase) else ()
     points = len(phase.texts.scale) if isinstance(phase, FormPhase) else 0
@@ -273,9 +274,9 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
-    """Return a form that the phase has to refuse: a wrong answer to a question that has a right one, or an empty form.
+    """Return a form that the phase must refuse, or None if it accepts any.
 
-    None if the phase accepts any form.
+    It has a wrong answer to a question with a right one, or else no answers.
     """
     example: dict[str, Any] = getattr(phase, "example", dict)()
     for item in phase.items if isinstance(phase, FormPhase) else ():

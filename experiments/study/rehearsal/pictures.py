@@ -1,4 +1,4 @@
-"""Pictures of pages, by a Chromium that is on the machine, through its DevTools protocol."""
+"""Screenshots of pages, taken by an installed Chromium through its DevTools protocol."""
 
 import asyncio
 import base64
@@ -18,21 +18,21 @@ from websockets.asyncio.client import ClientConnection, connect
 from mjsim.support.files import write_text_atomically
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # px of the page
-MAX_HEIGHT = 6000  # px of a picture
-SETTLE = 1.5  # s that a page has to fill itself
-LOADING = 120.0  # s that a trial has to load
+SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # window sizes, in pixels
+MAX_HEIGHT = 6000  # longest screenshot, in pixels
+SETTLE = 1.5  # time for scripts of a page to run, in seconds
+LOADING = 120.0  # timeout for loading a trial, in seconds
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
-START = 120.0  # s that the browser has to start, on a loaded machine
+START = 120.0  # timeout for the start of the browser, in seconds
 
 
 def browser() -> str | None:
-    """A Chromium on the path, or None."""
+    """Return the first Chromium found on the path, or None."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 class Camera:
-    """Takes pictures of pages into a folder.
+    """Takes screenshots of pages into a folder.
 
     Attributes:
         taken: Names of the pages, in order.
@@ -50,7 +50,7 @@ class Camera:
         self._session = attached["sessionId"]
 
     async def photograph(self, name: str, url: str) -> None:
-        """Take a picture of a whole page in each size."""
+        """Take a screenshot of a whole page at each size."""
         self.taken.append(f"{len(self.taken) + 1:02d}-{name.replace(':', '-')}")
         for size, (width, height) in SIZES.items():
             screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == "phone"}
@@ -62,10 +62,10 @@ class Camera:
             clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
-        await self._ask("Page.navigate", url="about:blank")  # it lets go of a trial
+        await self._ask("Page.navigate", url="about:blank")  # releases the session of a trial
 
     async def _settle(self) -> None:
-        """Wait until a page shows what it has to show."""
+        """Wait until the page has loaded."""
         loop = asyncio.get_running_loop()
         until = loop.time() + LOADING
         await asyncio.sleep(SETTLE)
@@ -92,7 +92,7 @@ class Camera:
 
 @asynccontextmanager
 async def camera(program: str, folder: Path) -> AsyncIterator[Camera]:
-    """Start a browser that takes pictures into a folder; an OSError where it does not start."""
+    """Start a browser that saves screenshots in a folder. Raises OSError if it does not start."""
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         options = ["--headless", "--remote-debugging-port=0", f"--user-data-dir={profile}"]
@@ -113,7 +113,7 @@ async def camera(program: str, folder: Path) -> AsyncIterator[Camera]:
 
 
 async def _address(profile: Path) -> str:
-    """Where the browser listens; it writes that into its profile."""
+    """Return the browser's DevTools address, which it writes into its profile."""
     file, loop = profile / "DevToolsActivePort", asyncio.get_running_loop()
     until = loop.time() + START
     while loop.time() < until:
@@ -125,7 +125,7 @@ async def _address(profile: Path) -> str:
 
 
 def write_contact_sheet(folder: Path, names: Sequence[str], title: str) -> Path:
-    """A page with all pictures side by side."""
+    """Write an HTML page with all screenshots, and return its path."""
     rows = "\n".join(
         f"<h2>{html.escape(name)}</h2><p>"
         + " ".join(

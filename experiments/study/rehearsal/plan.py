@@ -1,4 +1,4 @@
-"""Plan of a rehearsal: its study, its simulated people, and when they leave, return, reload or lose the connection."""
+"""The plan of a rehearsal: its simulated people, and when they leave, return, reload or lose the connection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,26 +13,26 @@ from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
 from experiments.visit.recruiter import Recruiter
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails", "gives up"]
-STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # names that platforms use
-RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of people
-HOW = (0.6, 0.2, 0.2)  # shares of those who leave: they vanish, withdraw, withdraw and have all deleted
+STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # parameter names of platforms
+RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of all people
+HOW = (0.6, 0.2, 0.2)  # shares of the ways of leaving: vanish, withdraw, withdraw and delete
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A person of a rehearsal.
+    """Planned behaviour of a simulated person.
 
     Attributes:
-        number: From 0.
-        seed: Of what the person answers and does.
-        arrives: After the beginning, s of the study's time.
-        leaves: How the person leaves the study, or None.
-        leaves_in: The phase in which that happens.
-        returns_in: The phase in which the person closes the page and comes back later to the same link, or None.
-        reloads_in: The phase in which the page is loaded again, or None.
-        bad: Whether the connection is cut and delayed.
-        twice: Whether forms are sent twice at once, links opened twice, and trials opened in a second page.
-        wrong: Whether a question about the task is answered wrongly at first.
+        number: Number of the person, from 0.
+        seed: Seed of answers and actions.
+        arrives: Time of arrival, in seconds of study time.
+        leaves: Way of leaving the study early, or None.
+        leaves_in: Phase in which the person leaves.
+        returns_in: Phase in which the person closes the page and later reopens the link, or None.
+        reloads_in: Phase in which the person reloads the page, or None.
+        bad: True if the connection is delayed and cut.
+        twice: True if forms are submitted twice at once, links opened twice, and trials opened in a second page.
+        wrong: True if a question about the task is first answered wrongly.
     """
 
     number: int
@@ -50,14 +50,14 @@ class Planned:
 def plan_people(
     phases: Sequence[str], people: int, seed: int, *, per_minute: float, dropouts: float
 ) -> list[Planned]:
-    """The people of a rehearsal, in order of arrival; the same seed gives the same people.
+    """Plan the people of a rehearsal, in order of arrival. The same seed gives the same people.
 
     Args:
-        phases: Of the study.
-        people: How many arrive, as a Poisson process.
-        seed: Source of all that they do.
-        per_minute: How many arrive in a minute of the study's time, on average.
-        dropouts: Share of those who do not finish.
+        phases: Phases of the study.
+        people: Number of arrivals, a Poisson process.
+        seed: Seed of the plan.
+        per_minute: Mean number of arrivals per minute of study time.
+        dropouts: Share of people who do not finish.
     """
     found, arrives = [], 0.0
     for number in range(people):
@@ -93,7 +93,7 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 
 
 def moment(phase: str, rng: np.random.Generator) -> int:
-    """After how many decisions something happens in a trial."""
+    """Draw a number of decisions after which something happens in a trial."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
 
 
@@ -105,7 +105,7 @@ def link_parameters(study: Study, platform: Recruiter) -> dict[str, str]:
 
 
 def rehearsed(study: Study, factor: float) -> Study:
-    """Mark the people of a study as simulated, and divide all its waiting times by `factor`."""
+    """Return the study with its people marked as simulated and all waiting times divided by `factor`."""
     settings = study.settings
     away = ("abandoned_after", "timed_out_after")
     shorter = {name: getattr(settings.limits, name) / factor for name in away}

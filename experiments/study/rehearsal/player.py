@@ -1,4 +1,4 @@
-"""A simulated participant of a trial: what it does next, from what the protocol tells a page (docs/protocol.md)."""
+"""A simulated player of a trial, which chooses its inputs from the protocol's messages (docs/protocol.md)."""
 
 import math
 from collections.abc import Mapping
@@ -9,29 +9,31 @@ import numpy as np
 from experiments.house import House
 from planner.errors import UnreachableError
 
-STEP = 0.04  # s of a control step
-STEPS = 16  # control steps for which it decides at once
-NEAR = 0.15  # m from a corner of a path from which the next one counts
-ALIGNED = 0.7  # rad off the way within which it walks
-SEEN = 0.8  # m from a viewpoint from which it has looked there
-STUCK = 0.05  # m that it has to get on in `STUCK_AFTER` decisions
+STEP = 0.04  # duration of a control step, in seconds
+STEPS = 16  # control steps per input
+NEAR = 0.15  # distance at which a corner of the path is reached, in metres
+ALIGNED = 0.7  # largest heading error while walking, in radians
+SEEN = 0.8  # distance at which a viewpoint counts as visited, in metres
+STUCK = 0.05  # shortest progress within `STUCK_AFTER` inputs, in metres
 STUCK_AFTER = 6
-BACKWARDS = 3  # decisions for which it steps back then
-PRESS_GAP = 15  # control steps between two presses
+BACKWARDS = 3  # number of backward inputs after being stuck
+PRESS_GAP = 15  # shortest time between two presses, in control steps
 
 
 class Player:
-    """Tidies up by the shortest ways: what the display leads to, else what it holds or knows of, else it searches.
+    """Tidies up along shortest paths.
+
+    It follows the display's goal. Without one, it walks to the nearest known object or bin, or else searches the house.
 
     Args:
-        house: The house, which people know from the film.
-        rng: Source of chance.
+        house: The house, known to people from the film.
+        rng: Random generator.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._models: dict[str, str] = {}
-        self._places: dict[str, tuple[float, float]] = {}  # of objects that are not tidied up
+        self._places: dict[str, tuple[float, float]] = {}  # positions of objects that are not in their bins
         self._held: tuple[str | None, str | None] = (None, None)
         self._goal: tuple[float, float] | None = None
         self._reach: Any = None
@@ -58,7 +60,7 @@ class Player:
                 self._take_snapshot(message)
 
     def act(self) -> dict[str, Any]:
-        """What is pressed and held for the next control steps, as fields of an input."""
+        """Return the input for the next control steps, without its number and step."""
         state = self.state
         if state is None or state["busy"]:
             return {}
@@ -115,7 +117,7 @@ class Player:
         return self._unseen(here)
 
     def _unseen(self, here: tuple[float, float]) -> tuple[float, float]:
-        """The nearest place from which it has not looked yet."""
+        """Return the nearest viewpoint that was not visited."""
         places = [(float(x), float(y)) for group in self._house.viewpoints.values() for x, y in group]
         self._searched += [p for p in places if p not in self._searched and math.dist(p, here) < SEEN]
         left = [place for place in places if place not in self._searched]

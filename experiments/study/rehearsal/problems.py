@@ -1,4 +1,4 @@
-"""What in a study file is not ready for people, by line."""
+"""Checks of a study file before participants are recruited."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ from experiments.study.recruitment import recruiter
 from experiments.visit.plan import COMPREHENSION, CONSENT
 from mjsim.support.files import read_text
 
-PAID = ("prolific", "connect", "external-question")  # platforms on which nobody works for nothing
+PAID = ("prolific", "connect", "external-question")  # platforms whose participants are paid
 EXAMPLES = ("your institution", "example.org", "example.com")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What has to change before people come.
+    """A problem of a study file.
 
     Attributes:
-        key: Of the file, such as `study.contact`.
-        text: What is wrong, and what to do.
+        key: Key in the file, such as `study.contact`.
+        text: Description and remedy.
     """
 
     key: str
@@ -27,7 +27,7 @@ class Problem:
 
 
 def problems_of_file(study: Study) -> list[Problem]:
-    """What can be told from the file alone."""
+    """Return the problems that follow from the file alone."""
     return [Problem(f"study.{key}", text) for key, text in _found(study)]
 
 
@@ -59,7 +59,7 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
 
 
 def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:
-    """Whether the minutes that people are told fit the expected length of the shortest and the longest cell, s."""
+    """Compare the announced minutes with the expected durations of the shortest and longest cell, in seconds."""
     told, low, high = study.settings.minutes, shortest / 60, longest / 60
     if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
         return []

@@ -1,19 +1,17 @@
-"""How much there is to read on a page."""
+"""Counting the words on a page."""
 
 from html.parser import HTMLParser
 from typing import Any
 
 
 def words_of(page: str) -> int:
-    """How many words a reader sees on an HTML page."""
+    """Count the visible words of an HTML page."""
     text = _Text()
     text.feed(page)
     return text.words
 
 
 class _Text(HTMLParser):
-    """Counts the words that a reader sees."""
-
     def __init__(self) -> None:
         super().__init__()
         self.words, self._hidden = 0, 0

@@ -1,4 +1,4 @@
-"""What a rehearsal found: whether the database agrees with what people did, and what went wrong."""
+"""The report of a rehearsal, which compares the database with the people's own records."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from experiments.visit.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
-STATUS: dict[str, Leaving] = {  # of people by what they did
+STATUS: dict[str, Leaving] = {  # status by outcome
     "finished": "finished",
     "withdraws": "withdrawn",
     "withdraws and deletes": "withdrawn",
@@ -34,15 +34,15 @@ STATUS: dict[str, Leaving] = {  # of people by what they did
 
 @dataclass(frozen=True)
 class Report:
-    """What came of a rehearsal.
+    """Result of a rehearsal.
 
     Attributes:
-        settings: Of the rehearsal.
-        passed: Whether nothing went wrong.
-        outcomes: People by what they did.
-        cells: People who finished, by cell.
-        owed: What they would be paid, cents.
-        faults: What went wrong, a line each.
+        settings: Settings of the rehearsal.
+        passed: True if there are no faults.
+        outcomes: Number of people by outcome.
+        cells: Number of finished people, by cell.
+        owed: Sum of payments that would be due, in cents.
+        faults: Descriptions of faults.
     """
 
     settings: Settings
@@ -56,7 +56,7 @@ class Report:
 async def report(
     study: Study, settings: Settings, store: Store, people: Sequence[Rehearsed], out: Path
 ) -> Report:
-    """Decide payments, collect, export, compare with what people did; the report is written to the folder as well."""
+    """Decide payments, collect and export, compare the database with the people's records, and write the report."""
     study, served = replace(study, rehearsal=True), out / SERVED
     known = {person.token_hash: person for person in await store.people()}
     faults = [f"person {one.number}: {fault}" for one in people for fault in one.faults]
@@ -95,17 +95,17 @@ PASSED, WITHOUT = "rehearsal passed", "pays without a rehearsal"
 
 
 async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, without: bool) -> None:
-    """Check that a rehearsal of the study file has passed; the audit log remembers that, or that none was wanted.
+    """Check that a rehearsal of this study file has passed, and record that in the audit log.
 
     Args:
-        store: Of real people.
+        store: Store with real participants.
         study: The study.
-        folder: Of a rehearsal; None if its success is in the audit log already.
-        without: Whether people may be paid all the same.
+        folder: Folder of a rehearsal, or None if the audit log has its success already.
+        without: True to record instead that no rehearsal is wanted.
 
     Raises:
-        ConfigError: No rehearsal of this very file has passed.
-        RecordError: The people are those of a rehearsal.
+        ConfigError: No rehearsal of this version of the study file has passed.
+        RecordError: The store holds simulated participants.
     """
     check_people(study, await store.people())
     log = await store.audit_log()

@@ -1,4 +1,4 @@
-"""A rehearsal: starts the study's server, sends simulated people to it, and keeps what came of them."""
+"""A rehearsal: starts the study's server and sends simulated people to it."""
 
 import asyncio
 import contextlib
@@ -22,37 +22,37 @@ from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
-WORKERS = "20"  # trials at a time; in a hurry, they need not be on time
-END_TIMEOUT = 60.0  # s that the server has to end
-HTTP_TIMEOUT = 120.0  # s
+WORKERS = "20"  # number of concurrent trials; they may run late
+END_TIMEOUT = 60.0  # timeout for stopping the server, in seconds
+HTTP_TIMEOUT = 120.0  # timeout of requests, in seconds
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a rehearsal does; kept in its folder, so that it goes on with the same people."""
+    """Settings of a rehearsal, stored in its folder so that it can be resumed."""
 
     study: str  # SHA-256 of the study file
     people: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
     seed: int
-    per_minute: float  # people who arrive in a minute of the study's time
-    dropouts: float  # share of those who leave
-    factor: float  # by which all waiting is shorter
+    per_minute: float  # arrivals per minute of study time
+    dropouts: float  # share of people who leave early
+    factor: float  # speed-up of waiting
 
 
 async def rehearse(
     study: Study, settings: Settings, out: Path, film: Path | None, on_person: Callable[[Rehearsed], None]
 ) -> list[Rehearsed]:
-    """Send everybody who has not been through it yet; what came of all, in order.
+    """Run all unfinished people. Return every result, in order.
 
     Args:
         study: The study.
-        settings: Of the rehearsal.
+        settings: Settings of the rehearsal.
         out: Folder of the rehearsal.
-        film: Of the house; None lets the server make it.
-        on_person: Called for each person who has ended, those of an earlier run included.
+        film: Film of the house, or None to let the server make it.
+        on_person: Called for each finished person, including those of an earlier run.
 
     Raises:
         ConfigError: The folder holds another rehearsal.
-        RecordError: The server cannot be started, or has ended.
+        RecordError: The server did not start, or stopped early.
     """
     _keep(settings, out)
     known = read_people(out / PEOPLE)
@@ -71,11 +71,11 @@ async def rehearse(
 
 
 def read_people(path: Path) -> dict[int, Rehearsed]:
-    """What is known of the people of a rehearsal by number; the last line of each counts."""
+    """Read the records of people by number. The last record of each person counts."""
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = {}
     for line in lines:
-        with contextlib.suppress(msgspec.DecodeError):  # the last one may have been cut off
+        with contextlib.suppress(msgspec.DecodeError):  # the last line may be incomplete
             rehearsed = msgspec.json.decode(line, type=Rehearsed)
             found[rehearsed.number] = rehearsed
     return found
@@ -92,7 +92,7 @@ def _keep(settings: Settings, out: Path) -> None:
 
 @asynccontextmanager
 async def _server(study: Study, settings: Settings, out: Path, film: Path | None) -> AsyncIterator[str]:
-    """The study's server as a process of its own; its URL."""
+    """Run the study's server in a subprocess, and yield its URL."""
     command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
     command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
     command += [
@@ -105,7 +105,7 @@ async def _server(study: Study, settings: Settings, out: Path, film: Path | None
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(
             *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
-        )  # Ctrl-C is for this process alone
+        )  # Ctrl-C must not reach the server
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
             if not url:
@@ -136,7 +136,7 @@ async def _send(
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
     minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
-    # Each request on a connection of its own: a pool looks at all that it keeps before each one.
+    # Without keep-alive, since a connection pool checks all idle connections before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(

@@ -1,4 +1,4 @@
-"""A server that runs inside of a command, for as long as the command needs it."""
+"""A server inside a command."""
 
 import asyncio
 import socket
@@ -10,7 +10,7 @@ import uvicorn
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to the command."""
+    """A server that leaves signal handling to the command."""
 
     def capture_signals(self) -> AbstractContextManager[None]:  # type: ignore[override]
         return nullcontext()
@@ -18,7 +18,7 @@ class _Server(uvicorn.Server):
 
 @asynccontextmanager
 async def serving(app: Any) -> AsyncIterator[str]:
-    """Serve an application at a free port of this computer; its URL."""
+    """Serve an application on a free local port, and yield its URL."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         config = uvicorn.Config(
             app, log_config=None, access_log=False, log_level="error", ws="websockets-sansio",

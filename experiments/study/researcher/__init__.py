@@ -1,1 +1,1 @@
-"""The researcher's page of a study with people, on a port of its own; health and metrics."""
+"""The researcher's page."""

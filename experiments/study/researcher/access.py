@@ -1,4 +1,4 @@
-"""Who may see the researcher's page: logins by a cookie, roles, and limits to attempts."""
+"""Access to the researcher's page: login cookies, roles and rate limits."""
 
 import asyncio
 import datetime
@@ -14,13 +14,13 @@ from experiments.web.server.guards import Rate
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
-ATTEMPTS = 10, 300.0  # to log in, within this time, s, from one address and with one name
-CHECKS = 2  # of passwords at a time: each takes 64 MiB
-ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # each may do what those before may
+ATTEMPTS = 10, 300.0  # login attempts per address and per name, and their period in seconds
+CHECKS = 2  # concurrent password checks; each takes 64 MiB
+ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # each role includes the ones before it
 
 
 def may(who: Researcher, role: Role) -> bool:
-    """Whether somebody may do what a role may."""
+    """Return True if the researcher's role includes `role`."""
     return ORDER.index(who.role) >= ORDER.index(role)
 
 
@@ -28,8 +28,8 @@ class Access:
     """Logs researchers in and out.
 
     Args:
-        researchers: Of the store.
-        secure: Whether the page is reached by HTTPS.
+        researchers: Researchers of the store.
+        secure: True if the page is served by HTTPS.
     """
 
     def __init__(self, researchers: Researchers, *, secure: bool) -> None:
@@ -39,16 +39,16 @@ class Access:
         self._checks = asyncio.Semaphore(CHECKS)
 
     async def who(self, connection: HTTPConnection) -> Researcher | None:
-        """Who asks; None for nobody who is logged in."""
+        """Return the logged-in researcher, or None."""
         token = self._token(connection)
         return None if token is None else await self._researchers.who(token_hash(token))
 
     def may_try(self, address: str, name: str) -> bool:
-        """Whether there may be another attempt from an address with a name; that counts."""
+        """Count a login attempt, and return True if the limits per address and per name allow it."""
         return self._from.allows(address) and self._names.allows(name)
 
     async def log_in(self, connection: HTTPConnection, name: str, password: str) -> str | None:
-        """A new token for who has this name and password, whatever cookie came along; None for nobody."""
+        """Check the credentials and return a new token, or None if they are wrong. It ends an earlier login."""
         async with self._checks:
             researcher = await self._researchers.check(name, password)
         if researcher is None:
@@ -59,12 +59,12 @@ class Access:
         return token
 
     async def log_out(self, connection: HTTPConnection) -> None:
-        """End the login of the cookie, if there is one."""
+        """End the login of the cookie, if any."""
         if (token := self._token(connection)) is not None:
             await self._researchers.log_out(token_hash(token))
 
     def remember(self, response: Response, token: str) -> None:
-        """Let the browser keep a token, and send it with what comes from the page itself alone."""
+        """Set the login cookie. `SameSite=strict` keeps it off requests from other sites."""
         seconds = int(LASTS.total_seconds())
         response.set_cookie(
             self._cookie, token, seconds, httponly=True, secure=self._secure, samesite="strict"

@@ -1,4 +1,4 @@
-"""The researcher's page: how a study stands, pausing and stopping it, its quotas, watching sessions, who did what."""
+"""The researcher's page: overview, participants, watching sessions, study state, quotas and the audit log."""
 
 import asyncio
 import logging
@@ -35,10 +35,10 @@ from experiments.web.server.sessions import Sessions
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
-HEALTH_TIMEOUT = 3.0  # s for the database to answer
-CHECK_PERIOD = 5.0  # s between two looks whether who watches may still do so
-PAGE_SIZE = 100  # participants on a page of the list
-MAX_WANTED = 1_000_000  # people of a cell
+HEALTH_TIMEOUT = 3.0  # timeout of the database, in seconds
+CHECK_PERIOD = 5.0  # period of checking the login of a watching researcher, in seconds
+PAGE_SIZE = 100  # participants per page of the list
+MAX_WANTED = 1_000_000  # largest quota of a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 UNKNOWN = "Not found", "This page does not exist."
 _PAGE = re.compile(r"\d{1,9}", re.ASCII)
@@ -47,7 +47,7 @@ Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class Watched:
-    """What the page shows: a study, its store, the sessions of this server, and what it measures."""
+    """Study, store, sessions of this server and metrics, as shown on the page."""
 
     study: Study
     store: Store
@@ -56,12 +56,12 @@ class Watched:
 
 
 class ResearcherServer:
-    """Pages for researchers, health and metrics.
+    """Pages for researchers, health check and metrics.
 
     Args:
-        watched: What they show.
-        public: URL under which a proxy makes the page public; None without one.
-        proxies: Whose word about the address of a browser is believed.
+        watched: Data to show.
+        public: Public URL of the page behind a proxy, or None.
+        proxies: Proxies whose X-Forwarded-For header is trusted.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class ResearcherServer:
         self._access = Access(watched.store.researchers, secure=secure)
 
     def app(self, host: str) -> Starlette:
-        """The ASGI application that listens at `host`."""
+        """Return the ASGI application that listens at `host`."""
         return Starlette(
             routes=[
                 Route("/health", self._health),
@@ -114,7 +114,7 @@ class ResearcherServer:
             logging.getLogger().removeHandler(self._watched.metrics.log)
 
     def _for(self, role: Role, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
-        """An endpoint for those who may do what a role may."""
+        """Wrap a handler so that only researchers with at least this role reach it."""
 
         async def endpoint(request: Request) -> Response:
             who = await self._access.who(request)
@@ -229,12 +229,12 @@ class ResearcherServer:
         try:
             while not (await asyncio.wait([watching], timeout=CHECK_PERIOD))[0]:
                 if await self._access.who(socket) is None:
-                    break  # logged out meanwhile
+                    break  # logged out
         finally:
             watching.cancel()
             with suppress(asyncio.CancelledError):
                 await watching
-        with suppress(RuntimeError, WebSocketDisconnect):  # it is closed already
+        with suppress(RuntimeError, WebSocketDisconnect):  # already closed
             await socket.close(1008)
 
     async def _audit(self, request: Request, who: Researcher) -> Response:
@@ -255,7 +255,7 @@ class ResearcherServer:
     async def _set_state(
         self, request: Request, who: Researcher, before: StudyState | None, after: StudyState
     ) -> Response:
-        """Change the state of the study, if it is still what the researcher saw."""
+        """Change the state of the study, unless it has changed since the page was shown."""
         state = (await self._store.study()).state
         if before is not None and state != before:
             return self._message(request, 409, "Not changed", f"The study is now {state}.")
@@ -270,7 +270,9 @@ class ResearcherServer:
             return self._message(request, 400, "Not changed", "The quota must be a whole number from 0.")
         cell, wanted = map(int, numbers)
         if cell >= len(self._study.cells) or wanted > MAX_WANTED:
-            return self._message(request, 400, "Not changed", "The cell does not exist, or the quota is too high.")
+            return self._message(
+                request, 400, "Not changed", "The cell does not exist, or the quota is too high."
+            )
         await self._store.set_quota(cell, wanted, who.name)
         return RedirectResponse("/", 303)
 
@@ -278,7 +280,7 @@ class ResearcherServer:
         return next((one for one in await self._store.people() if one.id == number), None)
 
     def _session(self, person: Person) -> PlayedSession | None:
-        """The session under way of a person, if this server has it."""
+        """Return the participant's session if it runs on this server."""
         session = self._watched.sessions.under_way.get(person.token_hash)
         return session if session and person.active and session.trial is not None else None
 
@@ -301,5 +303,5 @@ class ResearcherServer:
 
 
 def _described(person: Person) -> str:
-    """Text of a participant's row that the list can be searched for."""
+    """Return the text of a participant's row that the search looks at."""
     return f"{person_name(person)} {person.status.replace('_', ' ')} {person.phase}".lower()

@@ -1,4 +1,4 @@
-"""What Prometheus reads, and what went wrong lately. Numbers alone: nothing here names a person."""
+"""Prometheus metrics, and recent warnings and errors. None of them identifies a participant."""
 
 import logging
 import time
@@ -14,13 +14,13 @@ from experiments.visit.store import Counts
 from experiments.web.server.player import Meter
 from experiments.web.server.sessions import Sessions
 
-LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # s
-KEPT = 50  # warnings and errors
+LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # histogram buckets, in seconds
+KEPT = 50  # number of warnings and errors kept
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A line of the log: a warning or an error."""
+    """A warning or error of the log."""
 
     at: datetime
     level: str
@@ -28,7 +28,7 @@ class Fault:
 
 
 class Metrics(Meter):
-    """Counts and times of one server, since it started."""
+    """Metrics of one server since its start."""
 
     def __init__(self) -> None:
         registry = self._registry = CollectorRegistry()
@@ -69,11 +69,9 @@ class Metrics(Meter):
         self.log = FaultLog(self._faults)
 
     def acknowledged(self, seconds: float) -> None:
-        """The inputs of a message are safe, so long after they came."""
         self._inputs.observe(seconds)
 
     def worker_lost(self) -> None:
-        """The worker of a session has died."""
         self._lost.inc()
 
     def wrote(self, seconds: float) -> None:
@@ -83,7 +81,7 @@ class Metrics(Meter):
         self._answers.labels(f"{status // 100}xx").observe(seconds)
 
     def text(self, counts: Counts, sessions: Sessions) -> bytes:
-        """All of it, as Prometheus reads it."""
+        """Return all metrics in the Prometheus text format."""
         for gauge in (self._people, self._places, self._sessions):
             gauge.clear()
         for status, number in counts.statuses.items():
@@ -100,7 +98,7 @@ class Metrics(Meter):
 
 
 class FaultLog(logging.Handler):
-    """Keeps and counts warnings and errors."""
+    """Counts warnings and errors, and keeps the latest."""
 
     def __init__(self, counter: Counter) -> None:
         super().__init__(logging.WARNING)
@@ -118,7 +116,7 @@ class FaultLog(logging.Handler):
 
 
 class Timed:
-    """ASGI middleware: measures how long answers take."""
+    """ASGI middleware that measures response times."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self._app, self._metrics = app, metrics

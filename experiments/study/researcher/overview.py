@@ -1,4 +1,4 @@
-"""How a study stands, for the researcher's page: by cell and phase, who left, how fast pictures are, what is paid."""
+"""The state of a study for the researcher's page: cells, phases, dropouts, frame rates and payments."""
 
 import statistics
 from collections import Counter
@@ -17,7 +17,7 @@ LEFT: tuple[Status, ...] = ("no_consent", "screened_out", "withdrawn", "timed_ou
 
 @dataclass(frozen=True)
 class CellLine:
-    """A cell: how many are wanted, and how its places stand."""
+    """Places of a cell."""
 
     index: int
     label: str
@@ -29,7 +29,7 @@ class CellLine:
 
 @dataclass(frozen=True)
 class PhaseLine:
-    """A phase: who is in it, who of them has given no sign of life for long, and who left in it, by status."""
+    """Participants in a phase: active, inactive for long, and those who left in it, by status."""
 
     name: str
     here: int
@@ -39,7 +39,7 @@ class PhaseLine:
 
 @dataclass(frozen=True)
 class Frames:
-    """Pictures a second, of so many people."""
+    """Frame rates of several participants, in fps."""
 
     people: int
     lowest: float
@@ -48,7 +48,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class PayLine:
-    """Payments of a kind: what the ledger says, amounts in hundredths of the currency."""
+    """Payments of one kind and currency. Amounts are in hundredths of the currency."""
 
     kind: str
     currency: str
@@ -62,7 +62,7 @@ class PayLine:
 
 @dataclass(frozen=True)
 class Overview:
-    """A study at a moment. `checked` are frame rates of the check of computers, `playing` of sessions under way."""
+    """State of a study. `checked` has frame rates of the device check, `playing` of sessions under way."""
 
     at: datetime
     state: StudyState
