@@ -167,7 +167,11 @@ def test_in_a_lab_nothing_leads_back_to_the_person_before(tmp_path):
         assert first != second
         post(client, first, phase="consent", agree="no")
         end = client.get(first)
-        assert "Start with the next participant" in end.text and 'href="/"' in end.text and "data-forgets" in end.text
+        assert (
+            "Start with the next participant" in end.text
+            and 'href="/"' in end.text
+            and "data-forgets" in end.text
+        )
         assert phase(client, second) == "consent"
         assert all("set-cookie" not in client.get(path).headers for path in ("/", first, second))
 
