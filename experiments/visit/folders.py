@@ -1,7 +1,7 @@
-"""Folders of visits: the settings of their trials, their journals and their runs.
+"""Folders of visits, with the settings of their trials, journals and runs.
 
-The folder of a visit is named after the SHA-256 of the token in the participant's link. How far the participant is
-stands in the database only.
+A visit's folder is named after the SHA-256 of the token in the participant's link. Only the database records the
+participant's progress.
 """
 
 import shutil
@@ -23,7 +23,7 @@ VISITS = "visits"  # folder of a study's visits in its own folder
 
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A phase that is over, as the event `phase_ended` has it; `reason` is why a training ended."""
+    """A phase that has ended, with the fields of a `phase_ended` event. `reason` is given for a training."""
 
     phase: str
     duration_s: float
@@ -34,11 +34,11 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
 class Stored(msgspec.Struct, frozen=True):
     """Content of `visit.json`, which is written once."""
 
-    phase: str  # phase at which the folder was made
+    phase: str  # phase in which the folder was created
     phases: list[str]  # played phases, in order
     trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
     ended: list[Ended] = []  # phases before the first trial
-    version: int = 1  # of this format
+    version: int = 1  # format version
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,6 @@ class VisitFolder:
     stored: Stored
 
     def settings(self, phase: str) -> dict[str, Any]:
-        """Settings of the trial of a phase."""
         return self.stored.trials[phase]
 
     def run(self, phase: str) -> Path:
@@ -59,16 +58,15 @@ class VisitFolder:
         return self.path / JOURNALS / phase
 
     def is_over(self, phase: str) -> bool:
-        """True if the run directory of a phase has been written."""
+        """Return True if the run directory of a phase has been written."""
         return (self.run(phase) / records.METRICS).is_file()
 
     def metrics(self, phase: str) -> dict[str, Any]:
-        """Content of `metrics.json` of a phase's run directory."""
         found: dict[str, Any] = msgspec.json.decode((self.run(phase) / records.METRICS).read_bytes())
         return found
 
     def before(self, phase: str) -> list[dict[str, Any]]:
-        """Return the phases before the task as fields of `phase_ended` events; none for other phases."""
+        """Return the phases before the task as fields of `phase_ended` events. Other phases have none."""
         if phase != TASK:
             return []
         ended = [one for one in self.stored.ended if one.phase != TRAINING]
@@ -80,7 +78,6 @@ class VisitFolder:
 
     @property
     def floor_plan(self) -> Path:
-        """Picture of the paths in the task."""
         return self.run(TASK) / records.TOPDOWN
 
 
@@ -102,7 +99,7 @@ class VisitFolders:
         trials: Mapping[str, dict[str, Any]],
         ended: Sequence[Ended] = (),
     ) -> VisitFolder:
-        """Make the folder of a visit, or return the one that exists.
+        """Create the folder of a visit, or return the existing one.
 
         Args:
             name: Hash of the token of the participant's link.
@@ -121,7 +118,7 @@ class VisitFolders:
         return VisitFolder(folder, stored)
 
     def remove(self, name: str) -> None:
-        """Delete a visit with everything that was played in it."""
+        """Delete a visit with its journals and runs."""
         shutil.rmtree(self.path / name, ignore_errors=True)
         sync_folder(self.path)
 
@@ -140,5 +137,4 @@ class VisitFolders:
             raise RecordError(f"{path} is damaged: {error}") from error
 
     def names(self) -> list[str]:
-        """Return the names of all visits."""
         return sorted(path.parent.name for path in self.path.glob(f"*/{VISIT}"))

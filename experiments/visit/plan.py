@@ -1,4 +1,4 @@
-"""Plan of a visit: what a server has to know to take participants from the first phase to the last."""
+"""The plan of a visit, from which a server takes participants through all phases."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,25 +22,25 @@ Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Device(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a participant's computer has to have."""
+    """Requirements for a participant's computer."""
 
     frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
     latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
-    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # px of the window
+    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # smallest window, in pixels
     height: Annotated[int, msgspec.Meta(ge=0)] = 500
     keyboard: bool = True
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What ends a participation."""
+    """Timeouts and numbers of attempts."""
 
-    idle: Seconds = 1800.0  # without a sign of the person, after which a trial gives its place away
-    abandoned_after: Seconds = 1800.0  # without a sign of the person, after which the assignment is released
-    timed_out_after: Seconds = 14400.0  # without a sign of the person, after which the participation ends
-    attempts: Count = 3  # at the comprehension check
-    # how many items of the survey with a right answer may be answered wrongly; None screens nobody out
+    idle: Seconds = 1800.0  # inactivity after which a trial releases its slot, in seconds
+    abandoned_after: Seconds = 1800.0  # inactivity after which the place in a cell is released, in seconds
+    timed_out_after: Seconds = 14400.0  # inactivity after which the participation ends, in seconds
+    attempts: Count = 3  # allowed attempts at the comprehension check
+    # allowed wrong answers to survey items with a right one; None disables the check
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # after which personal data are deleted
+    keep_days: Count | None = None  # days after the last activity until identifying data are deleted
 
     def __post_init__(self) -> None:
         if self.timed_out_after < self.abandoned_after:

@@ -1,4 +1,4 @@
-"""The way of participants through the phases of a visit."""
+"""The course of visits through their phases."""
 
 import asyncio
 import dataclasses
@@ -25,16 +25,16 @@ from experiments.visit.store.values import utc_now
 from experiments.web.server.player import LiveTrial
 
 LOG = logging.getLogger("mjsim.study")
-FULL = "full"  # reason of a phase that ended because no place was left
-ATTEMPTS = "attempts"  # answer in which the attempts at a phase are counted
+FULL = "full"  # reason recorded for a phase that ended because no place was left
+ATTEMPTS = "attempts"  # name of the answer that counts attempts at a phase
 
 
 @dataclass(frozen=True)
 class Now:
-    """Where a participant is.
+    """Current state of a visit.
 
     Attributes:
-        phase: Phase under way; None if the participation has ended.
+        phase: Current phase, or None if the participation has ended.
         number: Number of the phase, from 1.
         wait: Seconds before the phase may be ended.
     """
@@ -47,13 +47,13 @@ class Now:
 
 
 class Procedure:
-    """The phases of a plan, with the store and the folders that record how participants go through them.
+    """Takes participants through the phases of a plan.
 
     Args:
         plan: Plan of the visits.
         store: Records participants, their phases and answers.
-        folders: Hold what is played.
-        rng: Source of assignments.
+        folders: Folders of journals and runs.
+        rng: Random generator for assignments.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Procedure:
         self._rng = rng
 
     async def now(self, person: Person, path: str) -> Now:
-        """Return where a participant is, and record when the phase was first shown."""
+        """Return the current state of a visit, and record when the phase was first shown."""
         if not person.active and person.status != "finished":
             return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
         if person.phase not in self.names:
@@ -78,7 +78,7 @@ class Procedure:
         return Now(person, self.phases[number], number + 1, visitor, wait)
 
     async def times(self, person: Person) -> tuple[float, float]:
-        """Return the seconds since the participant's phase was first shown, and those until it may be ended."""
+        """Return the seconds since the phase was first shown, and those until it may be ended."""
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
         minimum = self.plan.minimum.get(person.phase, 0.0)
@@ -86,7 +86,10 @@ class Procedure:
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
     async def submit(self, now: Now, phase: str, sent: FormData) -> Again | None:
-        """Handle a submitted form. Return an error message, or None if it was accepted or came from an earlier page."""
+        """Handle a submitted form.
+
+        Return an error message, or None if it was accepted or belongs to an earlier page.
+        """
         current = now.phase
         if current is None or phase != current.name or isinstance(current, Played):
             return None
@@ -116,14 +119,14 @@ class Procedure:
             await self.store.save_answers(now.person.id, phase, drafts)
 
     async def assign(self, person: Person) -> Assignment | None:
-        """Return the place of a participant who has not begun to play. None if all cells are full."""
+        """Return the participant's place in a cell, or None if all cells are full."""
         plan = self.plan
         return await self.store.assign(
             person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
         )
 
     async def begin_playing(self, person: Person, place: Assignment) -> VisitFolder:
-        """Make the folder of a visit, with the settings of its trials."""
+        """Create the visit's folder with the settings of its trials."""
         played = [name for name in self.names if name in PLAYED]
         ended = await self._before_playing(person)
         trials = self.plan.trials(await self._after_earlier_visit(person, place))
@@ -140,13 +143,13 @@ class Procedure:
         return await self.store.room(wanted, self.names[0], self._away)
 
     async def turn_away(self, person: Person) -> Person:
-        """End the participation of a participant for whom there is no place."""
+        """End a participation for which there is no place."""
         here = person.phase
         await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
         return await self.store.person(person.id)
 
     async def record_trials(self, person: Person) -> Person:
-        """Record the participant's trials whose runs have been written, and return the participant afterwards."""
+        """Record the participant's trials whose runs have been written, and return the updated participant."""
         while person.active and person.phase in PLAYED:
             folder = self.folders.find(person.token_hash)
             if folder is None or not folder.is_over(person.phase):
@@ -159,9 +162,9 @@ class Procedure:
         return person
 
     async def recover(self, before: datetime.datetime | None = None) -> None:
-        """Record trials whose end is not in the database, of all participants or of those inactive since `before`.
+        """Record trials that ended without being recorded, for all participants or those inactive since `before`.
 
-        A damaged folder is logged, and concerns its own participant only.
+        A damaged folder is logged and skipped.
         """
         for person in await self.store.people():
             if before is None or person.seen < before:
@@ -171,7 +174,7 @@ class Procedure:
                     LOG.error("person %d: %s", person.id, error)
 
     async def adopt(self) -> None:
-        """Add participants for folders of visits that were made before `mjsim play` had a database."""
+        """Add participants for visit folders from before `mjsim play` had a database."""
         for name in await asyncio.to_thread(self.folders.names):
             try:
                 folder = self.folders.find(name)
@@ -185,7 +188,7 @@ class Procedure:
                 await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
 
     async def _leave_missing_phase(self, person: Person) -> Person:
-        """Move a participant on whose phase the plan no longer has, such as the film of a server without one."""
+        """Advance a participant whose phase is not in the plan, such as the film of a server without one."""
         order = (*PHASES, RESULT)
         later = order[order.index(person.phase) + 1 :] if person.phase in order else ()
         following = next((name for name in later if name in self.names), None)
@@ -200,12 +203,11 @@ class Procedure:
         return datetime.timedelta(seconds=self.plan.limits.abandoned_after)
 
     def _metrics(self, person: Person) -> Mapping[str, Any] | None:
-        """Metrics of the task, for the page of the result."""
         folder = self.folders.find(person.token_hash) if person.phase == RESULT else None
         return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
 
     async def _after_earlier_visit(self, person: Person, place: Assignment) -> Assignment:
-        """Give the next house seed to a participant who has seen the best way through the episode of this one."""
+        """Use the next house seed if the participant has seen the result of the same episode."""
         earlier = (await self.store.identity(person.id)).get(AFTER)
         folder = self.folders.find(earlier) if earlier else None
         if folder is None or not folder.is_over(TASK):
@@ -213,14 +215,13 @@ class Procedure:
         return dataclasses.replace(place, house_seed=folder.settings(TASK)["house_seed"] + 1)
 
     async def _before_playing(self, person: Person) -> list[Ended]:
-        """The phases that the record of the task mentions."""
         wanted = [name for name in (STORY, FLYTHROUGH) if name in self.names]
         found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
         shown = [found[name] for name in wanted if name in found]
         return [Ended(phase.name, phase.duration_s or 0.0) for phase in shown]
 
     async def _move_on(self, person: Person, phase: str, answers: Answers, reason: str | None = None) -> None:
-        """End a phase. A participant who reaches the last one has finished."""
+        """End a phase. Reaching the last phase finishes the participation."""
         names = self.names
         following = names[names.index(phase) + 1]
         status: Status | None = "finished" if following == names[-1] else None
@@ -254,5 +255,5 @@ class BrowserPlayer:
             texts=procedure.plan.texts["hud"].words,
         )
 
-    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002 - the folder tells which are over
+    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002 - the folder shows which trials are over
         await self._procedure.record_trials(await self._procedure.store.person(self._id))

@@ -1,4 +1,4 @@
-"""Where people come from: what a platform says about who arrives, and the way back to it."""
+"""The interface of recruitment platforms: arrivals, and the link that leads back to the platform."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,17 +6,17 @@ from typing import Literal, Protocol
 
 from experiments.visit.tokens import TOKEN, token_hash
 
-AFTER = "after"  # parameter that holds the token of an earlier visit
+AFTER = "after"  # query parameter with the token of an earlier visit
 Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_out"]
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """Somebody who may take part.
+    """A person who may take part.
 
     Attributes:
-        key: The platform's id of the person, by which a second visit is recognised; None where there is none.
-        identity: All ids that paying needs; they never leave the store.
+        key: The platform's id of the person, which recognizes a second visit. None if there is no id.
+        identity: All ids needed for payment. They never leave the store.
     """
 
     key: str | None = None
@@ -25,25 +25,25 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Preview:
-    """Somebody who looks at the study before accepting it."""
+    """A look at the study before accepting it."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A link that does not come from the platform as it should."""
+    """A link that the platform could not have made."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class WayBack:
-    """What a person sees at the end: a code, and where to go.
+    """How the last page leads back to the platform.
 
     Attributes:
-        url: Of the platform, or empty.
-        fields: Of a form that is posted there; None for a plain link.
-        label: Name of the text of the button.
-        gives_back: Whether the person has to give the task back on the platform's page.
+        url: URL on the platform, or empty.
+        fields: Fields of a form that is posted there, or None for a plain link.
+        label: Name of the button's text.
+        gives_back: True if the participant must return the task on the platform's page.
     """
 
     code: str = ""
@@ -54,13 +54,13 @@ class WayBack:
 
 
 class Recruiter(Protocol):
-    """A platform.
+    """A recruitment platform.
 
     Attributes:
-        platform: Its name in the study file.
-        parameters: Names of what its links carry, which the first page keeps.
-        has_time_limit: Whether the platform ends a participation that takes too long.
-        embedded_by: Sites whose pages show the study in a frame, and to which its last form may be sent.
+        platform: Name in the study file.
+        parameters: Query parameters of its links, which the welcome page passes on.
+        has_time_limit: True if the platform limits the duration of a participation.
+        embedded_by: Sites that may embed the study in a frame and receive its last form.
     """
 
     platform: str
@@ -69,20 +69,20 @@ class Recruiter(Protocol):
     embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
-        """Who comes with the query of a link."""
+        """Check the query of a link."""
         ...
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """The way back of somebody who leaves."""
+        """Return the way back for a participant who leaves like this."""
         ...
 
 
 class OpenLink:
-    """An open link: every visitor may take part, and gets a personal link to come back to.
+    """An open link. Everyone may take part, and gets a personal link for returning.
 
     Args:
         platform: `link`, or `lab`, where the last page leads to the first one for the next participant.
-        code: Completion code; empty for none.
+        code: Completion code, or empty.
         repeats: True if the link of a further visit names the earlier one.
     """
 
@@ -94,11 +94,9 @@ class OpenLink:
         self.parameters: tuple[str, ...] = (AFTER,) if repeats else ()
 
     def arrive(self, query: Mapping[str, str]) -> Arrival:
-        """Return an arrival without an id of a platform."""
         earlier = query.get(AFTER, "") if AFTER in self.parameters else ""
         return Arrival(identity={AFTER: token_hash(earlier)} if TOKEN.fullmatch(earlier) else {})
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - nobody is known
-        """A code where there is one; in a lab, the first page."""
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - there are no ids
         code = self._code if how == "finished" else ""
         return WayBack(code, "/", label="next_person") if self.platform == "lab" else WayBack(code)

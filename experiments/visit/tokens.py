@@ -1,4 +1,4 @@
-"""Tokens of links, and the keys by which participants of a platform are recognized."""
+"""Tokens of personal links, and keys that recognize a platform's participants."""
 
 import base64
 import hashlib
@@ -14,12 +14,12 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """SHA-256 of a token, hexadecimal. Only this hash is stored."""
+    """Return the SHA-256 of a token, hexadecimal. Only this hash is stored."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
 class Keys:
-    """Keys and tokens that follow from a study's secret.
+    """Keys and tokens derived from a study's secret.
 
     Args:
         secret: The study's secret.

@@ -1,4 +1,4 @@
-"""Phases of a visit, which a participant goes through one after the other."""
+"""Phases of a visit."""
 
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
@@ -27,10 +27,10 @@ KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
 
 
 def phases_of(plan: VisitPlan) -> Sequence[Phase]:
-    """Make the phases of a plan, in order. A custom one is named by its factory, `package.module:attribute`.
+    """Create the phases of a plan, in order. A custom phase is named by its factory, `package.module:attribute`.
 
     Raises:
-        ConfigError: One cannot be loaded or made.
+        ConfigError: A phase cannot be loaded or created.
     """
     return [_phase(name, plan) for name in plan.phases]
 

@@ -1,4 +1,4 @@
-"""Phases of a visit: the interface, and phases that are a text with a form."""
+"""The interface of phases, and the phases that consist of a text and a form."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -20,14 +20,14 @@ FormData = ImmutableMultiDict[str, str]
 
 @dataclass(frozen=True)
 class Visitor:
-    """What a phase may know of the person in it.
+    """Data of the participant that a phase may use.
 
     Attributes:
-        answers: Given in this phase so far.
-        shown_s: How long ago the phase was shown first, s.
-        attempts: How many answers of it were refused.
-        path: Of the person's pages.
-        metrics: Metrics of the task, in the phase `result`.
+        answers: Answers given in this phase so far.
+        shown_s: Time since the phase was first shown, in seconds.
+        attempts: Number of rejected forms in this phase.
+        path: Path of the participant's pages.
+        metrics: Metrics of the task, only in the phase `result`.
     """
 
     answers: Answers
@@ -39,7 +39,7 @@ class Visitor:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: a template by name, and its values."""
+    """A template by name, and its values."""
 
     template: str
     values: Mapping[str, Any]
@@ -47,7 +47,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Done:
-    """The phase is over: what was answered, and what follows."""
+    """An accepted form: the answers and what follows."""
 
     answers: Answers = field(default_factory=dict)
     outcome: Outcome = "next"
@@ -55,7 +55,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Again:
-    """The phase is shown again with a note."""
+    """A rejected form: the phase is shown again with a note."""
 
     note: str
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -68,19 +68,19 @@ class Phase(Protocol):
     name: str
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
-        """What the person sees; `refused` is what was wrong with what was sent."""
+        """Return the page. `refused` is the result of a rejected form."""
         ...
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again: ...
 
 
 class FormPhase:
-    """A text, the items of a form, and a button.
+    """A page with a text, the items of a form and a button.
 
     Args:
         plan: Plan of the visit.
-        name: Of the phase, and of the section of its texts.
-        template: Of its page.
+        name: Name of the phase and of its section in the texts.
+        template: Template of its page.
     """
 
     def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
@@ -93,7 +93,6 @@ class FormPhase:
         return self.texts.items
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
-        """The text and the form, with the answers so far."""
         form = refused.values.get("form") if refused else None
         return Page(
             self._template,
@@ -122,11 +121,11 @@ class FormPhase:
         )
 
     def example(self) -> dict[str, str]:
-        """A form that is accepted, as `mjsim study check` sends it; items that need no answer get none."""
+        """Return a form that is accepted, with answers to all required items."""
         return {item.name: item.example() for item in self.items if item.required}
 
     def drafts(self, sent: FormData) -> Answers:
-        """The answers among what is in a form that is not sent yet; those that cannot be used are left out."""
+        """Return the valid answers of a form that has not been submitted yet."""
         form = self._form(sent, {})
         form.validate()
         given = {item.name: form[item.name] for item in self.items if item.name in sent}
@@ -141,7 +140,7 @@ class FormPhase:
 
 
 class Story(FormPhase):
-    """The story as a text."""
+    """The story."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
         return {"paragraphs": self._plan.story_paragraphs}
@@ -160,10 +159,9 @@ class Result(FormPhase):
 
 
 class Consent(FormPhase):
-    """A statement to agree with, or not."""
+    """The consent form, and further items if the study's texts have any."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """Whether the person agrees; items of a study's own texts have to be answered besides."""
         if sent.get("agree") == "no":
             return Done({"agreed": False}, "no_consent")
         if sent.get("agree") != "yes":
@@ -176,13 +174,12 @@ class Consent(FormPhase):
 
 
 class Comprehension(FormPhase):
-    """Questions about the story, which can be read again on the same page."""
+    """Questions about the task. Too many failed attempts screen the participant out."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
         return {"story": self._plan.story_paragraphs}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """The answers, if all are right; after the last attempt the person is screened out."""
         read = super().read(visitor, sent)
         if isinstance(read, Again):
             return read
@@ -196,10 +193,9 @@ class Comprehension(FormPhase):
 
 
 class Survey(FormPhase):
-    """Items; those with a right answer show whether they were read."""
+    """The survey. Too many wrong answers to attention checks screen the participant out."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
-        """The answers; whoever gives too many wrong ones is screened out where the study file says so."""
         read = super().read(visitor, sent)
         allowed = self._plan.limits.inattentive
         if isinstance(read, Again) or allowed is None:

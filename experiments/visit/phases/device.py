@@ -1,4 +1,4 @@
-"""Whether a person's computer can show the house: WebGL 2, frame rate, connection, keyboard, size of the window."""
+"""The device check: WebGL 2, frame rate, connection, keyboard and window size."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from experiments.visit.phases.base import Again, Done, FormData, FormPhase, Visi
 from experiments.visit.plan import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
-MAX_RENDERER = 200  # characters
+MAX_RENDERER = 200  # maximum length, in characters
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,10 @@ class _Measured:
     renderer: str
 
     def faults(self, needed: Device, draws: bool) -> list[str]:
-        """Names of the texts that say what does not fit; pictures that the server draws need no WebGL."""
+        """Return the names of the texts that describe unmet requirements.
+
+        Frame rate does not matter if the server draws.
+        """
         values = self.values
         found = [
             ("bad_frames", draws and values["frames_per_s"] < needed.frames_per_s),
@@ -32,13 +35,12 @@ class _Measured:
 
 
 class DeviceCheck(FormPhase):
-    """A page that measures and sends what it found."""
+    """A page that measures the participant's computer and submits the result."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
         return {"keyboard": self._plan.device.keyboard}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
-        """What was measured, if it suffices; who gives up is screened out."""
         measured = _measured(sent)
         if measured is None:
             return Again(self._plan.texts["common"]["needs_script"])
@@ -63,7 +65,7 @@ class DeviceCheck(FormPhase):
 
 
 def _measured(sent: FormData) -> _Measured | None:
-    """What the page measured; None where that is no measurement."""
+    """Return the measurements of a form, or None if they are not valid."""
     try:
         values = {name: float(sent.get(name, "")) for name in MEASURES}
     except ValueError:

@@ -1,4 +1,4 @@
-"""Forms from items, by WTForms."""
+"""Forms made from items, by WTForms."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,9 +15,9 @@ from experiments.visit.texts.items import MAX_LINE, MAX_TEXT, Item
 
 
 def form_of(items: Sequence[Item], scale: Sequence[str], common: Section, language: str = "en") -> BaseForm:
-    """A form with a field for each item; `scale` are the words of the points of scales."""
+    """Return a form with a field per item. `scale` has the labels of the points of scales."""
     meta = DefaultMeta()
-    meta.locales = [language]  # of WTForms' own messages
+    meta.locales = [language]  # language of WTForms' own messages
     return BaseForm({item.name: _field(item, scale, common) for item in items}, meta=meta)
 
 

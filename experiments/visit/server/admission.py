@@ -1,4 +1,4 @@
-"""Who comes: the first page, who may begin, and who is recognised."""
+"""Admission: the welcome page, new participants and returning ones."""
 
 import asyncio
 import hmac
@@ -16,21 +16,19 @@ from experiments.visit.tokens import Keys, new_token, token_hash
 from experiments.web.server.guards import Rate, sent_form
 
 LOG = logging.getLogger("mjsim.study")
-NEW_PEOPLE = 60, 60.0  # people from one address, within this time, s
-COUNTED = (
-    10.0  # s for which a count of free places is good; whoever comes to one too many is told at the training
-)
-COUNTED_FULL = 1.0  # s for which none is free
-TOKEN = "token"  # field of a form by which a browser shows that the person began in it
+NEW_PEOPLE = 60, 60.0  # new participants per IP address, and the period in seconds
+COUNTED = 10.0  # lifetime of a count of free places, in seconds; late surplus is handled at the training
+COUNTED_FULL = 1.0  # lifetime of a count of 0, in seconds
+TOKEN = "token"  # form field with the token that the browser has stored
 
 
 class Arrivals:
-    """The door of a study.
+    """Admits participants to a study.
 
     Args:
-        procedure: Of the study.
-        pages: What they see.
-        keys: Of the study.
+        procedure: Procedure of the study.
+        pages: Pages of the study.
+        keys: Keys of the study.
     """
 
     def __init__(self, procedure: Procedure, pages: VisitPages, keys: Keys) -> None:
@@ -39,10 +37,10 @@ class Arrivals:
         self._recruiter = self._plan.recruiter
         self._new = Rate(*NEW_PEOPLE)
         self._counting = asyncio.Lock()
-        self._room, self._counted = 0, 0.0  # free places, and until when that count is good
+        self._room, self._counted = 0, 0.0  # number of free places, and when it expires
 
     async def welcome(self, request: Request) -> Response:
-        """The first page; who comes again goes on."""
+        """Show the welcome page, or send a returning participant to their current phase."""
         came = self._recruiter.arrive(request.query_params)
         if isinstance(came, Refusal):
             LOG.warning("a link was refused: %s", came.reason)
@@ -75,18 +73,19 @@ class Arrivals:
         return await self._arrive(came)
 
     async def _known(self, came: Arrival) -> Person | None:
-        """The person who came before with the platform's id of this one."""
+        """Return the participant with this platform id, if they have arrived before."""
         return None if came.key is None else await self._store.find(token_hash(self._keys.token(came.key)))
 
     async def _again(self, request: Request, came: Arrival, person: Person, token: str = "") -> Response:
-        """Let somebody who came before go on, if all ids are those of then, or the browser has the person's link.
+        """Let a participant return if all ids match, or if the browser has the participant's link.
 
-        A platform's id of a person is known to others; that of the submission to the person alone.
+        The platform's id of a person alone is no proof, since others know it. Only the person knows the submission's
+        id.
         """
         same = came.identity == await self._store.identity(person.id)
         if came.key is not None and (
             same
-            or person.status == "no_consent"  # nothing is known of them
+            or person.status == "no_consent"  # no ids are stored
             or hmac.compare_digest(token.encode(), self._keys.token(came.key).encode())
         ):
             return await self._arrive(came)
@@ -111,11 +110,11 @@ class Arrivals:
         return RedirectResponse(f"/play/{token}", 303)
 
     async def _closed(self) -> str | None:
-        """Why nobody new may come: the name of a text; None if people may."""
+        """Return the name of the text that says why no new participant may start, or None."""
         state = (await self._store.study()).state
         if state != "open":
             return "paused" if state == "paused" else "full"
-        async with self._counting:  # once for all who come at once
+        async with self._counting:  # concurrent requests share one count
             if time.monotonic() > self._counted:
                 self._room = await self._procedure.room()
                 self._counted = time.monotonic() + (COUNTED if self._room > 0 else COUNTED_FULL)

@@ -1,4 +1,4 @@
-"""The server of visits: a welcome, the phases one after the other, the end."""
+"""The application of the visit server."""
 
 import asyncio
 import logging
@@ -35,7 +35,7 @@ from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
-MAX_FORM = 64 * 1024  # bytes
+MAX_FORM = 64 * 1024  # maximum size of a form, in bytes
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class ServerOptions:
     """Options of a server that are not part of the plan.
 
     Attributes:
-        secret: Key from which tokens of participants with a platform's id are made.
+        secret: Key for deriving the tokens of participants with a platform id.
         proxies: Proxies whose X-Forwarded-For header is trusted.
         meter: Receives session metrics.
-        host: Name of this host if several share a database; None for the only one.
-        workers: Trials at a time; None for as many as the machine holds.
+        host: Name of this host if several share a database, or None.
+        workers: Number of concurrent trials, or None to measure the machine's capacity.
         background: Tasks that run as long as the server.
     """
 
@@ -60,11 +60,11 @@ class ServerOptions:
 
 
 class _ElsewhereError(Exception):
-    """Another host has a person."""
+    """The participant's visit is on another host."""
 
 
 class VisitServer:
-    """Pages and sockets of all visits.
+    """Pages and WebSockets of all visits.
 
     Attributes:
         sessions: Sessions under way.
@@ -83,7 +83,7 @@ class VisitServer:
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
-        """The ASGI application that listens at `host`; `public` is the URL under which a proxy makes it public."""
+        """Return the ASGI application that listens at `host`. `public` is its public URL behind a proxy."""
         return Starlette(
             routes=[
                 Route("/", self._arrivals.welcome),
@@ -140,7 +140,7 @@ class VisitServer:
             await self.sessions.release()
             await self._pool.close()
             if self._host is not None:
-                with suppress(StoreError):  # it is silent soon
+                with suppress(StoreError):  # without heartbeats, its lease ends soon
                     await self._host.leave()
             await self._store.close()
 
@@ -167,7 +167,7 @@ class VisitServer:
         if person is None:
             return Response(status_code=404)
         form = await sent_form(request)
-        async with self._lock(person):  # so that an answer does not replace a later one
+        async with self._lock(person):  # keeps an older answer from replacing a newer one
             now = await self._procedure.now(person, request.url.path)
             await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
@@ -186,7 +186,7 @@ class VisitServer:
         form = await sent_form(request)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
-            self.sessions.limit.release(person.token_hash)  # also where its page had just been let in
+            self.sessions.limit.release(person.token_hash)  # its page may have just left the queue
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -202,7 +202,7 @@ class VisitServer:
             return PlainTextResponse("not found\n", 404)
         return FileResponse(folder.floor_plan, media_type="image/png")
 
-    async def _ping(self, request: Request) -> Response:  # noqa: ARG002 - only the time counts
+    async def _ping(self, request: Request) -> Response:  # noqa: ARG002 - only measures latency
         return Response(status_code=204)
 
     async def _play(self, socket: WebSocket) -> None:
@@ -227,7 +227,7 @@ class VisitServer:
 
     async def _played(self, request: Request, now: Now) -> Response:
         person = now.person
-        begun = self._procedure.folders.find(person.token_hash)  # a small file: a thread would take longer
+        begun = self._procedure.folders.find(person.token_hash)  # a small file, read faster without a thread
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))
@@ -252,7 +252,7 @@ class VisitServer:
         return self._pages.message(request, "unknown", 404)
 
     async def _elsewhere(self, request: Request, _: Exception) -> Response:
-        """With 404 a proxy asks the next host; where there is none, the person reads this."""
+        """Answer with 404, after which a proxy asks the next host. Without one, the participant sees this page."""
         return self._pages.message(request, "paused", 404)
 
     async def _person(self, request: Request) -> Person | None:
@@ -263,5 +263,5 @@ class VisitServer:
         return person
 
     def _lock(self, person: Person) -> asyncio.Lock:
-        """Held while a person's phase is read or changed, so that two pages of one person take turns."""
+        """Return a lock that keeps two pages of a participant from changing the phase concurrently."""
         return self._locks.setdefault(person.token_hash, asyncio.Lock())

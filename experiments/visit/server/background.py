@@ -1,4 +1,4 @@
-"""Background of a server of visits: time-outs of absent participants, and one host among several."""
+"""Background tasks of the visit server: timeouts of absent participants, and heartbeats of a host."""
 
 import asyncio
 import datetime
@@ -16,21 +16,21 @@ from experiments.web.server.sessions import Sessions
 LOG = logging.getLogger("mjsim.study")
 HEARTBEAT_S = 10.0  # time between two heartbeats to the database
 SWEEP_S = 60.0  # time between two searches for absent participants
-CLOCK_SET_S = 30.0  # deviation from which the clock was set, or the machine slept
+CLOCK_SET_S = 30.0  # clock deviation that means the clock was set or the machine slept
 
 
 class HostOfVisits:
-    """This host among several.
+    """This host, among several with one database.
 
     Args:
-        name: Name of the host, unique among the hosts.
-        store: Records the heartbeats of all hosts.
-        folders: Hold the journals of this host.
+        name: Unique name of the host.
+        store: Store that records the heartbeats of all hosts.
+        folders: Folders with the journals of this host.
     """
 
     def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
         self._name, self._store, self._folders = name, store, folders
-        self._until = 0.0  # of the monotonic clock
+        self._until = 0.0  # end of the lease, by the monotonic clock
         self._new = False
 
     async def keep(self, sessions: Sessions) -> None:
@@ -47,7 +47,7 @@ class HostOfVisits:
             await asyncio.sleep(HEARTBEAT_S)
 
     async def has(self, person: Person) -> bool:
-        """Return whether this host shows a participant's pages. Every host shows those of the first phases."""
+        """Return True if this host shows the participant's pages. Every host shows those of the first phases."""
         if person.host is None and person.phase not in PLAYED:
             return True
         if time.monotonic() > self._until:
@@ -58,26 +58,26 @@ class HostOfVisits:
         return await self._store.claim(person.id, self._name, new=self._new, journal=journal)
 
     async def leave(self) -> None:
-        """Record that no sessions run on this host any more."""
+        """Record that this host runs no more sessions."""
         await self._store.greet(self._name, leaves=True)
 
 
 async def end_absent(procedure: Procedure) -> None:
-    """Time out participants who do not return. Time in which this server did not run does not count."""
+    """Time out absent participants until cancelled. Downtime of this server does not count as absence."""
     away = procedure.plan.limits.timed_out_after
     since = time.monotonic()
     ahead = time.time() - since
     while True:
         await asyncio.sleep(SWEEP_S)
         now = time.monotonic()
-        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # signs of life are noted by that clock
+        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # last activity is stored in that clock's time
             since, ahead = now, time.time() - now
         if now - since < away:
             continue
         try:
             before = utc_now() - datetime.timedelta(seconds=away)
-            await procedure.recover(before)  # a participant whose trial is over may still answer the survey
+            await procedure.recover(before)  # their trials may be over but not recorded
             if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
-        except StoreError as error:  # the next sweep may find them
+        except StoreError as error:  # try again at the next sweep
             LOG.warning("%s", error)

@@ -1,4 +1,4 @@
-"""The pages that people see: those of phases, the last one, and messages."""
+"""Pages of the phases, last pages and messages."""
 
 import re
 from collections.abc import Mapping
@@ -17,13 +17,13 @@ from experiments.web.server.pages import page
 
 
 class VisitPages:
-    """Pages of a plan, in its texts."""
+    """Pages of a plan, with its texts."""
 
     def __init__(self, plan: VisitPlan) -> None:
         self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
 
     def show(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
-        """A page from a template, with the texts that all pages have."""
+        """Render a template with the common texts."""
         section: Any = values.get("section")
         if "paragraphs" not in values:
             values["paragraphs"] = section.paragraphs()
@@ -31,13 +31,13 @@ class VisitPages:
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
-        """A message, by the name of its text."""
+        """Show a message, by the name of its text."""
         words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
-        """The page of somebody who may not begin, by the name of its text."""
+        """Show why the study admits no new participants, by the name of the text."""
         words, platform = self._plan.texts["welcome"], self._recruiter.platform
         return self.show(
             request,
@@ -52,13 +52,13 @@ class VisitPages:
     def phase(
         self, request: Request, now: Now, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
-        """The page of the phase in which a person is; trials have pages of their own.
+        """Show the participant's current phase, unless it is a trial.
 
         Args:
-            request: Asks for it.
-            now: Where the person is.
-            identity: The platform's ids of the person.
-            refused: What was wrong with what was sent.
+            request: The request.
+            now: State of the visit.
+            identity: The platform's ids of the participant.
+            refused: Result of a rejected form.
         """
         if now.phase is None:
             return self.left(request, now.person)
@@ -71,7 +71,7 @@ class VisitPages:
         return self.show(request, shown.template, **values, back=back, finished=True)
 
     def queue(self, request: Request, now: Now, queued: Queued) -> Response:
-        """The page of somebody who waits for a place; it asks again by itself."""
+        """Show the queue page, which reloads itself."""
         section = self._plan.texts["queue"]
         values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
         texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
@@ -80,7 +80,7 @@ class VisitPages:
         return self.show(request, "queue", **around, texts=filled, refresh=round(queued.refresh))
 
     def _around(self, now: Now) -> dict[str, Any]:
-        """What the pages of all phases have."""
+        """Return the values that the pages of all phases share."""
         common, name = self._plan.texts["common"], now.phase.name if now.phase else ""
         step = common["step"].replace("{step}", str(now.number))
         section = self._plan.texts.get(name)
@@ -96,7 +96,7 @@ class VisitPages:
         }
 
     def left(self, request: Request, person: Person) -> Response:
-        """The last page of somebody who did not finish."""
+        """Show the last page of a participant who did not finish."""
         names: Mapping[str, tuple[str, str, Leaving]] = {
             "no_consent": ("consent", "declined", "no_consent"),
             "withdrawn": ("withdrawal", "left", "withdrawn"),
@@ -108,7 +108,6 @@ class VisitPages:
         return self._last(request, section, text, how)
 
     def _last(self, request: Request, section: str, text: str, how: Leaving) -> Response:
-        """A last page, by the section and the name of its text."""
         words = self._plan.texts[section]
         return self.show(
             request,

@@ -1,4 +1,4 @@
-"""Trials of people: their page, and the sockets over which they are played."""
+"""Trials of participants: their pages and WebSockets."""
 
 import asyncio
 import logging
@@ -27,22 +27,22 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Sessions
 
 LOG = logging.getLogger("mjsim.study")
-BEAT_PERIOD = 60.0  # s between two notes that somebody is still there
-SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # open at a time
-REAL_TIME_EVERY = 20  # people of a rehearsal of whom one plays in real time
+BEAT_PERIOD = 60.0  # period of recording the participant's activity, in seconds
+SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # open sockets at a time
+REAL_TIME_EVERY = 20  # in a rehearsal, one participant of this many plays in real time
 NEVER = 1e9  # seconds; HTML has no infinity
-REFRESH = 10.0, 30.0  # s after which a page in the queue asks again, at least and at most
-PATIENCE = 2.5  # times as long others wait for it
+REFRESH = 10.0, 30.0  # shortest and longest polling period of the queue page, in seconds
+PATIENCE = 2.5  # a page keeps its position for this many polling periods
 
 
 @dataclass(frozen=True)
 class Queued:
-    """Somebody who waits for a place.
+    """Position of a visit in the queue.
 
     Attributes:
-        position: 1 for who is next.
-        wait: How long that is expected to take, s.
-        refresh: After which the page is to ask again, s.
+        position: Position, from 1.
+        wait: Expected waiting time, in seconds.
+        refresh: Time until the page asks again, in seconds.
     """
 
     position: int
@@ -54,13 +54,13 @@ class Trials:
     """Trials under way on this server.
 
     Args:
-        procedure: Of the study.
-        pool: Makes workers.
-        workers: How many trials may run at a time; None for as many as the machine holds.
-        meter: Is told what sessions measure.
+        procedure: Procedure of the study.
+        pool: Pool of workers.
+        workers: Number of concurrent trials, or None to measure the machine's capacity.
+        meter: Receives session metrics.
 
     Attributes:
-        sessions: Those under way.
+        sessions: Sessions under way.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(pool, self._limit, self._plan.limits.idle, meter, capacity)
-        self._default_wait = 60.0 * self._plan.minutes  # of a whole visit, until trials have ended
-        self._sockets: Counter[str] = Counter()  # by participant and by address
+        self._default_wait = 60.0 * self._plan.minutes  # assumed duration in seconds, until trials have ended
+        self._sockets: Counter[str] = Counter()  # open sockets, by participant and by address
 
     def queued(self, visit: str) -> Queued | None:
-        """Where a visit is in the queue, by its name; None if its trial may run."""
+        """Return the position of a visit in the queue, or None if its trial may run."""
         wait = self._limit.expected_wait(self._limit.waiting + 1, self._default_wait)
         refresh = min(max(REFRESH[0], wait / 10.0), REFRESH[1])
         position = self._limit.ask(visit, PATIENCE * refresh)
@@ -83,7 +83,7 @@ class Trials:
         return Queued(position, self._limit.expected_wait(position, self._default_wait), refresh)
 
     def page(self, request: Request, now: Now, folder: VisitFolder) -> Response:
-        """Show the page of the trial that is next or under way."""
+        """Show the page of the next or current trial."""
         phase = now.person.phase
         settings = folder.settings(phase)
         by_hand = self._plan.minimum.get(TASK, 0.0) < math.inf
@@ -117,13 +117,13 @@ class Trials:
             await BrowserSocket(socket).serve(session)
         finally:
             self._sockets.subtract(sockets)
-            self._sockets += Counter()  # forgets those without any
+            self._sockets += Counter()  # removes zero counts
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        """Return whether one more socket of a participant and an address is served."""
+        """Return True if the participant and the address may open one more socket."""
         # All participants may be behind one address. A page that is loaded again has two sockets for a moment.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
@@ -133,6 +133,6 @@ class Trials:
         while True:
             try:
                 await self._store.beat(person.id)
-            except StoreError as error:  # the next one may be noted
+            except StoreError as error:  # try again next time
                 LOG.warning("%s", error)
             await asyncio.sleep(BEAT_PERIOD)

@@ -1,4 +1,4 @@
-"""The database of a study with people. Nothing outside of this package speaks to the database."""
+"""The database of a study. No other package accesses it."""
 
 from experiments.visit.store.assignments import choose
 from experiments.visit.store.copies import restore

@@ -1,4 +1,4 @@
-"""Cells and places: who gets which, in one transaction with a lock on the study."""
+"""Assignment of participants to places in cells, in transactions that lock the study."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -22,11 +22,11 @@ from experiments.visit.store.values import (
     utc_now,
 )
 
-SEEDS = 2**53  # exact as numbers of JavaScript as well
+SEEDS = 2**53  # exact in JavaScript's numbers, too
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
-# Made once, as that takes as long as running them.
+# Built once, since building a query takes as long as running it.
 _ACTIVE = update(person).where(
     person.c.id == bindparam("person"),
     person.c.study_id == bindparam("study"),
@@ -63,23 +63,23 @@ class Assignments(Part):
         now: datetime | None = None,
         abandoned_after: timedelta = timedelta(minutes=30),
     ) -> Assignment | None:
-        """The place of a person: the one they have, or a new one; None if the cells are full.
+        """Return the participant's place, assigning one if needed. None if all cells are full.
 
-        A place is held as long as its person gives signs of life. After `abandoned_after` without one it no longer
-        counts, and the next person of its cell gets it once no other is free. Whoever comes back after that gets it
-        again if it is free by then, else a new place in any cell, so ask for the place with :meth:`assignment`
-        instead where the trial has begun.
+        A place is held while its participant is active. After `abandoned_after` without activity it no longer counts,
+        and the next participant of the cell gets it if no other place is free. A participant who returns later gets the
+        same place back if it is still free, or else a new one in any cell. Once a trial has started, call
+        :meth:`assignment` instead.
 
         Args:
-            person_id: The person, whose participation must be under way.
-            cells: What the study file wants of each cell; :meth:`set_quota` may have changed the numbers.
-            rule: How a cell is chosen, see :func:`choose`.
-            rng: Source of the choice and of the person's own seeds.
-            now: The time, with its zone.
-            abandoned_after: How long a place is held without a sign of life.
+            person_id: Number of an active participant.
+            cells: Quotas of the study file. :meth:`set_quota` may have changed them.
+            rule: Rule for choosing a cell, see :func:`choose`.
+            rng: Random generator for the choice and the participant's seeds.
+            now: Current time, with a timezone.
+            abandoned_after: How long a place is held without activity.
 
         Raises:
-            StoreError: The participation is over.
+            StoreError: The participation has ended.
         """
         now = now or utc_now()
 
@@ -94,7 +94,7 @@ class Assignments(Part):
                     return await place_of(connection, person_id)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
             here = {"study": self._study_id, "since": now - abandoned_after}
-            while True:  # again if a sign of life came between the two queries
+            while True:  # repeat if a participant became active between the two queries
                 taken = await _tally(connection, _TAKEN, here)
                 cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
                 if cell is None:
@@ -110,13 +110,13 @@ class Assignments(Part):
     async def room(
         self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
     ) -> int:
-        """How many places are free, less the people who are on their way to one; below 0 if they are too many.
+        """Return the number of free places minus participants on their way to one. It may be negative.
 
         Args:
-            wanted: What the study file wants of each cell.
-            first: The first phase; who is still in it is not yet on the way.
-            abandoned_after: Time without a sign of life after which nobody counts, as in :meth:`assign`.
-            now: The time, with its zone.
+            wanted: Quotas of the study file.
+            first: First phase. Participants in it are not counted as on their way.
+            abandoned_after: Inactivity after which a participant does not count, as in :meth:`assign`.
+            now: Current time, with a timezone.
         """
         since = (now or utc_now()) - abandoned_after
         mine, there = person.c.study_id == self._study_id, person.c.seen >= since
@@ -138,18 +138,18 @@ class Assignments(Part):
         return int(sum(max(0, number) for number in free) - on_the_way)
 
     async def assignment(self, person_id: int) -> Assignment | None:
-        """The place that a person has or had."""
+        """Return the current or released place of a participant."""
         async with self._database.reading() as connection:
             return await place_of(connection, person_id)
 
     async def assignments(self) -> tuple[Assignment, ...]:
-        """Places of everybody, in the order in which they were given first."""
+        """Return all places, in the order in which they were first assigned."""
         query = select(*FIELDS).where(assignment.c.study_id == self._study_id).order_by(assignment.c.id)
         async with self._database.reading() as connection:
             return tuple(Assignment(*row) for row in await connection.execute(query))
 
     async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
-        """Change how many people a cell shall have, in place of what the study file wants; nobody loses a place."""
+        """Override the study file's number of participants in a cell. Assigned places stay."""
         if cell < 0 or wanted < 0:
             raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
         now = now or utc_now()
@@ -164,7 +164,6 @@ class Assignments(Part):
         await self._database.write(work)
 
     async def counts(self) -> Counts:
-        """How many people there are by status, by phase (of those who are under way) and by cell."""
         mine = person.c.study_id == self._study_id
         by_status = select(person.c.status, func.count()).where(mine).group_by(person.c.status)
         by_phase = select(person.c.phase, func.count()).where(mine, person.c.status.in_(ACTIVE))
@@ -219,7 +218,7 @@ class Assignments(Part):
 
 
 async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
-    """Return the first place of a cell that nobody has, else release and return an abandoned one, if any."""
+    """Return the first unassigned place of a cell, or else release and return an abandoned one, if any."""
     free = sorted(set(range(wanted)) - {holder.place for holder in holders})
     if free:
         return free[0]
@@ -233,21 +232,20 @@ async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wante
 async def _tally(
     connection: AsyncConnection, query: Select[Any], values: Mapping[str, Any] | None = None
 ) -> dict[Any, int]:
-    """Count the rows that have each value."""
     return {row[0]: row[1] for row in await connection.execute(query, values)}
 
 
 def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
-    """The cell of the next person: `balanced` takes the one that is filled least, `uniform` any that has room.
+    """Choose the next participant's cell: `balanced` the least filled one, `uniform` any with free places.
 
     Args:
-        counts: People in each cell.
-        quotas: Wanted people of each cell.
-        rule: The rule; ties are broken at random.
-        rng: Source of chance.
+        counts: Number of participants in each cell.
+        quotas: Number of wanted participants of each cell.
+        rule: The rule. Ties are broken at random.
+        rng: Random generator.
 
     Returns:
-        Index of the cell; None if all are full.
+        Index of the cell, or None if all are full.
     """
     room = [cell for cell, (count, quota) in enumerate(zip(counts, quotas, strict=True)) if count < quota]
     if not room:
@@ -260,13 +258,13 @@ def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.ran
 
 
 async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
-    """The place that a person has or had."""
+    """Return the current or released place of a participant."""
     row = (await connection.execute(_PLACE, {"person": person_id})).first()
     return None if row is None else Assignment(*row)
 
 
 async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
-    """Give a person a released place again; False if somebody else has it."""
+    """Give a participant a released place again. Return False if it is taken."""
     query = select(assignment.c.id).where(
         assignment.c.study_id == study_id,
         assignment.c.cell == place.cell,
@@ -280,7 +278,7 @@ async def take_back(connection: AsyncConnection, study_id: int, place: Assignmen
 
 
 async def set_place(connection: AsyncConnection, person_id: int, state: PlaceState) -> None:
-    """Hold, finish or release the place of a person."""
+    """Set the state of a participant's place."""
     await connection.execute(
         update(assignment)
         .where(assignment.c.person_id == person_id)

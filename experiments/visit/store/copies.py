@@ -1,4 +1,4 @@
-"""Backups: one SQLite file whatever the database is, so that restoring may move a study to another kind."""
+"""Backups. A backup of any database is one SQLite file, which can be restored into a database of any kind."""
 
 import os
 import shutil
@@ -16,17 +16,17 @@ from experiments.visit.store.engine import Database
 from experiments.visit.store.tables import metadata
 from experiments.visit.store.upgrade import upgrade
 
-ROWS = 1000  # at a time
+ROWS = 1000  # rows per INSERT
 
 
 def check_new(path: Path) -> None:
-    """Raise StoreError if a backup has another file in its way."""
+    """Raise StoreError if the file of a new backup exists."""
     if path.exists():
         raise StoreError(f"{path} is there already: name a new file for the backup.")
 
 
 async def back_up(source: Database, path: Path) -> None:
-    """Write every row, as of one moment, to a new SQLite file, which is there whole or not at all.
+    """Write a consistent snapshot of the database atomically to a new SQLite file.
 
     Raises StoreError if the file exists or cannot be written.
     """
@@ -44,27 +44,27 @@ async def back_up(source: Database, path: Path) -> None:
 
 
 def one_file(path: Path) -> None:
-    """Let a SQLite database have no log beside it, be on the disk, and be read by nobody else."""
+    """Checkpoint the WAL of a SQLite database, fsync it, and restrict the file to mode 0600."""
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
-    path.chmod(0o600)  # it holds ids of platforms
+    path.chmod(0o600)  # it contains platform ids
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
 
 async def restore(path: Path, url: str) -> None:
-    """Fill an empty database with a backup.
+    """Restore a backup into an empty database.
 
     Args:
-        path: A file that :meth:`Store.backup` wrote.
-        url: The database, see :meth:`Store.open`.
+        path: A file written by :meth:`Store.backup`.
+        url: URL of the database, see :meth:`Store.open`.
 
     Raises:
-        StoreError: The backup is missing or damaged, or the database holds a study already.
+        StoreError: The backup is missing or damaged, or the database is not empty.
     """
     if not path.is_file():
         raise StoreError(f"There is no backup {path}.")
-    with TemporaryDirectory() as folder:  # a backup of an older version is upgraded, and stays as it is
+    with TemporaryDirectory() as folder:  # an older backup is upgraded in a copy
         copy = shutil.copyfile(path, Path(folder, "backup.db"))
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
@@ -101,7 +101,7 @@ async def _copy(source: Database, target: Database) -> None:
                         rows = []
                 if rows:
                     await writing.execute(insert(table), rows)
-                if target.kind == "postgresql":  # it counts ids apart from the rows
+                if target.kind == "postgresql":  # its id sequences are separate from the rows
                     last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
                     after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
                     await writing.execute(text(f"SELECT setval({after})"))

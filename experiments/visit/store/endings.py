@@ -1,4 +1,4 @@
-"""How a participation ends, and what becomes of the place."""
+"""Ends of participations, and their effect on places."""
 
 from datetime import datetime
 
@@ -13,12 +13,12 @@ from experiments.visit.store.values import ACTIVE, Status, utc_now
 
 
 class Endings(Part):
-    """The last status of a person."""
+    """Changes of the final status."""
 
     async def finish(self, person_id: int, status: Status = "finished", now: datetime | None = None) -> bool:
-        """End a participation that is under way; whether this call did.
+        """End an active participation. Return True if it was active.
 
-        The place of somebody who finished is theirs for good; that of others goes to the next person.
+        A finished participant keeps the place. Otherwise it is released.
         """
         now = now or utc_now()
 
@@ -36,10 +36,7 @@ class Endings(Part):
         return await self._database.write(work)
 
     async def time_out(self, before: datetime) -> int:
-        """End the participations under way of whom there is no sign of life since `before`; how many.
-
-        Their places go to the next people.
-        """
+        """Time out participants inactive since `before`, and release their places. Return their number."""
         gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)
 
         async def work(connection: AsyncConnection) -> int:
@@ -52,10 +49,10 @@ class Endings(Part):
         return await self._database.write(work)
 
     async def withdraw(self, person_id: int, delete: bool, now: datetime | None = None) -> bool:
-        """Note that a person wants to take part no longer, even after finishing; whether this call did.
+        """Withdraw a participant, even after finishing. Return True if this call did.
 
-        With `delete`, the answers are deleted at once and the place goes to the next person. The person's number and
-        platform ids stay until what is owed is paid; :meth:`Store.erase` then deletes the rest.
+        With `delete`, the answers are deleted at once and the place is released. The number and platform ids stay until
+        all payments are made. :meth:`Store.erase` then deletes the rest.
         """
         now = now or utc_now()
 
@@ -79,9 +76,9 @@ class Endings(Part):
 async def end(
     connection: AsyncConnection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
 ) -> None:
-    """Give a person the last status, and finish or release the place; the study must be locked."""
+    """Set the final status of a participant, and finish or release the place. The study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
-    if status == "no_consent":  # paying nobody needs no ids; the keyed hash recognises who comes again
+    if status == "no_consent":  # ids are only needed for payment; the keyed hash still recognizes the person
         await connection.execute(delete_rows(identity).where(identity.c.person_id == person_id))
     place = await place_of(connection, person_id)
     if place is None:
@@ -91,5 +88,5 @@ async def end(
             await set_place(connection, person_id, "released")
     elif place.state == "held":
         await set_place(connection, person_id, "finished")
-    else:  # whoever comes back so late that the place is somebody else's is one more than wanted
+    else:  # if another participant has the place by now, the cell gets one more than wanted
         await take_back(connection, study_id, place, "finished")

@@ -1,4 +1,4 @@
-"""The connection to the database: short transactions, repeated where that is safe, and errors with a remedy."""
+"""The connection to the database: short transactions, safe retries, and errors with remedies."""
 
 import asyncio
 import random
@@ -27,11 +27,11 @@ DRIVERS = {
 }
 PRAGMAS = (
     "PRAGMA journal_mode = WAL",
-    "PRAGMA synchronous = FULL",  # a commit is on the disk before it returns
+    "PRAGMA synchronous = FULL",  # commits are durable
     "PRAGMA foreign_keys = ON",
-    "PRAGMA secure_delete = ON",  # what is deleted is overwritten
+    "PRAGMA secure_delete = ON",  # overwrite deleted rows
 )
-# Settings of servers, and the values with which a commit is on the disk before it returns.
+# Settings of servers, with the values that make commits durable.
 DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
     "mysql": {"@@innodb_flush_log_at_trx_commit": ("1",)},
     "postgresql": {
@@ -39,39 +39,41 @@ DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "current_setting('synchronous_commit')": ("on", "local", "remote_write", "remote_apply"),
     },
 }
-PATIENCE_S = 20  # for locks and for connections to be made
-TURN_S = 60  # for a connection that others use
+PATIENCE_S = 20  # timeout for locks and new connections, in seconds
+TURN_S = 60  # timeout for a pooled connection, in seconds
 TRIES = 9
-CONNECTIONS = 10  # kept open
-TOGETHER = 64  # changes in one transaction of SQLite
-PAUSE_S = 0.01  # before the second try, on average twice as long; doubles with each try
+CONNECTIONS = 10  # size of the connection pool
+TOGETHER = 64  # maximum number of writes per SQLite transaction
+PAUSE_S = 0.01  # doubled before each retry, in seconds
 
 
 class _UnknownError(StoreError):
-    """A commit failed in a way that says nothing about what was saved."""
+    """A commit failed with an unknown outcome."""
 
 
 class Database:
-    """One database: SQLite, MariaDB or PostgreSQL."""
+    """A database: SQLite, MariaDB or PostgreSQL."""
 
     def __init__(self, url: str) -> None:
-        """Nothing is connected yet. Raises StoreError for a URL that names no database that is known."""
+        """Parse the URL, without connecting. Raises StoreError if it is not valid."""
         self.url = _parsed(url)
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
-        self.on_write: Callable[[float], None] = lambda _: None  # is told how long each write took, s
+        self.on_write: Callable[[float], None] = lambda _: (
+            None
+        )  # called with the duration of each write, in seconds
         self._turn = asyncio.Lock()  # SQLite has one writer
         self._waiting: list[_Waiting] = []
         self._writer: asyncio.Task[None] | None = None
 
     @property
     def kind(self) -> str:
-        """`sqlite`, `mysql` (MariaDB as well) or `postgresql`."""
+        """`sqlite`, `mysql` (also for MariaDB) or `postgresql`."""
         return self.url.get_backend_name()
 
     @property
     def name(self) -> str:
-        """The URL without its password."""
+        """URL without the password."""
         return self.url.render_as_string(hide_password=True)
 
     async def close(self) -> None:
@@ -79,21 +81,21 @@ class Database:
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncConnection]:
-        """A connection to read from; each statement sees what is committed by then."""
+        """Connect for reading. Each statement sees everything committed so far."""
         async with self._connection(begin="") as connection:
             yield connection
 
     @asynccontextmanager
     async def snapshot(self) -> AsyncIterator[AsyncConnection]:
-        """A connection to read from, which sees everything as of one moment."""
+        """Connect for reading a consistent snapshot."""
         options = {"begin": "BEGIN"} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
         async with self._connection(**options) as connection:
             yield connection
 
     async def scrub(self) -> None:
-        """Let SQLite write its file anew and empty its log, so that nothing that was deleted is left in them.
+        """Vacuum a SQLite file and truncate its WAL, so that deleted rows are gone from both.
 
-        Raises StoreError if others use the database all the time, so that its log cannot be emptied.
+        Raises StoreError if the WAL cannot be truncated because the database is in constant use.
         """
         if not self._sqlite:
             return
@@ -106,7 +108,7 @@ class Database:
             )
 
     async def check(self) -> None:
-        """Raise StoreError if the file of a SQLite database is damaged."""
+        """Raise StoreError if a SQLite file is damaged."""
         if self._sqlite:
             async with self._connection(begin="") as connection:
                 found = (await connection.execute(text("PRAGMA integrity_check(1)"))).scalar()
@@ -114,7 +116,7 @@ class Database:
                 raise StoreError(damaged(self.name))
 
     async def check_durable(self) -> None:
-        """Raise StoreError if the server is set to confirm what is not on its disk yet."""
+        """Raise StoreError if the server may confirm a commit before it is on disk."""
         if self._sqlite:
             return
         async with self.reading() as connection:
@@ -140,7 +142,7 @@ class Database:
             raise StoreError(advice(error, self.name)) from error
 
     async def _connected(self) -> AsyncConnection:
-        """A connection; waits some seconds for a server that is being started."""
+        """Connect. Retry for some seconds if the server is still starting."""
         for attempt in range(1, TRIES):
             try:
                 return await self._engine.connect()
@@ -151,12 +153,12 @@ class Database:
         return await self._engine.connect()
 
     async def write(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
-        """Do work in one transaction; its result, once it is committed.
+        """Run `work` in one transaction and return its result after the commit.
 
-        The work is done again after a deadlock, a conflict or a lost connection, so it must do nothing but use the
-        connection. A connection that is lost while committing is an error: whether it is saved is not known.
+        It is run again after a deadlock, a conflict or a lost connection, so it must only use the connection. If the
+        connection is lost during the commit, the outcome is unknown and an error is raised.
 
-        Raises StoreError where the database cannot do it.
+        Raises StoreError if the database fails.
         """
         began = time.monotonic()
         if self._sqlite:
@@ -171,16 +173,19 @@ class Database:
         return result
 
     async def _write_waiting(self) -> None:
-        """Do what waits, many at a time: a commit waits for the disk, which takes longer than the rest."""
+        """Run waiting work in groups, because most of a transaction's time is the commit's wait for the disk."""
         while self._waiting:
             group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
             if len(group) > 1 and await self._write_group(group, alone=False):
                 continue
-            for one in group:  # as one of them failed, and nothing was written
+            for one in group:  # the group failed and nothing was written
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
-        """Do work in one transaction, and tell those who wait; False if nothing was written or told."""
+        """Run work in one transaction and set its futures.
+
+        Return False if nothing was written and no future was set.
+        """
         try:
             results = await self._persist([work for work, _ in group])
         except Exception as error:
@@ -191,12 +196,12 @@ class Database:
                     done.set_exception(error)
         else:
             for (_, done), result in zip(group, results, strict=True):
-                if not done.done():  # who waited is gone
+                if not done.done():  # the caller was cancelled
                     done.set_result(result)
         return True
 
     async def _persist(self, works: Sequence[Callable[[AsyncConnection], Awaitable[Any]]]) -> Sequence[Any]:
-        """Results of work in one transaction, which is tried again where that may help."""
+        """Run work in one transaction, with retries."""
         for attempt in range(1, TRIES + 1):
             try:
                 return await self._transaction(works)
@@ -254,12 +259,12 @@ def _engine(url: URL) -> AsyncEngine:
             connect_args={"timeout": PATIENCE_S, "async_creator_fn": quick_connection},
             pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
-            max_overflow=0,  # each is a thread, and takes longer to make than to wait for
+            max_overflow=0,  # each is a thread, and waiting is faster than starting one
         )
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
         return engine
-    # Every statement sees what is committed; rows that must not change meanwhile are locked by name.
+    # Every statement sees committed rows. Rows that must not change are locked explicitly.
     return create_async_engine(
         url,
         hide_parameters=True,
@@ -271,7 +276,7 @@ def _engine(url: URL) -> AsyncEngine:
 
 
 def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
-    connection.isolation_level = None  # the driver begins no transactions by itself
+    connection.isolation_level = None  # the driver starts no transactions
     cursor = connection.cursor()
     for pragma in PRAGMAS:
         cursor.execute(pragma)
@@ -279,17 +284,20 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 
 
 def _begin(connection: Connection) -> None:
-    """A transaction that will write takes the lock at once: one that reads first might have to give up later."""
+    """Start a transaction.
+
+    One that will write locks at once, since one that reads first may fail to get the lock later.
+    """
     if statement := connection.get_execution_options()["begin"]:
         connection.exec_driver_sql(statement)
 
 
 async def _pause(attempt: int) -> None:
-    """Wait before another try; all tries together take about five seconds."""
+    """Wait before the next try, about five seconds for all tries together."""
     share = random.uniform(0.5, 1.5)  # nosec B311  # no secret
     await asyncio.sleep(PAUSE_S * 2**attempt * share)
 
 
 def _again(error: SQLAlchemyError, attempt: int) -> bool:
-    """Whether the same work may succeed now; after a conflict of two writers it does at the second try."""
+    """Return True if a retry may succeed. A conflict of two writers is retried once."""
     return passes(error) or (isinstance(error, IntegrityError) and attempt == 1)

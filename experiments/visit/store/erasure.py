@@ -1,4 +1,4 @@
-"""Deletes all of a person but the fact that somebody was paid, or who the person is on a platform."""
+"""Erasure of participants, and deletion of identifying data."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -13,24 +13,24 @@ from experiments.visit.store.ledger import by_key, events_of, paid
 from experiments.visit.store.part import Part, lock_study, note
 from experiments.visit.store.values import utc_now
 
-# Those first that refer to others.
+# In an order that keeps foreign keys valid.
 OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.identity, tables.payment)
 
 
 class Erasure(Part):
-    """Deletes rows of a person."""
+    """Deletes rows of participants."""
 
     async def erase(
         self, person_id: int, who: str, now: datetime | None = None, *, unpaid: bool = False
     ) -> None:
-        """Delete every row of a person. The audit log keeps the number, and kinds and amounts of what was paid.
+        """Delete all rows of a participant. The audit log keeps the number, and the kinds and amounts of payments.
 
-        The person's folder, backups and exports are the caller's. SQLite overwrites what is deleted; MariaDB and
-        PostgreSQL do so when they clean up. With `unpaid`, also somebody who is owed something, as in a backup that
-        is older than the payment.
+        The caller deletes the visit's folder, backups and exports. SQLite overwrites deleted rows. MariaDB and
+        PostgreSQL do so at their next clean-up. `unpaid` allows erasing a participant with unpaid payments, as in a
+        backup from before the payment.
 
         Raises:
-            StoreError: There is no such person, or the person is owed something.
+            StoreError: There is no such participant, or a payment is still owed.
         """
         now = now or utc_now()
 
@@ -57,7 +57,7 @@ class Erasure(Part):
         await self._database.scrub()
 
     async def known(self, before: datetime) -> tuple[int, ...]:
-        """Numbers of people who can still be recognised, and who gave their last sign before a time."""
+        """Return the numbers of identifiable participants inactive since `before`."""
         mine = (tables.person.c.study_id == self._study_id, tables.person.c.seen < before)
         recognised = tables.identity.c.id.is_not(None) | tables.person.c.platform_key.is_not(None)
         query = select(tables.person.c.id).outerjoin(tables.identity).where(*mine, recognised)
@@ -66,15 +66,14 @@ class Erasure(Part):
             return tuple((await connection.execute(query)).scalars())
 
     async def forget(self, person_ids: Sequence[int], names: Sequence[str], who: str) -> None:
-        """Delete who people are on their platform, and by what they would be recognised.
+        """Delete identifying data: platform ids, keys, links and receipts of payments.
 
-        What they did and answered stays, and what they were paid, without the platform's receipts. Their links end,
-        and they could take part again.
+        Measures, answers and amounts stay. The links no longer work, and the participants could take part again.
 
         Args:
-            person_ids: Numbers of the people.
-            names: Of each the name that replaces the hash of the link, also in the paths of runs.
-            who: Deletes, for the audit log.
+            person_ids: Numbers of the participants.
+            names: New names of their folders in place of the hash of the link, in the same order.
+            who: Author for the audit log.
         """
         now = utc_now()
 

@@ -1,4 +1,4 @@
-"""What an error of a database means, and what to do about it."""
+"""Database errors: which ones to retry, and messages with remedies."""
 
 from sqlalchemy.exc import DBAPIError, IntegrityError, SQLAlchemyError, TimeoutError
 
@@ -10,7 +10,7 @@ PASSING = {
     "40001",  # PostgreSQL: conflict of two transactions
     "40P01",  # PostgreSQL: deadlock
 }
-# MariaDB's number, PostgreSQL's state, or words of the message -> what it means and what to do
+# MariaDB's numbers, PostgreSQL's states or parts of messages, each with cause and remedy
 MEANINGS = (
     (
         ("1045", "1044", "28P01", "42501", "authentication failed", "FATAL:  role", "pg_hba.conf"),
@@ -33,14 +33,14 @@ MEANINGS = (
 
 
 def passes(error: SQLAlchemyError) -> bool:
-    """Whether the same transaction may succeed if it is done again."""
+    """Return True if a retry of the transaction may succeed."""
     if not isinstance(error, DBAPIError):
         return False
     return error.connection_invalidated or bool(_codes(error) & PASSING) or _meaning(error) == UNREACHABLE
 
 
 def advice(error: SQLAlchemyError, database: str) -> str:
-    """A sentence that says what is wrong and what to do."""
+    """Return a sentence with the cause and the remedy."""
     if isinstance(error, TimeoutError):
         return (
             f"The database {database} is busy: every connection is in use. Try again, or let fewer people in."
@@ -53,7 +53,6 @@ def advice(error: SQLAlchemyError, database: str) -> str:
 
 
 def damaged(database: str) -> str:
-    """What to do about a damaged file."""
     return f"The database {database} {DAMAGED}"
 
 
@@ -66,6 +65,6 @@ def _meaning(error: DBAPIError) -> str | None:
 
 
 def _codes(error: DBAPIError) -> set[str]:
-    """Number of MariaDB's error, and PostgreSQL's state."""
+    """Return MariaDB's error number and PostgreSQL's state."""
     number = error.orig.args[:1] if error.orig is not None else ()
     return {str(code) for code in (*number, getattr(error.orig, "sqlstate", None))}

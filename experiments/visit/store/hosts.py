@@ -1,6 +1,6 @@
-"""Several hosts with one database: which of them are there, and which one keeps what a person plays.
+"""Several hosts with one database: heartbeats, and which host has which visit.
 
-When a host was heard of is told by the database's clock, as those of hosts may be wrong.
+Times are those of the database's clock, since the hosts' clocks may be wrong.
 """
 
 from datetime import datetime, timedelta
@@ -13,16 +13,16 @@ from experiments.visit.store.part import Part, database_now, note
 from experiments.visit.store.tables import assignment, host, person
 from experiments.visit.store.values import Host
 
-LEASE = timedelta(seconds=60)  # without a word from it, a host ends its sessions
-SILENT = timedelta(seconds=90)  # and some time later, others may have them
-HANDED_OVER = "-"  # in place of a host: whoever has the journal
+LEASE = timedelta(seconds=60)  # without a successful heartbeat for this long, a host ends its sessions
+SILENT = timedelta(seconds=90)  # a host without heartbeats for this long may be handed over
+HANDED_OVER = "-"  # host name that stands for any host with the journal
 
 
 class Hosts(Part):
     """Rows of `host`, and `person.host`."""
 
     async def greet(self, name: str, *, leaves: bool = False) -> bool:
-        """Note that a host is there, or that it leaves; whether it takes new visits."""
+        """Record a heartbeat or departure. Return whether the host accepts new visits."""
         mine = (host.c.study_id == self._study_id, host.c.name == name)
 
         async def work(connection: AsyncConnection) -> bool:
@@ -40,18 +40,18 @@ class Hosts(Part):
             return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
 
     async def claim(self, person_id: int, name: str, *, new: bool, journal: bool) -> bool:
-        """Let a host keep what a person plays, for good; whether it does.
+        """Let a host have the trials of a participant. Return True if it has them.
 
         Args:
-            person_id: The person.
-            name: Of the host.
-            new: Whether the host takes new visits.
-            journal: Whether it has the journal of the person.
+            person_id: Number of the participant.
+            name: Name of the host.
+            new: True if the host accepts new visits.
+            journal: True if the host has the participant's journal.
         """
         may = [person.c.host == name]
         if journal:
             may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
-        elif new:  # who has a place has a journal elsewhere
+        elif new:  # a participant with a place has a journal elsewhere
             may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
 
         async def work(connection: AsyncConnection) -> bool:
@@ -61,7 +61,7 @@ class Hosts(Part):
         return await self._database.write(work)
 
     async def drain(self, name: str, draining: bool, who: str) -> None:
-        """Let a host take no new visits, or take them again; those it has go on."""
+        """Stop or allow new visits on a host. Visits that it has continue."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)
@@ -75,9 +75,9 @@ class Hosts(Part):
         await self._database.write(work)
 
     async def hand_over(self, name: str, who: str, now: datetime | None = None) -> int:
-        """Let whoever has their journals have the visits of a host that is gone; how many visits.
+        """Release the visits of a dead host to the hosts that have their journals. Return the number of visits.
 
-        Raises StoreError while the host may still run them.
+        Raises StoreError while the host may still be running.
         """
 
         async def work(connection: AsyncConnection) -> int:

@@ -1,8 +1,8 @@
-"""What people are paid: an append-only list of events, from which follows what is owed.
+"""Payments of participants: an append-only list of events that determines what is owed.
 
-Every payment has a key. `sending` is on the disk before the platform is asked, so after a crash between the platform's
-yes and our note the payment is known to be in doubt: the platform is asked what it knows of the key before anything is
-sent again. How long ago that was is told by the database's clock.
+Every payment has a key. The event `sending` is written before the platform is asked. After a crash between the
+platform's answer and the next event, the payment is in doubt, so the platform is asked about its key before anything is
+sent again. Times are those of the database's clock.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ ONCE: tuple[PaymentKind, ...] = (
     "reward",
     "screen_out",
     "partial",
-)  # a person gets one of these, and only once
+)  # kinds of which a participant gets at most one
 IN_DOUBT_AFTER = timedelta(minutes=10)
 _FIELDS = [column for column in payment.c if column.name != "study_id"]
 
@@ -39,20 +39,20 @@ class Ledger(Part):
         note: str = "",
         now: datetime | None = None,
     ) -> bool:
-        """Note that a person is owed something; False if the key has been decided already.
+        """Record that a payment is owed. Return False if the same payment is recorded already.
 
         Args:
-            person_id: The person.
-            kind: What it is for. A person gets at most one of `reward`, `screen_out` and `partial`.
-            cents: Hundredths of the currency; 0 for a rejection.
-            currency: Three letters.
-            key: Names the payment for ever, such as `12-reward`; at most 100 characters.
-            note: Why.
-            now: The time, with its zone.
+            person_id: Number of the participant.
+            kind: Kind of the payment. A participant gets at most one of `reward`, `screen_out` and `partial`.
+            cents: Hundredths of the currency, 0 for a rejection.
+            currency: Three-letter code.
+            key: Permanent name of the payment, such as `12-reward`, of at most 100 characters.
+            note: Reason.
+            now: Current time, with a timezone.
 
         Raises:
-            StoreError: The key stands for something else, or the person has been given one of the kinds that are
-                given once, or the amount or kind is unusable.
+            StoreError: The key is used for another payment, the participant already has one of these kinds, or
+                the amount or kind is not valid.
         """
         _check(kind, cents, currency)
         same = (person_id, kind, cents, currency)
@@ -75,11 +75,11 @@ class Ledger(Part):
         return await self._database.write(work)
 
     async def begin_sending(self, key: str, now: datetime | None = None) -> int | None:
-        """Ask for leave to send a payment: the number of this attempt, or None if it must not be sent now.
+        """Request to send a payment. Return the number of the attempt, or None if it must not be sent now.
 
-        It must not if it is paid, or if another attempt is under way or in doubt. Ask the platform at once, with a
-        time-out well below ten minutes: after those :meth:`owed` offers the payment to others, who ask the platform
-        what it knows of the key.
+        It must not be sent if it is paid, or if another attempt is under way or in doubt. Ask the platform at once,
+        with a timeout well below ten minutes. After ten minutes :meth:`owed` returns the payment to other callers, who
+        ask the platform about its key.
         """
 
         async def work(connection: AsyncConnection) -> int | None:
@@ -95,7 +95,7 @@ class Ledger(Part):
     async def confirm(
         self, key: str, attempt: int, reference: str, note: str = "", now: datetime | None = None
     ) -> bool:
-        """Note that the platform has paid, with its own reference; False if that is known already."""
+        """Record the platform's payment with its reference. Return False if it is recorded already."""
 
         async def work(connection: AsyncConnection) -> bool:
             events = await self._known(connection, key)
@@ -108,9 +108,9 @@ class Ledger(Part):
         return await self._database.write(work)
 
     async def fail(self, key: str, attempt: int, note: str, now: datetime | None = None) -> bool:
-        """Note that the platform has certainly not paid in this attempt, which may be made again; whether it was noted.
+        """Record that the platform has certainly not paid in this attempt. Return False if it is not the current one.
 
-        Never call this after a time-out or a lost connection: the payment is in doubt then.
+        Never call this after a timeout or a lost connection, when the payment is in doubt.
         """
 
         async def work(connection: AsyncConnection) -> bool:
@@ -125,10 +125,10 @@ class Ledger(Part):
     async def owed(
         self, now: datetime | None = None, in_doubt_after: timedelta = IN_DOUBT_AFTER
     ) -> tuple[PaymentEvent, ...]:
-        """The last events of payments that are not confirmed, without those that somebody began to send a moment ago.
+        """Return the last events of unconfirmed payments, except those that another process has just started to send.
 
-        Where it is `sending`, the payment is in doubt: ask the platform what it knows of the key, then
-        :meth:`confirm` or :meth:`fail` that attempt.
+        If the event is `sending`, the payment is in doubt. Ask the platform about its key, then :meth:`confirm` or
+        :meth:`fail` the attempt.
         """
         limit = (now or await self.now()) - in_doubt_after
         payments = by_key(await self.history()).values()
@@ -136,12 +136,12 @@ class Ledger(Part):
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
 
     async def now(self) -> datetime:
-        """The time by the clock that tells when events were noted."""
+        """Return the time of the clock that stamps events."""
         async with self._database.reading() as connection:
             return await database_now(connection)
 
     async def history(self, person_id: int | None = None) -> tuple[PaymentEvent, ...]:
-        """Events of a person, or all, in order."""
+        """Return all events in order, or those of one participant."""
         which = [payment.c.study_id == self._study_id]
         if person_id is not None:
             which.append(payment.c.person_id == person_id)
@@ -155,7 +155,7 @@ class Ledger(Part):
         return events
 
     async def _events(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
-        """Events of a key; nobody adds any until the transaction ends."""
+        """Return the events of a key, and lock the study so that no other process adds any."""
         await lock_study(connection, self._study_id)
         return await events_of(connection, payment.c.study_id == self._study_id, payment.c.key == key)
 
@@ -200,7 +200,6 @@ def _check(kind: str, cents: int, currency: str) -> None:
 
 
 def _same(event: PaymentEvent) -> dict[str, Any]:
-    """What all events of a payment have in common."""
     return {
         "person_id": event.person_id,
         "kind": event.kind,
@@ -222,5 +221,5 @@ def by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
 
 
 def paid(events: Sequence[PaymentEvent]) -> bool:
-    """Whether the platform is known to have paid."""
+    """Return True if the platform is known to have paid."""
     return any(event.event == "confirmed" for event in events)

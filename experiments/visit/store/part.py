@@ -1,4 +1,4 @@
-"""What every part of the store has: the database and the study."""
+"""The base of the store's classes."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -18,28 +18,24 @@ _NOW = {
 
 
 class Part:
-    """Rows of one study in a database."""
+    """Access to the rows of one study."""
 
     def __init__(self, database: Database, study_id: int) -> None:
         self._database, self._study_id = database, study_id
 
 
 def new_id(inserted: CursorResult[Any]) -> int:
-    """The id of a row that was inserted."""
     key = inserted.inserted_primary_key
     return int(key[0]) if key else 0
 
 
 async def database_now(connection: AsyncConnection) -> datetime:
-    """The time by the clock of the database, which all hosts share; those of hosts may be wrong."""
+    """Return the time of the database's clock, which all hosts share."""
     return (await connection.execute(select(_NOW[connection.dialect.name]))).scalar_one()
 
 
 async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
-    """Let others who lock the study wait until this transaction ends; its changed quotas, by cell.
-
-    SQLite has locked the whole database.
-    """
+    """Lock the study's row until the transaction ends, and return the changed quotas by cell."""
     query = select(tables.study.c.quotas).where(tables.study.c.id == study_id).with_for_update()
     return dict((await connection.execute(query)).scalar_one())
 

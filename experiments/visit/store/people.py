@@ -1,4 +1,4 @@
-"""Who takes part: arrivals, signs of life, and who somebody is on their platform."""
+"""Participants: arrival, activity and platform ids."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,7 +25,7 @@ _FIELDS = (
     person.c.delete_wanted,
     person.c.host,
 )
-# Made once, as that takes as long as running it.
+# Built once, since building a query takes as long as running it.
 _FIND = select(*_FIELDS).where(
     person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
 )
@@ -43,18 +43,18 @@ class People(Part):
         phase: str,
         now: datetime | None = None,
     ) -> Person:
-        """The person who comes with a link: a new one, or the one who came before.
+        """Return the participant of a link, adding a new one or finding an earlier arrival.
 
-        A person who comes back keeps the token hash of the first arrival, so make the token from what makes the key.
+        A returning participant keeps the token hash of the first arrival, so derive the token from the key.
 
         Args:
-            platform: Where the person comes from, such as `prolific`; at most 20 characters.
-            key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal; None for links without an id.
-            identity: The platform's own ids. They are kept apart, and never exported. Those of the last arrival before
-                the end of the participation stay.
+            platform: Recruitment platform, such as `prolific`, of at most 20 characters.
+            key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal. None for links without an id.
+            identity: The platform's ids, which are stored separately and never exported. An active participant's ids
+                are replaced by those of the last arrival.
             token_hash: SHA-256 of the link's token, hexadecimal.
-            phase: The first phase of the study.
-            now: The time, with its zone.
+            phase: First phase of the study.
+            now: Current time, with a timezone.
         """
         now = now or utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
@@ -63,7 +63,7 @@ class People(Part):
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
                 found = replace(_person(known), returning=True)
-                if found.active:  # who gave a task back and accepted it again is paid for the new one
+                if found.active:  # a task that is returned and accepted again has new ids for payment
                     mine = ids.c.person_id == found.id
                     await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
                 return found
@@ -85,14 +85,14 @@ class People(Part):
         return await self._database.write(work)
 
     async def find(self, token_hash: str) -> Person | None:
-        """The person whom a link belongs to."""
+        """Return the participant of a link, or None."""
         async with self._database.reading() as connection:
             found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
             row = found.first()
             return None if row is None else _person(row)
 
     async def person(self, person_id: int) -> Person:
-        """A person by number; a StoreError if there is none."""
+        """Return a participant by number. Raises StoreError if there is none."""
         async with self._database.reading() as connection:
             row = (await connection.execute(self._select(person.c.id == person_id))).first()
         if row is None:
@@ -102,19 +102,19 @@ class People(Part):
         return _person(row)
 
     async def people(self, status: Status | None = None) -> tuple[Person, ...]:
-        """Everybody, or those of one status, in order of arrival."""
+        """Return all participants, or those of one status, in order of arrival."""
         query = self._select() if status is None else self._select(person.c.status == status)
         async with self._database.reading() as connection:
             return tuple(_person(row) for row in await connection.execute(query.order_by(person.c.id)))
 
     async def identity(self, person_id: int) -> dict[str, str]:
-        """The platform's own ids of a person, for paying alone; empty if they are erased."""
+        """Return a participant's platform ids, which are only used for payment. Empty if they are erased."""
         query = select(ids.c.ids).where(ids.c.person_id == person_id)
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
 
     async def beat(self, person_id: int, now: datetime | None = None) -> None:
-        """Note a sign of life, which keeps the person's place."""
+        """Record activity of a participant, which keeps the place."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:

@@ -1,4 +1,4 @@
-"""How far a person is: phases, answers and trials."""
+"""Progress of participants: phases, answers and trials."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -13,7 +13,7 @@ from experiments.visit.store.tables import answer, person, trial
 from experiments.visit.store.tables import phase as phases
 from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
 
-# Made once, as that takes as long as running them.
+# Built once, since building a query takes as long as running it.
 _PHASE = select(*[column for column in phases.c if column.name != "id"]).where(
     phases.c.person_id == bindparam("person"), phases.c.name == bindparam("phase")
 )
@@ -43,7 +43,7 @@ class Phases(Part):
     """Rows of `phase`, `answer` and `trial`."""
 
     async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
-        """Note when a phase was shown first; the phase, as it was shown first."""
+        """Record when the phase was first shown, and return its row."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> PhaseRow:
@@ -69,21 +69,20 @@ class Phases(Part):
         status: Status | None = None,
         now: datetime | None = None,
     ) -> bool:
-        """Move a person to the next phase and make the answers of this one final, in one transaction.
+        """Advance a participant to the next phase and make the answers final, in one transaction.
 
-        Returns whether this call did. It does nothing if another phase is under way (a form that was sent twice, the
-        back button, a second tab) or if the participation is over.
+        Return False if the participant is in another phase (double submission, back button, second tab) or has ended.
 
         Args:
-            person_id: The person.
-            name: The phase that ends.
-            next_name: The phase that follows.
-            answers: Answers by item; they replace those that were saved before.
-            reason: Why the phase ended, where it can end in several ways.
-            duration_s: How long it took, s; by default since it was shown first.
-            attempts: How many attempts it took.
-            status: Ends the participation as well, such as `finished` after the last phase.
-            now: The time, with its zone.
+            person_id: Number of the participant.
+            name: Phase that ends.
+            next_name: Phase that follows.
+            answers: Answers by item. They replace saved ones.
+            reason: Reason for ending, for phases with several.
+            duration_s: Duration in seconds, by default the time since the phase was first shown.
+            attempts: Number of attempts.
+            status: Final status that ends the participation too, such as `finished` after the last phase.
+            now: Current time, with a timezone.
         """
         now = now or utc_now()
 
@@ -107,9 +106,9 @@ class Phases(Part):
     async def save_answers(
         self, person_id: int, phase: str, values: Mapping[str, Any], now: datetime | None = None
     ) -> bool:
-        """Keep answers as they are given; saving again replaces them. Whether they are kept.
+        """Save or replace answers of the current phase. Return False if the participant is in another phase.
 
-        They are not if another phase is under way: answers of a phase that has ended never change.
+        Answers of a phase that has ended never change.
         """
         now = now or utc_now()
 
@@ -125,10 +124,7 @@ class Phases(Part):
     async def finish_trial(
         self, person_id: int, phase: str, folder: str, ended: str, now: datetime | None = None
     ) -> None:
-        """Note a trial that is over, its run directory relative to the study's folder, and how it ended.
-
-        Doing it again replaces what was noted.
-        """
+        """Record or replace the end of a trial, with its run directory relative to the study's folder."""
         values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
 
         async def work(connection: AsyncConnection) -> None:
@@ -139,20 +135,20 @@ class Phases(Part):
         await self._database.write(work)
 
     async def phases(self, person_id: int | None = None) -> tuple[PhaseRow, ...]:
-        """Phases of a person, or of everybody, in the order in which they were shown."""
+        """Return the phases of one or all participants, in the order in which they were shown."""
         return tuple(PhaseRow(*row) for row in await self._rows(phases, person_id))
 
     async def answers(self, person_id: int | None = None) -> tuple[Answer, ...]:
-        """Answers of a person, or of everybody, in the order in which they were given first."""
+        """Return the answers of one or all participants, in the order in which they were first given."""
         return tuple(Answer(*row) for row in await self._rows(answer, person_id))
 
     async def answers_to(self, phase: str, item: str) -> tuple[Answer, ...]:
-        """Final answers of everybody to one item."""
+        """Return all final answers to one item."""
         asked = (answer.c.phase == phase, answer.c.item == item, answer.c.final.is_(True))
         return tuple(Answer(*row) for row in await self._rows(answer, None, *asked))
 
     async def trials(self, person_id: int | None = None) -> tuple[TrialRow, ...]:
-        """Trials of a person, or of everybody."""
+        """Return the trials of one or all participants."""
         return tuple(TrialRow(*row) for row in await self._rows(trial, person_id))
 
     async def _rows(self, table: Table, person_id: int | None, *which: ColumnElement[bool]) -> Any:
@@ -173,7 +169,7 @@ async def _end_phase(
     row = await _phase(connection, person_id, name)
     if how["duration_s"] is None:
         how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
-    if row is None:  # it was never shown, such as a phase that is skipped
+    if row is None:  # the phase was never shown
         new = {"person_id": person_id, "name": name, "shown": now, "ended": now, **how}
         await connection.execute(insert(phases), new)
         return
@@ -189,7 +185,7 @@ async def _save(
     *,
     final: bool = False,
 ) -> None:
-    """Insert or replace; with `final`, make all answers of the phase final. The person's row must be locked."""
+    """Insert or update answers. `final` makes all answers of the phase final. The person's row must be locked."""
     mine = (answer.c.person_id == person_id, answer.c.phase == phase)
     known = set((await connection.execute(_ITEMS, {"person": person_id, "which": phase})).scalars())
     for item in known & set(values):

@@ -1,4 +1,4 @@
-"""Who may see the researcher's page: passwords, roles and logins that can be revoked."""
+"""Accounts of the researcher's page: passwords, roles and revocable logins."""
 
 import asyncio
 import re
@@ -17,7 +17,7 @@ from experiments.visit.store.values import Researcher, Role, utc_now
 if TYPE_CHECKING:
     from argon2 import PasswordHasher
 
-PASSWORD_MEMORY_KIB = 65_536  # what hashing a password takes, by RFC 9106
+PASSWORD_MEMORY_KIB = 65_536  # memory cost of hashing a password, by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
 _FIELDS = (
     researcher.c.id,
@@ -29,7 +29,7 @@ _FIELDS = (
 
 
 class Researchers:
-    """Rows of `researcher` and `login`, which hold for every study of a database."""
+    """Rows of `researcher` and `login`, shared by all studies of a database."""
 
     def __init__(self, database: Database, memory_kib: int) -> None:
         self._database = database
@@ -42,7 +42,7 @@ class Researchers:
         return PasswordHasher(memory_cost=self._memory_kib)
 
     async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
-        """Let somebody in. Raises StoreError if the name is taken or unusable, or the role unknown."""
+        """Add a researcher. Raises StoreError if the name is taken or not valid, or the role is unknown."""
         if not NAME.fullmatch(name):
             raise StoreError(f"{name!r} cannot be a name: use up to 60 of a-z, 0-9 and the signs . _ @ -")
         values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
@@ -63,9 +63,9 @@ class Researchers:
             return tuple(Researcher(*row) for row in await connection.execute(select(*_FIELDS)))
 
     async def check(self, name: str, password: str) -> Researcher | None:
-        """Who has this name and password; None for a wrong one, and for who is disabled.
+        """Return the researcher with these credentials, or None if they are wrong or the account is disabled.
 
-        It takes as long for a name that nobody has. How often it may be tried is the caller's to limit.
+        Unknown names take as long as known ones. The caller limits the number of attempts.
         """
         row = await self._row(name) if NAME.fullmatch(name) else None
         if row is None:
@@ -88,7 +88,7 @@ class Researchers:
         disabled: bool | None = None,
         now: datetime | None = None,
     ) -> None:
-        """Change what is given, and end the logins of the researcher."""
+        """Change the given values, and end all logins of the researcher."""
         values: dict[str, object] = {}
         if password is not None:
             values["password"] = await self._hash(password)
@@ -113,7 +113,7 @@ class Researchers:
     async def log_in(
         self, researcher_id: int, token_hash: str, expires: datetime, now: datetime | None = None
     ) -> None:
-        """Begin a login; only the SHA-256 of its token is kept."""
+        """Start a login. Only the SHA-256 of its token is stored."""
         values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
 
         async def work(connection: AsyncConnection) -> None:
@@ -122,7 +122,7 @@ class Researchers:
         await self._database.write(work)
 
     async def who(self, token_hash: str, now: datetime | None = None) -> Researcher | None:
-        """Whose login this is, unless it has expired or was revoked, or the researcher is disabled."""
+        """Return the researcher of a valid login, or None."""
         query = (
             select(*_FIELDS)
             .join(login, login.c.researcher_id == researcher.c.id)
@@ -147,7 +147,7 @@ class Researchers:
             return (await connection.execute(query)).first()
 
     async def _hash(self, password: str) -> str:
-        """Hash in a thread, since the default memory makes it take a tenth of a second on purpose."""
+        """Hash in a thread, since hashing is slow by design."""
         return await asyncio.to_thread(self._hasher.hash, password)
 
 

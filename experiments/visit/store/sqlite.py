@@ -1,4 +1,4 @@
-"""SQLite for an event loop: a statement runs at once where it takes less time than handing it to a thread."""
+"""SQLite in an event loop. Fast statements run directly, which takes less time than a thread."""
 
 import sqlite3
 from collections.abc import Callable
@@ -11,9 +11,9 @@ SLOW = ("Connection.commit", "Connection.close")
 
 
 class QuickConnection(aiosqlite.Connection):
-    """Uses its thread only for what may wait: for the lock of another process, or for the disk.
+    """Uses the thread only for operations that may wait for a lock or the disk.
 
-    Readers of a database in WAL mode wait for nobody, and writers have the lock by then.
+    In WAL mode readers never wait, and writers have the lock by then.
     """
 
     async def _execute(self, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -25,7 +25,7 @@ class QuickConnection(aiosqlite.Connection):
 
 
 def quick_connection(database: str, **options: Any) -> QuickConnection:
-    """A connection that is not open yet, as SQLAlchemy awaits it."""
+    """Return an unopened connection, as SQLAlchemy's `async_creator_fn` requires."""
     connection = QuickConnection(
         lambda: sqlite3.connect(database, **{**options, "check_same_thread": False}), iter_chunk_size=64
     )

@@ -1,4 +1,4 @@
-"""The store of a study: who takes part, how far they are, what they answered, what they are paid."""
+"""The store of a study: participants, progress, answers and payments."""
 
 import sqlite3
 from collections.abc import Awaitable, Callable, Mapping
@@ -28,17 +28,16 @@ from experiments.visit.store.values import AuditRow, StudyRow, StudyState, utc_n
 
 
 class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
-    """The database of one study. What a method has returned from is on the disk.
+    """The database of one study. Changes are on disk when a method returns.
 
-    Every method raises :class:`~experiments.errors.StoreError` where the database cannot do it.
+    All methods raise :class:`~experiments.errors.StoreError` if the database fails.
 
     Attributes:
-        ledger: What people are paid.
-        researchers: Who may see the researcher's page; the same for all studies of a database.
+        ledger: Payments of participants.
+        researchers: Accounts of the researcher's page, shared by all studies of a database.
     """
 
     def __init__(self, database: Database, study_id: int, password_memory_kib: int) -> None:
-        """See :meth:`open`."""
         super().__init__(database, study_id)
         self.ledger = Ledger(database, study_id)
         self.researchers = Researchers(database, password_memory_kib)
@@ -47,13 +46,13 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
     async def open(
         cls, url: str, study_name: str, file_hash: str, *, password_memory_kib: int = PASSWORD_MEMORY_KIB
     ) -> Self:
-        """Open a database, make or upgrade its tables, and find or add the study.
+        """Open a database, create or upgrade its tables, and find or add the study.
 
         Args:
             url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
-            study_name: Name of the study; one database may hold several.
-            file_hash: SHA-256 of the study file, hexadecimal. Another one than before is noted in the audit log.
-            password_memory_kib: Memory that hashing a researcher's password takes. Tests use little.
+            study_name: Name of the study. A database may hold several.
+            file_hash: SHA-256 of the study file, hexadecimal. A change is recorded in the audit log.
+            password_memory_kib: Memory cost of hashing a researcher's password. Tests use little.
         """
         database = Database(url)
         try:
@@ -68,18 +67,18 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await self._database.close()
 
     def on_write(self, tell: Callable[[float], None]) -> None:
-        """Tell how long each transaction that writes took, s."""
+        """Call `tell` with the duration of each write, in seconds."""
         self._database.on_write = tell
 
     def is_at(self, path: Path) -> bool:
-        """Return whether the database is this file."""
+        """Return True if the database is this file."""
         return (
             self._database.kind == "sqlite"
             and path.resolve() == Path(self._database.url.database or "").resolve()
         )
 
     async def backup(self, path: Path) -> None:
-        """Write the whole database, as of one moment, to a new SQLite file; people may go on meanwhile."""
+        """Write a consistent snapshot of the database to a new SQLite file, while the study continues."""
         await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
@@ -89,7 +88,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         return StudyRow(row.id, row.name, row.file_hash, row.state, row.created, quotas)
 
     async def set_state(self, state: StudyState, who: str, now: datetime | None = None) -> None:
-        """Open, pause or close the study, and note who did."""
+        """Open, pause or close the study."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
@@ -101,7 +100,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
     async def audit(
         self, who: str, action: str, details: Mapping[str, Any] | None = None, now: datetime | None = None
     ) -> None:
-        """Note who did what. People are named by their number; never note a platform's id."""
+        """Add a line to the audit log. Name participants by number, never by a platform's id."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
@@ -117,9 +116,9 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
 
 
 async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
-    """Let `work` change what a backup or another SQLite file holds of a study, and return what it returned.
+    """Apply `work` to a study in a backup or another SQLite file, and return its result.
 
-    Raises StoreError if the file cannot be read, or the database cannot do it.
+    Raises StoreError if the file cannot be read or changed.
     """
     try:
         with closing(sqlite3.connect(path)) as connection:
@@ -133,7 +132,7 @@ async def change_database(path: Path, study_name: str, work: Callable[[Store], A
         return await work(store)
     finally:
         await store.close()
-        with suppress(sqlite3.OperationalError):  # another process serves it
+        with suppress(sqlite3.OperationalError):  # another process has it open
             one_file(path)
 
 

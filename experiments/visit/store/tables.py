@@ -1,4 +1,4 @@
-"""The tables of a study's database. The migrations make them; a test holds both to each other."""
+"""The tables of a study's database. Migrations create them, and a test compares both."""
 
 import json
 from datetime import UTC, datetime
@@ -23,18 +23,18 @@ from sqlalchemy import (
 from sqlalchemy.dialects import mysql
 from sqlalchemy.types import BigInteger
 
-NAME = 100  # characters of names, phases, items and reasons
-HASH = 64  # hexadecimal digits of SHA-256
+NAME = 100  # maximum length of names, phases, items and reasons, in characters
+HASH = 64  # length of a SHA-256, in hexadecimal digits
 
 
 class Utc(TypeDecorator[datetime]):
-    """A time with its zone: kept in UTC without the zone, which SQLite and MariaDB cannot keep."""
+    """A time with a timezone, stored as UTC without it, since SQLite and MariaDB cannot store timezones."""
 
     impl = DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
-        """To UTC; a ValueError where the zone is missing."""
+        """Convert to UTC. Raises ValueError if the timezone is missing."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -46,17 +46,16 @@ class Utc(TypeDecorator[datetime]):
 
 
 class Json(TypeDecorator[Any]):
-    """A value as JSON text in ASCII, so that every character survives every database."""
+    """A value as ASCII JSON text, so that every character survives every database."""
 
     impl = Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
     cache_ok = True
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str:  # noqa: ARG002
-        """To JSON; a ValueError for NaN and infinity, a TypeError for what JSON does not have."""
+        """Encode as JSON. Raises ValueError for NaN and infinity, and TypeError for other unsupported values."""
         return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> Any:  # noqa: ARG002
-        """From JSON."""
         return None if value is None else json.loads(value)
 
 
@@ -69,7 +68,7 @@ metadata = MetaData(
     }
 )
 
-# SQLite would use the id of a deleted row again; MariaDB would compare text without regard to case.
+# By default, SQLite reuses ids of deleted rows, and MariaDB compares text case-insensitively.
 OPTIONS: dict[str, Any] = {
     "sqlite_autoincrement": True,
     "mysql_engine": "InnoDB",
@@ -112,7 +111,7 @@ person = Table(
     Column("created", Utc, nullable=False),
     Column("seen", Utc, nullable=False),
     Column("delete_wanted", Boolean, nullable=False),
-    Column("host", String(NAME)),  # that keeps what is played; NULL where there is but one
+    Column("host", String(NAME)),  # host that has the participant's trials; NULL if there is only one
     UniqueConstraint("study_id", "platform_key"),
     **OPTIONS,
 )
@@ -126,8 +125,8 @@ identity = Table(
     **OPTIONS,
 )
 
-# `active` is 1 while the place is held or finished and NULL once it is released, so that the last constraint lets
-# nobody have a place that another person has.
+# `active` is 1 while the place is held or finished, and NULL once it is released. So the last constraint keeps two
+# participants from having the same place.
 assignment = Table(
     "assignment",
     metadata,

@@ -1,4 +1,4 @@
-"""Brings a database to the newest form of the tables, one process at a time."""
+"""Migration of a database to the current tables, by one process at a time."""
 
 from pathlib import Path
 
@@ -15,13 +15,13 @@ from experiments.visit.store.tables import metadata
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSIONS = "alembic_version"
-LOCK = 7_303_014  # any number, the same for everybody who upgrades
+LOCK = 7_303_014  # arbitrary number that all upgrading processes share
 
 
 async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
-    """Make the tables, or bring them to their newest form; what they hold is kept.
+    """Create the tables, or migrate them to the current form with their rows.
 
-    Raises StoreError if a newer mjsim made them, or if tables of somebody else are in the way.
+    Raises StoreError if a newer mjsim created them, or the database holds tables of another program.
     """
 
     async def work(connection: AsyncConnection) -> None:
@@ -36,7 +36,7 @@ async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
 
 
 async def _lock(connection: AsyncConnection, kind: str) -> None:
-    """SQLite's transaction is a lock by itself."""
+    """Take a lock, except in SQLite, whose transaction is one."""
     if kind == "mysql":
         found = await connection.execute(
             text("SELECT GET_LOCK(:name, :wait)"), {"name": f"mjsim{LOCK}", "wait": PATIENCE_S}

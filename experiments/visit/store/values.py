@@ -1,4 +1,4 @@
-"""What the store takes and gives: plain frozen values; no row or connection leaves the store."""
+"""Frozen values that the store accepts and returns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ def utc_now() -> datetime:
 
 @dataclass(frozen=True)
 class StudyRow:
-    """The study that a store is open for.
+    """The study of a store.
 
     Attributes:
-        file_hash: Hash of the study file that it was opened with last.
-        quotas: Wanted numbers of people that were changed since, by cell.
+        file_hash: Hash of the study file at the last opening.
+        quotas: Changed numbers of wanted participants, by cell.
     """
 
     id: int
@@ -42,13 +42,13 @@ class Person:
     """A participant.
 
     Attributes:
-        token_hash: SHA-256 of the link's token, hexadecimal; also the name of the visit's folder.
-        platform: Where the person comes from, such as `link` or `prolific`.
-        phase: Name of the phase that is under way.
-        seen: Last sign of life.
-        delete_wanted: Whether the person withdrew and wants the data deleted.
-        host: Of several, the one that keeps what the person plays; None where nothing was played, or there is but one.
-        returning: Whether :meth:`Store.arrive` found the person instead of making one.
+        token_hash: SHA-256 of the link's token, hexadecimal. Also the name of the visit's folder.
+        platform: Recruitment platform, such as `link` or `prolific`.
+        phase: Name of the current phase.
+        seen: Time of the last activity.
+        delete_wanted: True if the participant withdrew and asked for deletion.
+        host: Host that has the participant's trials. None if there are no trials yet, or only one host.
+        returning: True if :meth:`Store.arrive` found the participant.
     """
 
     id: int
@@ -69,11 +69,11 @@ class Person:
 
 @dataclass(frozen=True)
 class Host:
-    """One of several machines that serve a study.
+    """A host of a study with several.
 
     Attributes:
-        seen: When it was heard of last.
-        draining: Whether it takes no new visits.
+        seen: Time of the last heartbeat.
+        draining: True if it accepts no new visits.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Host:
 
 @dataclass(frozen=True)
 class PhaseRow:
-    """A phase of a person: when it was shown first, and how it ended (None while it is under way)."""
+    """A participant's phase: when it was first shown, and how it ended (None before that)."""
 
     person_id: int
     name: str
@@ -96,7 +96,7 @@ class PhaseRow:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a person answered to an item of a phase; `final` once the phase has ended."""
+    """An answer to an item. `final` is True once the phase has ended."""
 
     person_id: int
     phase: str
@@ -108,7 +108,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class TrialRow:
-    """A trial that a person played, and its run directory, relative to the study's folder."""
+    """A played trial, with its run directory relative to the study's folder."""
 
     person_id: int
     phase: str
@@ -119,7 +119,7 @@ class TrialRow:
 
 @dataclass(frozen=True)
 class AuditRow:
-    """Who did what."""
+    """A line of the audit log."""
 
     id: int
     at: datetime
@@ -130,19 +130,19 @@ class AuditRow:
 
 @dataclass(frozen=True)
 class CellQuota:
-    """What a study wants of a cell: a number of people, and the seeds of their houses, gone through again for more."""
+    """Number of wanted participants of a cell, and their house seeds, which repeat for further participants."""
 
     wanted: int
     house_seeds: Sequence[int]
 
     def house_seed(self, place: int) -> int:
-        """Seed of the house of a place, counted from 0."""
+        """Return the house seed of a place, counted from 0."""
         return self.house_seeds[place % len(self.house_seeds)]
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """The place of a person in a cell, both counted from 0, and the person's own seeds."""
+    """A participant's place in a cell, both counted from 0, with the participant's seeds."""
 
     person_id: int
     cell: int
@@ -156,7 +156,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class CellCount:
-    """Places of a cell by state; `held` counts abandoned ones as well, until somebody else gets them."""
+    """Places of a cell by state. `held` includes abandoned ones that are not yet reassigned."""
 
     held: int = 0
     finished: int = 0
@@ -165,7 +165,7 @@ class CellCount:
 
 @dataclass(frozen=True)
 class Counts:
-    """How many people there are, by status, by phase (of those who are under way) and by cell."""
+    """Numbers of participants by status, by phase (active ones only) and by cell."""
 
     statuses: Mapping[str, int]
     phases: Mapping[str, int]
@@ -174,13 +174,13 @@ class Counts:
 
 @dataclass(frozen=True)
 class PaymentEvent:
-    """A line of the ledger.
+    """A row of the ledger.
 
     Attributes:
-        key: Names the payment for ever.
-        attempt: Number of the attempt to send it; 0 when it is decided.
+        key: Permanent name of the payment.
+        attempt: Number of the attempt to send it, 0 for the decision.
         cents: Hundredths of the currency.
-        reference: The platform's own name for the payment, once it is confirmed.
+        reference: The platform's reference of a confirmed payment.
     """
 
     id: int
@@ -197,13 +197,13 @@ class PaymentEvent:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether the platform may have paid without our knowing, if this is the last event of its key."""
+        """True if the platform may have paid, provided that this is the last event of its key."""
         return self.event == "sending"
 
 
 @dataclass(frozen=True)
 class Researcher:
-    """Who may see the researcher's page."""
+    """An account of the researcher's page."""
 
     id: int
     name: str

@@ -1,4 +1,4 @@
-"""Texts that participants read, from the files in `experiments/texts`: one for each language, and its story."""
+"""Texts for participants, read from `experiments/texts`: one file per language, and its story."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The texts of a page by name, and the items of its form."""
+    """Texts of a page by name, and the items of its form."""
 
     words: dict[str, str]
     items: tuple[Item, ...] = ()
@@ -47,15 +47,15 @@ def languages() -> tuple[str, ...]:
 
 
 def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
-    """The texts of a language, with those of a file in place of some of them.
+    """Return the texts of a language. A file of a study may replace some of them.
 
     Args:
-        language: Of one of this package's files; for another language, `path` has all texts.
-        path: A file with some sections; a section's items replace all of the original ones.
-        values: What stands for `{name}` in texts.
+        language: Language of one of the files in this package. Otherwise `path` must have all texts.
+        path: File with some sections. The items of a section replace all original items.
+        values: Values of the placeholders `{name}`.
 
     Raises:
-        ConfigError: A file cannot be read, or names something that does not exist; it names the file and the value.
+        ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
     """
     known = language in languages()
     if not known and path is None:
@@ -81,7 +81,7 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
 
 
 def story_file(language: str) -> Path | None:
-    """The story of a language but English, whose story is that of all trials; a ConfigError if there is none."""
+    """Return the path of a language's story, or None for English. Raises ConfigError if there is none."""
     if language == "en":
         return None
     path = FOLDER / f"story.{language}.md"
@@ -127,7 +127,7 @@ def _section(
 
 
 def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
-    """Fill in the values of a study; the other places of the English text stay."""
+    """Replace placeholders by values of the study. Other placeholders of the English text stay."""
     places = _PLACE.findall(english)
     later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
 

@@ -1,22 +1,21 @@
-"""What a participant is asked: items of a form, as files of texts describe them."""
+"""Items of forms, as described in the files of texts."""
 
 from typing import Annotated, Any, Literal
 
 import msgspec
 
 Kind = Literal["scale", "choice", "several", "number", "line", "text"]
-MAX_LINE, MAX_TEXT = 200, 2000  # characters of an answer
+MAX_LINE, MAX_TEXT = 200, 2000  # maximum length of an answer, in characters
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
 
 
 class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A question and how it is answered.
+    """A question with its kind of answer.
 
     Attributes:
-        name: Of its column in tables.
-        kind: `scale`, one of the points of the page's scale, kept as 1 and up; `choice` and `several`, of `choices`;
-            `number`, a whole one; `line` and `text`, written freely.
-        right: The answer that shows attention or comprehension; of a scale the number of its point.
+        name: Name of its column in tables.
+        kind: `scale` (a point from 1), `choice` and `several` (of `choices`), `number` (an integer), `line` or `text`.
+        right: The right answer of an attention or comprehension check. For a scale, the number of the point.
     """
 
     name: Annotated[str, msgspec.Meta(pattern=NAME)]
@@ -40,11 +39,11 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")
 
     def is_wrong(self, answer: Any) -> bool:
-        """Whether there is a right answer, and this is another one, or none."""
+        """Return True if the item has a right answer and this is not it."""
         return self.right is not None and answer != self.right
 
     def example(self) -> str:
-        """An answer that is accepted, as a form sends it; the right one where there is one."""
+        """Return a valid answer as a form field, the right one if there is one."""
         if self.right is not None:
             return str(self.right)
         match self.kind:

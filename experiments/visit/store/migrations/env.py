@@ -1,4 +1,4 @@
-"""How Alembic runs the migrations: on the connection that it is given, in the transaction that is open there."""
+"""Alembic's environment: runs the migrations on the given connection, in its open transaction."""
 
 from alembic import context
 

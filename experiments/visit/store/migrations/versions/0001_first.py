@@ -1,6 +1,6 @@
-"""The tables of the first version.
+"""Migration: the first tables.
 
-MariaDB commits each table by itself, so one that is there already is one of an upgrade that was interrupted.
+MariaDB commits each table separately, so an interrupted upgrade may have created some of them.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ JSON = sa.Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
 
 
 def upgrade() -> None:
-    """Make them all, those first that others refer to."""
+    """Create all tables, in an order that keeps foreign keys valid."""
     _studies_and_people()
     _progress()
     _money_and_researchers()

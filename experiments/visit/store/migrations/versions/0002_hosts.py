@@ -1,4 +1,4 @@
-"""Several hosts: which are there, and which one keeps what a person plays."""
+"""Migration: several hosts."""
 
 import sqlalchemy as sa
 from alembic import op
