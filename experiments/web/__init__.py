@@ -1,4 +1,4 @@
-"""A live trial in a browser: its server, worker processes and client, and pages that show recorded runs.
+"""A live trial in a browser: server, worker processes, client, and pages that show recorded runs.
 
-It serves visits, of `mjsim play` and of studies, without knowledge of them.
+It serves visits of `mjsim play` and of studies, and imports neither.
 """

@@ -1,4 +1,4 @@
-"""Files of the client: modules with their imports, and the addresses under which they are served."""
+"""Files of the client: their modules, URLs and caching."""
 
 import functools
 import hashlib
@@ -15,7 +15,7 @@ _IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
 
 
 def modules_of(entry: str) -> Mapping[str, str]:
-    """Sources of the module `entry` and of all that it imports, by their paths; imports name those paths."""
+    """Return the sources of a module and all its imports, by path. Their imports name these paths."""
     found: dict[str, str] = {}
     waiting = [entry]
     while waiting:
@@ -28,7 +28,7 @@ def modules_of(entry: str) -> Mapping[str, str]:
 
 
 def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
-    """Replaces relative imports of the module at `path` by paths, and appends these to `needs`."""
+    """Return a replacement of relative imports by paths, which appends the paths to `needs`."""
 
     def named(match: re.Match[str]) -> str:
         target = ((STATIC / path).parent / match[2]).resolve()
@@ -39,7 +39,7 @@ def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
 
 
 IMMUTABLE = "public, max-age=31536000, immutable"
-CHECKED = "no-cache"  # used again while their ETag is the same
+CHECKED = "no-cache"  # revalidated by ETag
 
 
 @functools.cache
@@ -51,18 +51,18 @@ def _folder() -> str:
 
 
 def static_url(name: str) -> str:
-    """Address of a file of the client; imports of modules lead to others in the same folder."""
+    """Return the URL of a file, in a folder named after the hash of all files."""
     return f"{_folder()}/{name}"
 
 
 def static_routes() -> Sequence[Mount]:
-    """Serve the files there, and at `/static/NAME` for those who do not know the address of today."""
+    """Serve the files at their URLs, and also at `/static/NAME`, whose URLs never change."""
     files = GZipMiddleware(StaticFiles(directory=STATIC))
     return [Mount(_folder(), files), Mount("/static", files)]
 
 
 def static_caching(path: str) -> str | None:
-    """`Cache-Control` for a path, or None where it is not one of a file."""
+    """Return the `Cache-Control` header of a file's URL, or None for other paths."""
     if path.startswith(f"{_folder()}/"):
         return IMMUTABLE
     return CHECKED if path.startswith("/static/") else None

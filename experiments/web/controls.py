@@ -1,7 +1,7 @@
-"""From inputs of a person to the action of a control step.
+"""Conversion of a person's inputs into the actions of control steps.
 
-A control step takes all inputs since the step before, so that a tap between two steps counts. The mouse sets a target
-angle that body and head follow within their limits.
+A control step handles all inputs since the previous one, so that a short tap between two steps counts. The mouse sets a
+target angle, which body and head follow within their limits.
 """
 
 import math
@@ -15,34 +15,34 @@ from mjsim.values.actions import Action, ActionResult, Move, Pick, Place, Refusa
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 
-Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # of the highest speed
-Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # rad
+Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # share of the highest speed
+Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # radians
 Press = Literal["act", "left hand", "right hand"]
-MAX_PITCH = 1.2  # rad that the mouse can look up or down
-MAX_PRESSES = 8  # that wait
-PRESS_LIFE = 0.5  # s after which a press that was not handled is forgotten
-MAX_TURN_AHEAD = 2.8  # rad that the mouse can be ahead of the body
+MAX_PITCH = 1.2  # largest pitch set by the mouse, in radians
+MAX_PRESSES = 8  # maximum number of pending presses
+PRESS_LIFE = 0.5  # age after which a pending press is dropped, in seconds
+MAX_TURN_AHEAD = 2.8  # largest angle between the mouse's target and the body, in radians
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A change at the keyboard, the mouse, a gamepad or a touch screen."""
+    """A change of the keyboard, mouse, gamepad or touch screen."""
 
-    # 1 for the first input of a session, then one more each
+    # consecutive number, from 1
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-    # the control step at which it counts, or the next one if that is over; None for the next one
+    # control step in which it takes effect, or None for the next one; a past step means the next one
     step: Annotated[int, msgspec.Meta(ge=0, le=2**53)] | None = None
-    forward: Share = 0.0  # walking from now on: share of the speed, negative to walk back
-    left: Share = 0.0  # stepping to the left from now on
-    turn: Share = 0.0  # turning to the left from now on
-    look: Share = 0.0  # looking up from now on
-    yaw: Angle = 0.0  # added to the heading to turn to, rad, counter-clockwise
-    pitch: Angle = 0.0  # added to the pitch to look to, rad, upwards
-    press: Press | None = None  # the action key, or the key of a hand, was pressed
-    # rows by which the task list is scrolled, positive towards its end
+    forward: Share = 0.0  # held: walking speed, negative to walk back
+    left: Share = 0.0  # held: speed to the left
+    turn: Share = 0.0  # held: turning speed to the left
+    look: Share = 0.0  # held: looking speed upwards
+    yaw: Angle = 0.0  # added to the target heading, in radians, counter-clockwise
+    pitch: Angle = 0.0  # added to the target pitch, in radians, upwards
+    press: Press | None = None  # key press: the action key, or the key of a hand
+    # rows to scroll the task list, positive towards its end
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
     def at_rest(self) -> "Input":
-        """What of it counts while the clock is paused: nothing is held, turned or pressed then."""
+        """Return the part of the input that counts while the clock is paused."""
         return Input(number=self.number, scroll=self.scroll)
 
 
@@ -51,7 +51,7 @@ Answer = Callable[[Pick | Place], ActionResult]
 
 @dataclass(frozen=True)
 class Controls:
-    """The latest input, where the mouse points (rad; None if it does not), and waiting presses with their age, s."""
+    """Latest input, target angles of the mouse (radians or None), and pending presses with their age in seconds."""
 
     held: Input | None = None
     heading: float | None = None
@@ -59,7 +59,7 @@ class Controls:
     presses: tuple[tuple[Press, float], ...] = ()
 
     def take(self, inputs: Sequence[Input], seen: Observation) -> "Controls":
-        """The controls after further inputs."""
+        """Return the controls after further inputs."""
         heading, pitch = self.heading, self.pitch
         for new in inputs:
             if new.yaw:
@@ -82,11 +82,11 @@ def control_step(
     person: PersonParameters,
     duration: float,
 ) -> tuple[Action, Controls]:
-    """The action of a control step of `duration` seconds, and the controls after it.
+    """Return the action of a control step of `duration` seconds, and the controls after it.
 
-    The action key places an object that belongs into a receptacle in reach; else it picks the nearest object in reach.
-    The key of a hand places the object in that hand; if it is empty, it picks. The impossible is attempted, so that the
-    message bar gives the reason; `answer` is the world's answer to a pick or place.
+    The action key places an object if one belongs into a receptacle in reach. Otherwise it picks the nearest object in
+    reach. The key of a hand places the object in that hand, or picks if it is empty. Impossible actions are attempted
+    too, so that the message bar shows the reason. `answer` returns the world's answer to a pick or place.
     """
     controls = before.take(inputs, seen)
     if not controls.presses:
@@ -104,7 +104,7 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
 
 
 def act(answer: Answer) -> Pick | Place:
-    """What the action key attempts; `answer` is the world's answer to a pick or place."""
+    """Return the action that the action key attempts."""
     place = answer(Place())
     at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
     if place.applied or (at_another_receptacle and not answer(Pick()).applied):
@@ -115,7 +115,7 @@ def act(answer: Answer) -> Pick | Place:
 def _move(
     controls: Controls, inputs: Sequence[Input], seen: Observation, person: PersonParameters, duration: float
 ) -> Move:
-    """The fastest walk that was asked for since the last step, and the turn towards where the mouse points."""
+    """Return the fastest requested walk since the previous step, and the turn towards the mouse's target."""
     asked = inputs if controls.held is None else (*inputs, controls.held)
 
     def fastest(name: str) -> float:
@@ -132,7 +132,7 @@ def _move(
 
 
 def _gap(angle: float, start: float) -> float:
-    """The shorter turn from one heading to another, rad."""
+    """Return the shorter turn from one heading to another, in radians."""
     return (angle - start + math.pi) % (2.0 * math.pi) - math.pi
 
 

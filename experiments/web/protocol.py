@@ -1,7 +1,7 @@
-"""The messages between browser, server and worker (docs/protocol.md).
+"""Messages between browser, server and worker (docs/protocol.md).
 
-A message is an object whose `type` is the name of its class in lower case. Between browser and server messages are JSON
-except for frames, which are binary; between server and worker they are MessagePack. The server forwards most of them.
+A message is an object whose `type` is the lower-case name of its class. Messages between browser and server are JSON,
+except binary frames. Messages between server and worker are MessagePack. The server forwards most of them.
 """
 
 import struct
@@ -13,38 +13,40 @@ from experiments.web.controls import Input
 from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
 from hud.state import HudState, Marker, MiniMap, Pointer
 
-HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable that tells the fork server the house of most sessions
-VERSION = 1  # of the head of a frame
-MAX_TEXT = 64 * 1024  # bytes of a message from the browser
-MAX_INPUTS = 64  # of one message
+HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable with the house that the fork server preloads
+VERSION = 1  # version of the header of frames
+MAX_TEXT = 64 * 1024  # maximum size of a message from the browser, in bytes
+MAX_INPUTS = 64  # maximum number of inputs per message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
-LENGTH = struct.Struct("!I")  # in bytes, of a message between server and worker
+LENGTH = struct.Struct("!I")  # length prefix of messages between server and worker, in bytes
 CODECS = {"jpeg": 1, "h264": 2}
-BEAT_PERIOD = 0.5  # s between two signs of life, both ways
-MAX_SILENCE = 1.0  # s without a message after which the link counts as lost
-MAX_STEPS_AHEAD = 25  # control steps by which inputs and promises may be ahead of the last one taken: 1 s
-DISPLAY_PERIOD = 5.0  # s between two messages `display`
+BEAT_PERIOD = 0.5  # time between heartbeats, in seconds
+MAX_SILENCE = 1.0  # silence after which the connection is considered lost, in seconds
+MAX_STEPS_AHEAD = (
+    25  # how far inputs and promises may be ahead of the last control step, in control steps (1 s)
+)
+DISPLAY_PERIOD = 5.0  # time between `display` messages, in seconds
 KEY_FLAG = 1
-REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # codes with which the server closes
+REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSocket close codes
 
 Codec = Literal["jpeg", "h264", "none"]
-Drawer = Literal["browser", "server"]  # who draws the picture
+Drawer = Literal["browser", "server"]  # side that draws the picture
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
-Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # px
+Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # pixels
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
-Angle = Annotated[float, msgspec.Meta(gt=0.0, lt=3.0)]  # rad, horizontal, of a view
+Angle = Annotated[float, msgspec.Meta(gt=0.0, lt=3.0)]  # horizontal field of view, in radians
 Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 
 
 class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """A message; `type` is the name of its class in lower case."""
+    """A message. Its `type` is the lower-case name of its class."""
 
 
 class View(WireMessage, frozen=True):
-    """How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself.
+    """View requested by a page: size in CSS pixels, and the codec of frames. The codec is `none` if the page draws.
 
-    `field_of_view` is what the person chose; it counts within the `field_of_view_range` of the scene.
+    `field_of_view` is the person's choice, limited to the `field_of_view_range` of the scene.
     """
 
     width: Length
@@ -54,7 +56,7 @@ class View(WireMessage, frozen=True):
 
 
 class Hello(WireMessage, frozen=True):
-    """First message of a connection: a random name of the page, which may reconnect, its trial and its view."""
+    """First message of a connection: a random name of the page that survives reconnects, its trial and its view."""
 
     tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
     trial: Annotated[str, msgspec.Meta(max_length=20)]
@@ -62,20 +64,20 @@ class Hello(WireMessage, frozen=True):
 
 
 class TakeOver(WireMessage, frozen=True):
-    """Continue here with a session that is open in another page; the answer to `occupied`."""
+    """Continue a session here that is open in another page. Answers `occupied`."""
 
 
 class Run(WireMessage, frozen=True):
-    """Start the clock, or let it run again; a page that will promise its inputs promises here what it has, or 0."""
+    """Start or resume the clock. A page that promises its inputs sends its current promise, or 0."""
 
     until: Count | None = None
 
 
 class Inputs(WireMessage, frozen=True):
-    """What the person pressed, in order, each once.
+    """Inputs of the person, in order, each once.
 
-    `until` promises that all inputs for the control steps before it have been sent; the clock then waits for such
-    promises, for 0.75 s at most.
+    `until` promises that all inputs for the control steps before it have been sent. The clock then waits for promises,
+    for at most 0.75 s.
     """
 
     inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
@@ -83,27 +85,33 @@ class Inputs(WireMessage, frozen=True):
 
 
 class Seen(WireMessage, frozen=True):
-    """The browser has shown a frame, by its number."""
+    """Number of a frame that the browser has shown."""
 
     frame: Count
 
 
 class Beat(WireMessage, frozen=True):
-    """A sign of life: the server sends one twice a second, and the page sends one back.
+    """Heartbeat. The server sends two per second, and the page answers each.
 
-    After 1 s without any message from the page the clock is stopped.
+    The clock stops after 1 s without any message from the page.
     """
 
 
 class Display(WireMessage, frozen=True):
-    """How well the person saw the session in the last 5 s; this is only logged.
+    """Quality of the display during the last 5 s, which is only logged.
 
-    `draw` is who drew, and `renderer` what drew, in words; `width` and `height` are those of the view, px of the page,
-    and `pixel_ratio` is how many px of the screen one of them has. `frames_per_s` counts the pictures that were shown,
-    `frame_ms` and `frame_ms_95` are median and 95 % of the times between two of them, `latency_ms` the median from an
-    input to the picture that shows it, or, where the browser draws, to the state of the server that counts it, absent
-    where nothing was pressed, and `dropped` counts the pictures that came and were not shown. `field_of_view` is that
-    of the picture where the person may choose it.
+    Attributes:
+        draw: Side that drew.
+        renderer: Name of the renderer.
+        width: Width of the view, in CSS pixels. `height` likewise.
+        pixel_ratio: Device pixels per CSS pixel.
+        frames_per_s: Pictures shown per second.
+        frame_ms: Median time between two pictures.
+        frame_ms_95: 95th percentile of the time between two pictures.
+        dropped: Number of pictures that were received but not shown.
+        latency_ms: Median time from an input to its picture, or to the server's state with that input if the browser
+            draws. None without inputs.
+        field_of_view: Field of view of the picture if the person may choose it.
     """
 
     draw: Drawer
@@ -120,20 +128,20 @@ class Display(WireMessage, frozen=True):
 
 
 class Draw(WireMessage, frozen=True):
-    """Who draws from now on, and why no longer the other one; this is only logged."""
+    """Change of the drawing side, with the reason. Only logged."""
 
     draw: Drawer
     reason: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Pause(WireMessage, frozen=True):
-    """Stop the clock; the reason is logged."""
+    """Stop the clock. The reason is logged."""
 
     reason: PauseReason
 
 
 class Blur(WireMessage, frozen=True):
-    """The page lost the keyboard to another window, or got it back; this is only logged."""
+    """The page lost or regained the keyboard focus. Only logged."""
 
     away: bool
 
@@ -143,11 +151,18 @@ class Leave(WireMessage, frozen=True):
 
 
 class Open(WireMessage, frozen=True):
-    """Open a session in a worker: its journal's folder, its run directory, settings, earlier phases of the visit.
+    """Open a session in a worker.
 
-    `restarted` tells that the worker before has died, `as_inputs_come` that control steps are taken as soon as their
-    inputs are promised, faster than real time, as in a rehearsal, and `floor_plan` that one of the task is drawn.
-    `language` is that of the labels and of the HUD, whose words `texts` replaces if it is not empty.
+    Attributes:
+        folder: Folder of the journal.
+        run: Run directory.
+        config: Settings of the trial.
+        before: Earlier phases of the visit.
+        restarted: True if the previous worker died.
+        as_inputs_come: True to take control steps as soon as their inputs are promised, as in a rehearsal.
+        floor_plan: True to draw a floor plan.
+        language: Language of the labels and the HUD.
+        texts: Texts of the HUD that replace those of the language, or empty.
     """
 
     folder: str
@@ -162,30 +177,30 @@ class Open(WireMessage, frozen=True):
 
 
 class State(WireMessage, frozen=True):
-    """The state of the session, why it is paused, over or failed, and the number of the last input that it received."""
+    """State of the session, the reason if it is paused, over or failed, and the number of the last received input."""
 
     phase: SessionPhase = LOADING
     reason: str = ""
     input: int = 0
 
     def after(self, trigger: Trigger, reason: str = "") -> "State":
-        """The state that follows, or the same object where the trigger changes nothing."""
+        """Return the next state, or the same object if the trigger has no effect."""
         phase = TRANSITIONS.get((self.phase, trigger))
         return self if phase is None else State(phase, reason, self.input)
 
 
 class Taken(WireMessage, frozen=True):
-    """Everything up to this input and control step counts, and is safe on the disk."""
+    """All inputs and control steps up to these numbers are processed and on disk."""
 
     input: int
     step: int
 
 
 class Frame(WireMessage, frozen=True):
-    """A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture.
+    """A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it.
 
-    H.264 is in Annex B, one access unit; `key` frames can be decoded without earlier ones. `milliseconds` is the time
-    to draw and compress it.
+    H.264 is in Annex B format, one access unit per frame. `key` frames can be decoded without earlier ones.
+    `milliseconds` is the time to draw and compress the frame.
     """
 
     number: int
@@ -205,7 +220,7 @@ class Frame(WireMessage, frozen=True):
 
 
 class Gait(msgspec.Struct, frozen=True):
-    """Limits and servos of walking, as the field of `mjsim.world.fidelity.kinematics.Gait`; SI units."""
+    """Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`."""
 
     max_speed: float
     max_turn: float
@@ -232,7 +247,7 @@ class Gait(msgspec.Struct, frozen=True):
 
 
 class Speeds(msgspec.Struct, frozen=True):
-    """Speeds of the person at full deflection of the controls, m/s and rad/s."""
+    """Speeds of the person at full deflection of the controls, in m/s and rad/s."""
 
     walking_speed: float
     turning_speed: float
@@ -240,12 +255,16 @@ class Speeds(msgspec.Struct, frozen=True):
 
 
 class Scene(WireMessage, frozen=True):
-    """What a client that draws needs once: where the files of the scene are, and how the person moves.
+    """Scene for clients that draw, sent once.
 
-    `path` is the folder of the scene's files on this server, None where it has none: then the server has to draw.
-    `floor` is the file of the obstacles for `gait`, or None where walking cannot be predicted. `field_of_view` is
-    horizontal, rad, whatever the shape of the view; `field_of_view_range` is within which angles the person may choose
-    it, None without a choice. `step_duration` is that of a control step, s.
+    Attributes:
+        path: URL path of the scene's files on this server. If None, the server draws.
+        floor: File of the obstacles for `gait`, or None if walking cannot be predicted.
+        gait: Limits and servos of walking.
+        speeds: Speeds of the person.
+        field_of_view: Horizontal field of view for any shape of the view, in radians.
+        field_of_view_range: Limits of the person's choice of the field of view, or None.
+        step_duration: Duration of a control step, in seconds.
     """
 
     path: str | None
@@ -258,20 +277,20 @@ class Scene(WireMessage, frozen=True):
 
 
 class Snapshot(WireMessage, frozen=True):
-    """The state at the start of a control step, for clients that draw; once a step.
+    """State at the start of a control step for clients that draw, sent once per step.
 
     Attributes:
-        step: The control step that begins with this state.
+        step: Control step that starts with this state.
         input: Number of the last input that counts in it.
-        time: Simulated time, s.
-        busy: Whether a pick or place is under way.
+        time: Simulated time, in seconds.
+        busy: True during a pick or place.
         body: Position, speeds, commands and servos of the body (docs/protocol.md).
-        eye: Position, m, heading and pitch, rad.
-        hands: Positions of the left and the right hand in the body's frame, m.
-        held: What they hold, by instance name.
-        objects: Position (3), m, and orientation wxyz (4) by instance name, where they changed since the last snapshot.
-        models: Model by instance name, of objects that the client has not seen, or not since they were `gone`.
-        gone: Instance names of objects about which the client is told nothing any more.
+        eye: Position in metres, heading and pitch in radians.
+        hands: Positions of the left and right hand in the body's frame, in metres.
+        held: Instance names of the objects in the hands.
+        objects: Position in metres (3) and orientation wxyz (4) by instance name, if changed since the last snapshot.
+        models: Models by instance name, of objects that are new to the client or were `gone`.
+        gone: Instance names of objects without further updates.
     """
 
     step: int
@@ -288,28 +307,28 @@ class Snapshot(WireMessage, frozen=True):
 
 
 class Markers(WireMessage, frozen=True):
-    """The markers of the HUD, for clients that draw; when they change."""
+    """Markers of the HUD for clients that draw, sent when they change."""
 
     markers: tuple[Marker, ...]
 
 
 class Pictures(WireMessage, frozen=True):
-    """The pictures that a `hud` names, as data URLs, by their keys; sent once to a page."""
+    """Pictures named by a `hud`, as data URLs by key. Sent once per page."""
 
     pictures: dict[str, str]
 
 
 class Hud(WireMessage, frozen=True):
-    """What is shown beside the picture: the state of the HUD without its markers, and without what a `moment` has."""
+    """State of the HUD next to the picture, without markers and the values of a `moment`."""
 
     state: HudState
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """What the action key would do: the object, the receptacle if it is put there, and where that is.
+    """What the action key would do: the object, and the receptacle if the object would be placed.
 
-    `instance` is the object's instance name, `place` the position of the object or the receptacle, m, and `at` where
-    that is in the view, in shares of its width and height, or None where it is out of view.
+    `instance` is the object's instance name. `place` is the position of the object or the receptacle in metres. `at` is
+    that position in the view, as shares of its width and height, or None if it is out of view.
     """
 
     object: str
@@ -320,7 +339,7 @@ class Reach(msgspec.Struct, frozen=True):
 
 
 class Moment(WireMessage, frozen=True):
-    """What changes as the person moves: the clock in whole seconds, the room, what is in reach, pointer and map."""
+    """Values that change as the person moves: clock in whole seconds, room, object in reach, pointer and map."""
 
     step: int
     clock: float | None
@@ -331,29 +350,29 @@ class Moment(WireMessage, frozen=True):
 
 
 class Busy(WireMessage, frozen=True):
-    """Whether a pick or place is under way, for clients that show frames; keys pressed then are handled afterwards."""
+    """Start or end of a pick or place, for clients that show frames. Keys pressed during it are handled afterwards."""
 
     busy: bool
 
 
 class Saved(WireMessage, frozen=True):
-    """The run directory of a session that is over has been written."""
+    """The run directory of a finished session has been written."""
 
 
 class Queue(WireMessage, frozen=True):
-    """All slots are taken. The page has to be loaded again, and then shows the queue."""
+    """All slots are taken. The page must reload, and then shows the queue."""
 
 
 class Occupied(WireMessage, frozen=True):
-    """The session is open in another page; `takeover` continues here."""
+    """The session is open in another page. `takeover` continues it here."""
 
 
 class Replaced(WireMessage, frozen=True):
-    """Another page took the session over; this connection is closed."""
+    """Another page took the session over. This connection is closed."""
 
 
 class Error(WireMessage, frozen=True):
-    """A message was refused and does not count: a code, and the reason in words."""
+    """A message was rejected, with a code and a reason."""
 
     code: ErrorCode
     message: str
@@ -388,6 +407,6 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def packed(message: WireMessage) -> bytes:
-    """A message between server and worker, after its length."""
+    """Encode a message between server and worker, preceded by its length."""
     content = _encode(message)
     return LENGTH.pack(len(content)) + content

@@ -1,6 +1,6 @@
-"""The states of a session with a person, and the one table of how they follow each other.
+"""States of a session with a person, and the table of their transitions.
 
-The worker owns the state; server and page hold copies of what it sends.
+The worker owns the state. Server and page hold copies of what it sends.
 """
 
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from enum import StrEnum, auto
 
 
 class SessionPhase(StrEnum):
-    """Where a session is: only while it is running does its clock advance."""
+    """State of a session. Its clock only advances while it is running."""
 
     LOADING = auto()
     READY = auto()
@@ -19,7 +19,7 @@ class SessionPhase(StrEnum):
 
 
 class Trigger(StrEnum):
-    """What moves a session from one phase to the next."""
+    """Cause of a transition."""
 
     OPENED = auto()
     RESTORED = auto()
@@ -38,4 +38,4 @@ TRANSITIONS: Mapping[tuple[SessionPhase, Trigger], SessionPhase] = {
     (RUNNING, Trigger.PAUSE): PAUSED,
     **{(phase, Trigger.END): OVER for phase in (LOADING, READY, RUNNING, PAUSED)},
     **{(phase, Trigger.FAIL): FAILED for phase in (LOADING, READY, RUNNING, PAUSED, OVER)},
-}  # anything else changes nothing
+}  # other triggers have no effect

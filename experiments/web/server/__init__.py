@@ -1,4 +1,4 @@
-"""The server of live trials: sockets of browsers, sessions, the queue for slots, and the pool of workers.
+"""The server of live trials: WebSockets, sessions, the queue for slots, and the pool of workers.
 
-It serves the visits of `mjsim play` and of studies; it simulates nothing and trusts no browser.
+It simulates nothing and validates everything that browsers send.
 """

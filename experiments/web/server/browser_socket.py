@@ -1,4 +1,4 @@
-"""The WebSocket of a browser: checks what comes in, and sends without ever waiting for a slow browser."""
+"""The WebSocket of a browser, which validates messages and never blocks on a slow browser."""
 
 import asyncio
 import time
@@ -24,16 +24,16 @@ from experiments.web.protocol import (
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.state import OVER
 
-HELLO_TIMEOUT = 10.0  # s for the first message
-OCCUPIED_TIMEOUT = 60.0  # s for the answer to `occupied`
-CLOSE_TIMEOUT = 0.5  # s that the connection before has to end, as when a page is reloaded
-MAX_WAITING = 300  # messages that wait to be sent
-RATE, BURST = 200.0, 1200.0  # messages and inputs a second, and at once: inputs are repeated after a failure
-MAX_ERRORS = 50  # refused messages of one connection
+HELLO_TIMEOUT = 10.0  # timeout of the first message, in seconds
+OCCUPIED_TIMEOUT = 60.0  # timeout of the answer to `occupied`, in seconds
+CLOSE_TIMEOUT = 0.5  # how long to wait for an earlier connection to close, in seconds
+MAX_WAITING = 300  # maximum number of queued messages
+RATE, BURST = 200.0, 1200.0  # messages and inputs per second; bursts repeat inputs after a failure
+MAX_ERRORS = 50  # maximum number of rejected messages per connection
 
 
 class BrowserSocket:
-    """An accepted connection of a browser. A separate task sends the messages in order."""
+    """An accepted WebSocket. A separate task sends messages in order."""
 
     def __init__(self, socket: WebSocket) -> None:
         self.tab = ""
@@ -43,7 +43,7 @@ class BrowserSocket:
         self._errors = 0
 
     def send(self, message: WireMessage) -> None:
-        """Send a message, without waiting; a browser that does not keep up is disconnected."""
+        """Queue a message. A browser that does not keep up is disconnected."""
         waiting = self._waiting.qsize()
         if waiting < MAX_WAITING:
             self._waiting.put_nowait(message)
@@ -51,11 +51,11 @@ class BrowserSocket:
             self.close(protocol.SLOW, "too slow")
 
     def close(self, code: int, reason: str) -> None:
-        """Close the connection once all is sent."""
+        """Close the connection after the queued messages."""
         self._waiting.put_nowait((code, reason))
 
     async def serve(self, session: PlayedSession) -> None:
-        """Serve until the browser is gone."""
+        """Serve until the browser disconnects."""
         sending = asyncio.create_task(self._send_all())
         receiving = asyncio.create_task(self._receive_all(session))
         beating = asyncio.create_task(self._beat(session))
@@ -63,7 +63,7 @@ class BrowserSocket:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
             session.detach(self)
             self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # the last message is still to be sent
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # for the last message
         finally:
             session.detach(self)
             for task in (sending, receiving, beating):
@@ -72,7 +72,7 @@ class BrowserSocket:
                     await task
 
     async def watch(self, session: PlayedSession) -> None:
-        """Show a session to a spectator until the page is gone, or says anything: nothing is taken from it."""
+        """Show a session to a spectator until the page disconnects or sends anything."""
         sending = asyncio.create_task(self._send_all())
         receiving = asyncio.create_task(self._socket.receive())
         session.spectators.join(self)
@@ -97,7 +97,6 @@ class BrowserSocket:
             await self._socket.close(*item)
 
     async def _beat(self, session: PlayedSession) -> None:
-        """Give signs of life to the page that has the session."""
         while True:
             await asyncio.sleep(BEAT_PERIOD)
             if session.browser is self and self._waiting.empty():
@@ -132,7 +131,7 @@ class BrowserSocket:
         return message
 
     async def _wait_for_place(self, session: PlayedSession) -> None:
-        """Wait until no other page has the session, or this one is to take it over."""
+        """Wait until no other page has the session, or this one takes it over."""
         until = time.monotonic() + CLOSE_TIMEOUT
         while (before := session.browser) is not None and before.tab != self.tab:
             if time.monotonic() < until:
@@ -145,7 +144,7 @@ class BrowserSocket:
             return
 
     async def _receive(self) -> WireMessage:
-        """The next well-formed message; `WebSocketDisconnect` is raised once the browser is gone."""
+        """Return the next well-formed message. Raises WebSocketDisconnect once the browser is gone."""
         while True:
             event = await self._socket.receive()
             if event["type"] != "websocket.receive":

@@ -1,4 +1,4 @@
-"""How many sessions a machine holds, learnt from what those under way take of its cores."""
+"""The number of sessions that a machine can run, estimated from the CPU time of those under way."""
 
 import os
 import time
@@ -9,34 +9,36 @@ from pathlib import Path
 
 from experiments.web.server.played_session import PlayedSession
 
-SHARE = 0.7  # of the cores that may be taken; the rest is for moments in which much happens at once
-MOST = (
-    1 / 3
-)  # of a core that a session takes whose frames are drawn here; one that is not measured yet counts as that
-SERVER = 0.7  # of the one core that the server can take, above which nobody is let in
-WINDOWS = 6  # measurements of a session, of which the largest counts
-QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a container: time in a period, and the period, in microseconds
+SHARE = 0.7  # usable share of the cores; the rest is a reserve for peaks
+MOST = 1 / 3  # cores of a session whose frames are drawn on the server, assumed for new sessions
+SERVER = 0.7  # load of the server's own core above which no session is admitted
+WINDOWS = 6  # measurements per session, of which the largest counts
+QUOTA = Path(
+    "/sys/fs/cgroup/cpu.max"
+)  # quota of a container: time per period, and the period, in microseconds
 
 
 class Capacity:
-    """Learns how many sessions the cores hold.
+    """Estimates how many sessions fit on the machine.
 
     Args:
-        cores: That sessions and server may use.
+        cores: Number of cores for sessions and server.
     """
 
     def __init__(self, cores: float) -> None:
         self._cores = cores
-        self._seen: dict[str, tuple[float, float]] = {}  # when, and processor time then, of running sessions
+        self._seen: dict[
+            str, tuple[float, float]
+        ] = {}  # time and CPU time of the last measurement of running sessions
         self._shares: dict[str, deque[float]] = {}
         self._own = time.monotonic(), time.process_time()
 
     def measure(self, sessions: Mapping[str, PlayedSession], held: Collection[str]) -> int:
-        """How many sessions there may be, at least one; call it every few seconds.
+        """Return the number of sessions that fit, at least one. Call this every few seconds.
 
         Args:
-            sessions: Those under way, by name.
-            held: Names of those that have a place.
+            sessions: Sessions under way, by name.
+            held: Names of the sessions with a slot.
         """
         now = time.monotonic()
         before, self._own = self._own, (now, time.process_time())
@@ -61,7 +63,7 @@ class Capacity:
 
 
 def usable_cores() -> float:
-    """How many cores this process may use, by its affinity and the quota of its container."""
+    """Return the number of usable cores, by the process's affinity and its container's quota."""
     cores = float(len(os.sched_getaffinity(0)))
     with suppress(OSError, ValueError):
         quota, period = QUOTA.read_text().split()

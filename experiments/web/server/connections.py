@@ -1,4 +1,4 @@
-"""Connections of limited time and number: a request comes whole within seconds; the busiest address makes room."""
+"""HTTP connections with timeouts and a limit on their number."""
 
 import asyncio
 from collections import Counter
@@ -9,14 +9,14 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from experiments.web.server.guards import address_of, machine_of
 
-REQUEST_TIMEOUT = 10.0  # s for the head and the body of a request
-MAX_OPEN = 2000  # connections that are no WebSockets; behind a proxy all come from one machine
+REQUEST_TIMEOUT = 10.0  # timeout for receiving a request, in seconds
+MAX_OPEN = 2000  # maximum number of connections, WebSockets excluded
 
 
 class QuickConnection(H11Protocol):
-    """A connection of uvicorn; it ends where a request is not there in time, or where its machine has too many."""
+    """A uvicorn connection with timeouts. Beyond the limit, the address with the most connections loses one."""
 
-    _open: ClassVar[dict["QuickConnection", str]] = {}  # with their machines, oldest first
+    _open: ClassVar[dict["QuickConnection", str]] = {}  # clients by connection, oldest first
     _timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -39,12 +39,12 @@ class QuickConnection(H11Protocol):
             self._watch()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Hand the connection over; it has limits of its own then."""
+        """Exempt the connection, since WebSockets have their own limits."""
         self._forget()
         super().handle_websocket_upgrade(event)
 
     def _watch(self) -> None:
-        """Let the time run until a request is whole."""
+        """Start the timeout of a request, or stop it if the request is complete."""
         if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
             self._stop()
         elif self._timer is None:

@@ -1,4 +1,4 @@
-"""Checks of every request before the pages see it, and the headers of every answer."""
+"""Checks of all requests, and headers of all responses."""
 
 import re
 import socket
@@ -14,9 +14,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from experiments.web.client_files import static_caching
 
-MAX_BODY = 4096  # bytes of a form
+MAX_BODY = 4096  # maximum size of a form, in bytes
 HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
-UNCACHED = "no-store"  # pages
+UNCACHED = "no-store"  # for pages
 Address = IPv4Address | IPv6Address
 Network = IPv4Network | IPv6Network
 HEADERS = {
@@ -34,7 +34,7 @@ POLICY = (
 
 
 def allowed_hosts(host: str, public: str | None) -> Sequence[str]:
-    """Names of a server that listens at `host`; any other would be that of another site, rebound to this address."""
+    """Return the valid host names of a server that listens at `host`. Other names could be DNS rebinding."""
     addresses = {host, "127.0.0.1", "::1"}
     if host in ("0.0.0.0", "::"):
         addresses |= _own_addresses()
@@ -48,19 +48,19 @@ def _own_addresses() -> set[str]:
     for family, target in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as probe:
-                probe.connect((target, 9))  # sends nothing; chooses the interface that leads outside
+                probe.connect((target, 9))  # selects the outgoing interface without sending anything
                 found.add(str(probe.getsockname()[0]))
             found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, family)}
         except OSError:
-            continue  # no network of this family
+            continue  # no network of this address family
     return found
 
 
 class Guards:
-    """ASGI middleware: checks `Host` and `Origin`, limits bodies, adds headers, tells who asks.
+    """ASGI middleware that checks `Host` and `Origin`, limits bodies, sets the client's address and adds headers.
 
-    What a request that comes from one of the `proxies` says about its sender is believed as far as the proxy wrote it.
-    Only pages of `embedded_by`, sites like https://example.org, may show these pages in frames, and get forms of them.
+    The X-Forwarded-For header is trusted for requests from `proxies`. Only sites in `embedded_by`, such as
+    https://example.org, may embed the pages in frames and receive their forms.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Guards:
         if scope["type"] == "http" and refusal is None:
             whole = await _whole(receive)
             if whole is None:
-                return  # who asked is gone
+                return  # the client disconnected
             receive = whole
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
         await app({**scope, "client": (self._sender(scope, headers), 0)}, receive, send_guarded)
@@ -105,13 +105,13 @@ class Guards:
     def _sender(self, scope: Scope, headers: Headers) -> str:
         peer = address_of((scope.get("client") or ("",))[0])
         if any(peer is not None and peer in proxy for proxy in self._proxies):
-            # the last one is what the proxy saw; others anybody can write
+            # the proxy appends the last address; clients can forge the others
             forwarded = ",".join(headers.getlist("x-forwarded-for")).rpartition(",")[2]
             peer = address_of(forwarded.strip()) or peer
         return machine_of(peer)
 
     def _origin(self, host: str) -> str:
-        """Origin of the pages that are served under a `Host`; empty if that is none."""
+        """Return the origin of pages served under a `Host` header, or an empty string if it is not valid."""
         if not HOST.fullmatch(host):
             return ""
         public = host == self._public.netloc and self._public.scheme == "https"
@@ -119,14 +119,14 @@ class Guards:
 
 
 class Rate:
-    """Limits to `count` times in `period` seconds what is done from one address."""
+    """Limits requests per address to `count` in `period` seconds."""
 
     def __init__(self, count: int, period: float) -> None:
         self._count, self._period = count, period
         self._log: list[tuple[float, str]] = []
 
     def allows(self, address: str) -> bool:
-        """Whether once more is allowed; that counts."""
+        """Count a request, and return True if it is allowed."""
         now = time.monotonic()
         self._log = [(at, who) for at, who in self._log if now - at < self._period]
         allowed = sum(who == address for _, who in self._log) < self._count
@@ -135,7 +135,7 @@ class Rate:
 
 
 def address_of(text: str) -> Address | None:
-    """The IP address that a text is; None if it is none."""
+    """Parse an IP address, or return None."""
     try:
         found = ip_address(text)
     except ValueError:
@@ -144,12 +144,12 @@ def address_of(text: str) -> Address | None:
 
 
 def machine_of(address: Address | None) -> str:
-    """An address, or the network of an IPv6 address, all of whose addresses one machine can have."""
+    """Return an IPv4 address, or the /64 network of an IPv6 address, since one machine can have all its addresses."""
     return str(ip_network((address, 64), strict=False) if isinstance(address, IPv6Address) else address)
 
 
 async def _whole(receive: Receive) -> Receive | None:
-    """A `receive` that has the whole body; None if it never came."""
+    """Receive the whole body, and return a `receive` that yields it. None if the client disconnected."""
     body = b""
     while (message := await receive())["type"] == "http.request":
         body += message.get("body", b"")
@@ -166,7 +166,7 @@ async def _whole(receive: Receive) -> Receive | None:
 
 
 def _refusal(scope: Scope, headers: Mapping[str, str], origin: str, max_body: int) -> tuple[int, str] | None:
-    """Status and text where a request is refused."""
+    """Return the status and text of a rejection, or None."""
     if not origin:
         return 400, "Invalid host header"
     changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
@@ -182,7 +182,7 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
     for name, value in HEADERS.items():
         headers[name] = value
     if embedded_by:
-        del headers["X-Frame-Options"]  # knows no other sites
+        del headers["X-Frame-Options"]  # cannot name other sites
     headers.setdefault("Cache-Control", cache)
     headers["Content-Security-Policy"] = POLICY.format(
         sockets=origin.replace("http", "ws", 1),
@@ -195,7 +195,7 @@ MAX_FIELDS = 500
 
 
 async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
-    """The fields of a form that was sent; none where that is no form, or has too many."""
+    """Return the fields of a submitted form. Empty if it is malformed or has too many."""
     text = (await request.body()).decode("utf-8", "replace")
     try:
         return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))

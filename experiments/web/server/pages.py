@@ -1,4 +1,4 @@
-"""The pages, from the Jinja2 templates of the client."""
+"""Rendering of the client's Jinja2 templates."""
 
 import functools
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ def _duration(seconds: float) -> str:
 
 @functools.cache
 def _modules(entry: str) -> tuple[str, ...]:
-    """Paths of all modules of a page, which a browser then loads at once rather than one import after the other."""
+    """Return the paths of a page's modules, which the browser can preload in parallel."""
     return tuple(modules_of(entry))
 
 
@@ -29,19 +29,18 @@ _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters.update(duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
-_templates.env.auto_reload = False  # would look at the file for each page
+_templates.env.auto_reload = False  # would check the file for each page
 
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
-    """A page from the template with a name; its values are escaped."""
+    """Render the template with this name."""
     return _templates.TemplateResponse(request, f"{name}.html", values, status)
 
 
 def message_page(request: Request, status: int, title: str, text: str) -> Response:
-    """A page with a title and a sentence."""
     return page(request, "message", status, title=title, text=text)
 
 
 def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Texts of the page of a trial, by name, from those of a language by section."""
+    """Return the texts of the trial page by name, from a language's texts by section."""
     return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -1,4 +1,4 @@
-"""A session under way: joins a participant, the worker, and the browser that is connected."""
+"""A session under way, which connects a participant, a worker and a browser."""
 
 import asyncio
 import logging
@@ -40,34 +40,36 @@ from experiments.web.server.spectators import Spectators
 from experiments.web.state import FAILED, LOADING, READY, RUNNING, Trigger
 
 LOG = logging.getLogger("mjsim.play")
-MAX_CRASHES = 3  # of workers in a row, without an input taken in between, after which a session fails
-MAX_AHEAD = 1000  # inputs that may wait to be taken
+MAX_CRASHES = (
+    3  # worker crashes in a row after which the session fails, unless control steps were saved in between
+)
+MAX_AHEAD = 1000  # maximum number of unprocessed inputs
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
 class Browser(Protocol):
-    """A connection to a page, of which each tab has one at a time."""
+    """A connection to a page. Each tab has one."""
 
     tab: str
 
     def send(self, message: WireMessage) -> None:
-        """Send a message, without waiting."""
+        """Queue a message."""
 
     def close(self, code: int, reason: str) -> None:
-        """Close the connection once all is sent."""
+        """Close the connection after the queued messages."""
 
 
 class PlayedSession:
-    """All trials that a participant plays, one after the other.
+    """The trials of a participant, one after the other.
 
     Attributes:
         player: The participant.
-        trial: The trial under way, or None.
-        browser: The one that is connected, or None.
-        heard: When the person last did something, as `time.monotonic` has it.
+        trial: The current trial, or None.
+        browser: The connected browser, or None.
+        heard: Time of the person's last activity, as of `time.monotonic`.
         state: Copy of the worker's state.
-        display: How well the person sees the session, by the page; None before it says so.
-        spectators: Who watches.
+        display: Display quality as last reported by the page, or None.
+        spectators: The connected spectators.
     """
 
     def __init__(
@@ -93,21 +95,21 @@ class PlayedSession:
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
-        self._taken = self._step = 0  # number of the last input that is safe, and the next control step
-        self._lost = False  # whether a worker died, and the browser may not know it yet
+        self._taken = self._step = 0  # last input on disk, and next control step
+        self._lost = False  # True if a worker died and the browser may not know yet
         self._came: deque[tuple[int, float]] = deque(
             maxlen=MAX_AHEAD
-        )  # inputs that are not safe yet, and when
+        )  # inputs in memory only, with arrival times
 
     @property
     def processor_time(self) -> float | None:
-        """Of the worker, s; None while the clock does not run."""
+        """CPU time of the worker in seconds, or None while the clock is stopped."""
         if self._worker is None or self.state.phase is not RUNNING:
             return None
         return self._worker.processor_time()
 
     def attach(self, browser: Browser, view: View) -> None:
-        """Connect a browser; it replaces the one before."""
+        """Connect a browser, in place of the previous one."""
         if self.browser is not None:
             self.browser.send(protocol.Replaced())
             self.browser.close(protocol.REPLACED, "the session is open elsewhere")
@@ -120,7 +122,7 @@ class PlayedSession:
             browser.send(self.state)
 
     def detach(self, browser: Browser) -> None:
-        """A browser is gone; the session is paused until one is back."""
+        """Disconnect a browser, and pause the session."""
         if self.browser is not browser:
             return
         self.browser = None
@@ -128,7 +130,7 @@ class PlayedSession:
         self._pause("disconnected")
 
     def take(self, message: Any) -> Error | None:
-        """Take a message from the browser; why it was refused, or None."""
+        """Handle a message from the browser. Return an error if it is rejected."""
         by_itself = isinstance(message, Seen | Beat | Display | Draw) or (
             isinstance(message, Inputs) and not message.inputs
         )
@@ -138,7 +140,7 @@ class PlayedSession:
             case View():
                 self._view = message
             case Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
-                return None  # the browser keeps them, and sends them again
+                return None  # the browser sends them again
             case Inputs(inputs):
                 if (error := self._input_error(message)) is not None:
                     return error
@@ -161,7 +163,7 @@ class PlayedSession:
         return None
 
     async def release(self) -> None:
-        """Give worker and place back; the journal holds everything."""
+        """Stop the session, and release worker and slot. The journal has everything."""
         self.spectators.close()
         task, self._task = self._task, None
         if task is not None:
@@ -170,9 +172,9 @@ class PlayedSession:
                 await task
 
     def _lacks_some_before(self, inputs: Sequence[Input]) -> bool:
-        """Whether a browser that does not know yet that a worker died sends what follows inputs lost with it.
+        """Return True if inputs are missing that were lost with a dead worker.
 
-        To take these would acknowledge the lost ones, and the browser would not send them again.
+        The browser may not know of the loss yet. Accepting its later inputs would acknowledge the missing ones.
         """
         return self._lost and len(inputs) > 0 and inputs[0].number > self.state.input + 1
 
@@ -211,7 +213,6 @@ class PlayedSession:
         return math.inf if self.trial is None else self.trial.leave_at
 
     async def _run(self) -> None:
-        """Play the trials that are left."""
         key, duration = self.player.key, None
         if not self._limit.hold(key):
             self._tell(protocol.Queue())
@@ -237,7 +238,7 @@ class PlayedSession:
                 self._task = None
 
     async def _play(self, trial: LiveTrial) -> None:
-        """Play a trial to its end, with another worker whenever one dies."""
+        """Play a trial to its end, replacing workers that die."""
         crashes, safe = 0, 0
         self._taken = self._step = 0
         self._came.clear()
@@ -263,7 +264,7 @@ class PlayedSession:
                         raise OSError(reason)
                     case State(input=number):
                         if self.state.phase is LOADING:
-                            self._taken = number  # of a session that was restored
+                            self._taken = number  # in a restored session
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
                     case Taken(number, step):
@@ -291,7 +292,6 @@ class PlayedSession:
         raise OSError(f"the worker crashed {MAX_CRASHES} times in a row")
 
     def _measure(self, safe: int) -> None:
-        """Note how long it took until inputs were safe."""
         while self._came and self._came[0][0] <= safe:
             self._meter.acknowledged(time.monotonic() - self._came.popleft()[1])
 

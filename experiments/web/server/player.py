@@ -1,4 +1,4 @@
-"""The participant of a session, as the server of trials sees them."""
+"""The interface between the server of trials and the participant."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class LiveTrial:
-    """A trial that a participant plays.
+    """A trial to be played.
 
     Attributes:
         phase: Name of the phase, `training` or `task`.
@@ -16,10 +16,10 @@ class LiveTrial:
         run: Run directory that the trial will become.
         config: Settings of the trial.
         before: Phases before the trial, as fields of `phase_ended` events.
-        leave_at: When the participant may end the trial by hand, in seconds of the monotonic clock; infinite for never.
+        leave_at: Time of the monotonic clock from which the participant may end the trial, in seconds. May be infinite.
         floor_plan: True if the run gets a picture of its paths.
         language: Language of the HUD.
-        texts: Words that replace those of the HUD in this language.
+        texts: Texts that replace those of the HUD in this language.
     """
 
     phase: str
@@ -43,19 +43,19 @@ class Player(Protocol):
     key: str
 
     async def trial(self) -> LiveTrial | None:
-        """Return the trial that is next or under way. None if the next phase is not a trial."""
+        """Return the next or current trial. None if the current phase is not a trial."""
         ...
 
     async def over(self, trial: LiveTrial) -> None:
-        """Record that the run directory of a trial has been written, and move on to the next phase."""
+        """Record that the trial's run directory has been written, and advance to the next phase."""
         ...
 
 
 class Meter:
-    """Forgets what it is told; see subclasses."""
+    """Receives session metrics. This one discards them."""
 
     def acknowledged(self, seconds: float) -> None:
-        """The inputs of a message are safe, so long after they came."""
+        """Record the time from the arrival of inputs until they were on disk."""
 
     def worker_lost(self) -> None:
-        """The worker of a session has died."""
+        """Record that the worker of a session has died."""

@@ -1,4 +1,4 @@
-"""Worker processes from the fork server of `multiprocessing`, in which the house and all kernels are loaded."""
+"""Worker processes, forked from a `multiprocessing` fork server that has loaded the house and all kernels."""
 
 import asyncio
 import multiprocessing
@@ -14,17 +14,17 @@ from experiments.web.protocol import HOUSE, LENGTH, WireMessage, decode_from_wor
 
 PRELOADED = "experiments.web.worker.preload"
 SETTINGS = {
-    "MALLOC_ARENA_MAX": "1",  # one heap for each thread would keep what each once needed
-    "LP_NUM_THREADS": "1",  # of software rendering; many workers share the machine
+    "MALLOC_ARENA_MAX": "1",  # one heap per thread would keep each thread's peak memory
+    "LP_NUM_THREADS": "1",  # threads of software rendering; many workers share the machine
 }
-END_TIMEOUT = 5.0  # s that a process has to end
-RETRY = 0.1  # s until a worker is asked for again
+END_TIMEOUT = 5.0  # timeout for the end of a process, in seconds
+RETRY = 0.1  # delay before retrying to start a worker, in seconds
 
 
 class WorkerProcess:
-    """A worker process and the socket to it. The constructor waits until it runs, so call it in a thread; then connect.
+    """A worker process and its socket. The constructor blocks until it runs, so call it in a thread, then `connect`.
 
-    Threads that read and write would compete with the event loop for the GIL: with 50 workers it was 60 ms late.
+    The socket belongs to the event loop. With threads for reading and writing, 50 workers delayed the loop by 60 ms.
     """
 
     def __init__(self) -> None:
@@ -42,12 +42,12 @@ class WorkerProcess:
         self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
 
     def send(self, message: WireMessage) -> None:
-        """Send a message, without waiting; if the worker is dead, `receive` reports it."""
+        """Queue a message. If the worker is dead, `receive` reports it."""
         if not self._writer.is_closing():
             self._writer.write(packed(message))
 
     async def receive(self) -> Any:
-        """The next message, or None if the worker is dead."""
+        """Return the next message, or None if the worker is dead."""
         try:
             (length,) = LENGTH.unpack(await self._reader.readexactly(LENGTH.size))
             return decode_from_worker(await self._reader.readexactly(length))
@@ -55,7 +55,7 @@ class WorkerProcess:
             return None
 
     def processor_time(self) -> float | None:
-        """Processor time of the process, s; None where it is not known."""
+        """Return the CPU time of the process in seconds, or None if it is unknown."""
         try:
             fields = Path(f"/proc/{self._process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         except OSError:
@@ -63,7 +63,7 @@ class WorkerProcess:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def end(self) -> None:
-        """End the process, and wait for that; the journal keeps what was acknowledged."""
+        """Terminate the process and wait for it. The journal keeps all acknowledged inputs."""
         self._process.terminate()
         self._process.join(END_TIMEOUT)
         self._process.kill()
@@ -73,26 +73,29 @@ class WorkerProcess:
 
 
 class WorkerPool:
-    """Starts and ends workers, which share a loaded house; they load others when they need them."""
+    """Starts and ends workers, which share a preloaded house and load others if needed."""
 
     def __init__(self, house: str) -> None:
-        os.environ.update({**SETTINGS, HOUSE: house})  # of the processes that this one starts
+        os.environ.update({**SETTINGS, HOUSE: house})  # for child processes
         self._ending: set[asyncio.Future[None]] = set()
 
     def warm_up(self) -> None:
-        """Start the fork server, unless it runs."""
+        """Start the fork server if it does not run."""
         multiprocessing.set_forkserver_preload([PRELOADED])
         forkserver.ensure_running()
 
     async def start(self) -> WorkerProcess:
-        """A new worker. A fork server that was just killed still takes connections, until another one replaces it."""
+        """Start a worker.
+
+        Retry for some seconds, since a killed fork server accepts connections until it is replaced.
+        """
         until = time.monotonic() + END_TIMEOUT
         while True:
             starting = asyncio.ensure_future(_started_worker())
             try:
                 return await asyncio.shield(starting)
             except asyncio.CancelledError:
-                starting.add_done_callback(self._discard_started)  # it goes on, and nobody wants the worker
+                starting.add_done_callback(self._discard_started)  # the start continues in its thread
                 raise
             except (EOFError, ConnectionError) as error:
                 if time.monotonic() > until:
@@ -100,7 +103,7 @@ class WorkerPool:
             await asyncio.sleep(RETRY)
 
     def discard(self, worker: WorkerProcess) -> None:
-        """End a worker, without waiting for that."""
+        """End a worker in the background."""
         ending = asyncio.ensure_future(asyncio.to_thread(worker.end))
         self._ending.add(ending)
         ending.add_done_callback(self._ending.discard)
@@ -120,6 +123,6 @@ async def _started_worker() -> WorkerProcess:
 
 
 def _run_worker(connection: socket.socket) -> None:
-    from experiments.web.worker.main import Worker  # the server never loads it
+    from experiments.web.worker.main import Worker  # not loaded by the server
 
     Worker(connection).run()

@@ -1,4 +1,4 @@
-"""The route of scene files, from which browsers draw: `/scene/HASH/NAME`, never changing, compressed beforehand."""
+"""The route of scene files, `/scene/HASH/NAME`. The files never change and are stored compressed."""
 
 import gzip
 import re
@@ -16,7 +16,7 @@ _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-
 
 
 def scene_route(folder: Path) -> Route:
-    """Serve the scenes in a folder, as `mjsim.formats.gltf.cache` leaves them; they need no token."""
+    """Serve the scenes in a folder written by `mjsim.formats.gltf.cache`. No token is needed."""
 
     def serve(request: Request) -> Response:
         scene, name = request.path_params["hash"], request.path_params["name"]
@@ -38,7 +38,7 @@ def scene_route(folder: Path) -> Route:
 
 
 def _accepts_gzip(request: Request) -> bool:
-    """Whether a request's Accept-Encoding names gzip with a quality above 0."""
+    """Return True if the Accept-Encoding header allows gzip."""
     for coding in request.headers.get("accept-encoding", "").lower().split(","):
         name, _, quality = coding.partition(";")
         if name.strip() in ("gzip", "*"):

@@ -1,4 +1,4 @@
-"""All sessions under way, and which of them give their place to others."""
+"""All sessions under way, and the release of idle ones."""
 
 import asyncio
 import time
@@ -12,14 +12,14 @@ from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.player import Meter, Player
 from experiments.web.server.pool import WorkerPool
 
-WATCH_PERIOD = 5.0  # s between two looks for sessions whose person is gone
-MAX_AWAY = 20.0  # s that a place is kept without a page while others wait
+WATCH_PERIOD = 5.0  # period of looking for abandoned sessions, in seconds
+MAX_AWAY = 20.0  # how long a session without a page keeps its slot while others wait, in seconds
 
 
 class Sessions:
-    """All sessions under way; after `idle` seconds without a sign of the person, one gives its worker back.
+    """All sessions under way. A session without activity for `idle` seconds releases its worker.
 
-    With a `capacity`, the limit follows what the machine holds.
+    With a `capacity`, the limit follows the machine's measured capacity.
     """
 
     def __init__(
@@ -33,12 +33,12 @@ class Sessions:
         self._pool, self._limit, self._idle = pool, limit, idle
         self._meter, self._capacity = meter, capacity
         self._sessions: dict[str, PlayedSession] = {}
-        self._scenes: dict[str, str] = {}  # by house, of those that a worker has named
+        self._scenes: dict[str, str] = {}  # URL paths of scenes, by house, as reported by workers
 
     def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:
         """Return the session of a participant.
 
-        With `as_inputs_come`, its clock runs as fast as inputs come, not in real time.
+        With `as_inputs_come`, its clock follows the inputs instead of real time.
         """
         if player.key not in self._sessions:
             self._sessions[player.key] = PlayedSession(
@@ -58,15 +58,15 @@ class Sessions:
 
     @property
     def limit(self) -> SessionLimit:
-        """How many there may be, and who waits."""
+        """The limit of concurrent sessions, with its queue."""
         return self._limit
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
-        """Folder of the files that the page of a trial will probably draw; None where that is not known."""
+        """Return the URL path of the scene that a trial's page will probably draw, or None if unknown."""
         return None if settings["draw"] == "server" else self._scenes.get(settings["house"])
 
     async def watch(self) -> None:
-        """Release sessions whose person is gone, and learn how many the machine holds, for ever."""
+        """Until cancelled, release abandoned sessions and update the capacity estimate."""
         while True:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
@@ -74,7 +74,7 @@ class Sessions:
             self._limit.resize(learnt or self._limit.count)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
-        """Release the sessions that `which` chooses."""
+        """Release the sessions selected by `which`."""
         for session in [session for session in self._sessions.values() if which(session)]:
             if session.browser is not None:
                 session.browser.send(protocol.Error("idle", "nothing was received for a long time"))
@@ -83,6 +83,9 @@ class Sessions:
             self._sessions.pop(session.player.key, None)
 
     def _is_idle(self, session: PlayedSession) -> bool:
-        """Whether the person has been gone for long; for less long where others wait and the page is closed."""
+        """Return True if the person is away for too long.
+
+        The limit is shorter if the page is closed and others wait.
+        """
         closed = session.browser is None and self._limit.waiting > 0
         return time.monotonic() - session.heard > (min(MAX_AWAY, self._idle) if closed else self._idle)

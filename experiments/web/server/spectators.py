@@ -1,4 +1,4 @@
-"""Those who watch a session: they see what its page sees, from the moment they come, and can do nothing."""
+"""Spectators of a session, who see what its page shows."""
 
 from typing import Any, Protocol
 
@@ -17,21 +17,21 @@ from experiments.web.protocol import (
     WireMessage,
 )
 
-KEPT = (State, Scene, Pictures, Hud, Markers, Moment)  # kinds of which the last message says all
+KEPT = (State, Scene, Pictures, Hud, Markers, Moment)  # messages that replace earlier ones of the same type
 
 
 class Spectator(Protocol):
-    """A connection to a page that only looks."""
+    """A connection to a watching page."""
 
     def send(self, message: WireMessage) -> None:
-        """Send a message, without waiting."""
+        """Queue a message."""
 
     def close(self, code: int, reason: str) -> None:
-        """Close the connection once all is sent."""
+        """Close the connection after the queued messages."""
 
 
 class Spectators:
-    """The spectators of a session, and what one who comes later has to be told first."""
+    """The spectators of a session, and the messages that a new one gets first."""
 
     def __init__(self) -> None:
         self._all: set[Spectator] = set()
@@ -41,7 +41,7 @@ class Spectators:
         self._models: dict[str, str] = {}
 
     def join(self, spectator: Spectator) -> None:
-        """Tell somebody the present state, and from now on all that happens."""
+        """Add a spectator and send the current state."""
         self._all.add(spectator)
         for kind in KEPT:
             if kind in self._last:
@@ -57,12 +57,12 @@ class Spectators:
         self._all.discard(spectator)
 
     def close(self) -> None:
-        """The session stops; its page, and those who watch, may come back."""
+        """Disconnect all spectators, whose pages reconnect."""
         for spectator in self._all:
             spectator.close(IDLE, "the session has stopped")
 
     def tell(self, message: Any) -> None:
-        """Take a message that the session's page is sent."""
+        """Handle a message to the session's page."""
         match message:
             case Snapshot(objects=objects, models=models, gone=gone):
                 self._snapshot = message
@@ -71,7 +71,7 @@ class Spectators:
                 for name in gone:
                     self._objects.pop(name, None)
                     self._models.pop(name, None)
-            case Scene() | Frame():  # all that may be known comes anew, or is in a picture
+            case Scene() | Frame():  # snapshots start again, or are not needed
                 self._snapshot = None
                 self._objects, self._models = {}, {}
         if isinstance(message, KEPT):

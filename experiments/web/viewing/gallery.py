@@ -1,4 +1,4 @@
-"""A folder that shows many homes: contact sheets, a page that lists them, and a page for each."""
+"""A folder that shows many homes: contact sheets, an index page, and a page per home."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
@@ -19,10 +19,10 @@ HOMES, SHEET = "homes", "sheet_{}.png"
 
 
 def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
-    """Folder in the gallery -> name of the house, each house once, in their order.
+    """Return the houses by their folders in the gallery, each once, in order.
 
     Raises:
-        AssetError, HouseError: A source names no house.
+        AssetError, HouseError: A source is not a house.
         ConfigError: Two houses would have the same folder.
     """
     found: dict[str, str] = {}
@@ -36,17 +36,17 @@ def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
 def write_gallery(
     homes: Mapping[str, str], out: Path, *, workers: int, on_home: Callable[[str | None], None]
 ) -> int:
-    """Draw the homes that are not in the folder `out` yet, then its sheets and its page; how many homes failed.
+    """Draw the missing homes of a gallery, then its sheets and its page. Return the number of homes that failed.
 
     Args:
-        homes: Of `homes_of`.
+        homes: Houses from `homes_of`.
         out: A new folder, or that of a gallery.
-        workers: Homes at a time.
-        on_home: Called for each home: with None, or with what is wrong with it.
+        workers: Number of homes drawn at a time.
+        on_home: Called for each home, with None or an error message.
 
     Raises:
         ConfigError: `workers` is below 1, or `out` holds something else.
-        RenderError: Nothing can be drawn on this machine.
+        RenderError: This machine cannot render.
         OSError: A file cannot be written.
     """
     if workers < 1:
@@ -65,7 +65,7 @@ def write_gallery(
         with replacing(out / SHEET.format(count)) as temporary:
             cv2.imwrite(str(temporary), sheet[..., ::-1])
     number = count + 1
-    while (old := out / SHEET.format(number)).is_file():  # of a longer gallery
+    while (old := out / SHEET.format(number)).is_file():  # left from a longer gallery
         old.unlink()
         number += 1
     page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
@@ -75,7 +75,7 @@ def write_gallery(
 
 
 def _drawn(homes: Mapping[str, str], folder: Path, workers: int) -> Iterator[tuple[str, Home | Exception]]:
-    """Each home as it is finished, or what is wrong with it."""
+    """Yield each home, or its error, in order of completion."""
     with worker_pool(min(workers, len(homes))) as pool:
         running = {pool.submit(draw_home, name, folder / key): key for key, name in homes.items()}
         for future in as_completed(running):

@@ -1,4 +1,4 @@
-"""A home of a gallery: its pictures, its page, and what is said of it, in a folder of its own."""
+"""A home of a gallery: its pictures, page and description, in its own folder."""
 
 import functools
 import hashlib
@@ -22,21 +22,21 @@ from mjsim.house.compiled.house import compiled_house
 from mjsim.render import Renderer
 from mjsim.support.files import exchange, source_digest, work_folder
 
-PLAN, VIEW = (480, 400), (300, 200)  # px
+PLAN, VIEW = (480, 400), (300, 200)  # sizes in pixels
 PAGE, ABOUT = "index.html", "home.json"
 _WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
 
 
 class Home(msgspec.Struct, frozen=True):
-    """What a gallery says of a home.
+    """Description of a home in a gallery.
 
     Attributes:
-        name: Which names it wherever a house is named; a folder is named as it was given.
-        label: For people.
-        rooms: How many there are.
-        area: Of its floor, m2.
+        name: Name of the house. A folder keeps the name under which it was given.
+        label: Label for readers.
+        rooms: Number of rooms.
+        area: Floor area, in m2.
         pictures: Files of the floor plan and of views at eye height.
-        digest: Of all that its files follow from.
+        digest: Hash of everything that determines the files.
     """
 
     name: str
@@ -52,18 +52,18 @@ class Home(msgspec.Struct, frozen=True):
 
     @property
     def origin(self) -> str:
-        """Seed and version of a generated home; how another one is named."""
+        """Seed and version of a generated home, or the name of another one."""
         found = re.fullmatch(r"generated:(\d+)\?rooms=\d+&version=(\d+)", self.name)
         return f"seed {found[1]}, version {found[2]}" if found else self.name
 
 
 def home_key(name: str) -> str:
-    """The folder of a home in a gallery, which is checked as far as it costs no time.
+    """Return the name of a home's folder in a gallery.
 
     Raises:
-        AssetError: A house that is not generated has no catalogue that can be read.
-        ConfigError: It has no name of which a folder could be called.
-        HouseError: A generated house is named wrongly.
+        AssetError: The catalogue of a house that is not generated cannot be read.
+        ConfigError: No folder can be named after the house.
+        HouseError: The name of a generated house is not valid.
     """
     named = parse_house(name)
     if named.kind == "generated":
@@ -78,12 +78,12 @@ def home_key(name: str) -> str:
 
 
 def draw_home(name: str, folder: Path) -> Home:
-    """Write pictures and page of a home into `folder`, whole or not at all, unless they are there.
+    """Write pictures and page of a home into `folder` atomically, unless they are up to date.
 
     Raises:
         AssetError: The house cannot be read or used.
-        HouseError: It cannot be generated.
-        RenderError: Nothing can be drawn on this machine.
+        HouseError: The house cannot be generated.
+        RenderError: This machine cannot render.
         OSError: The folder cannot be written.
     """
     catalogue = load_catalogue(name)
@@ -111,11 +111,11 @@ def draw_home(name: str, folder: Path) -> Home:
 
 
 def _draw(house: House, folder: Path) -> tuple[str, ...]:
-    """Write a floor plan and two views; their names."""
+    """Write a floor plan and two views, and return their names."""
     compiled, rooms = compiled_house(house.catalogue), house.rooms
     areas = dict.fromkeys(house.viewpoints, 0.0)
     for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
-        if key in areas:  # one can stand in it
+        if key in areas:  # a person can stand in it
             areas[key] += float(half.prod())
     largest = sorted(areas, key=lambda key: -areas[key])[:2]
     views = list(room_views(house, largest).values())
@@ -138,6 +138,6 @@ def _kept(folder: Path) -> Home | None:
 
 @functools.cache
 def _code() -> str:
-    """All but the house that a home's files follow from: our Python sources, and the page's."""
+    """Return a hash of the Python sources and the page's, which determine the files of all homes."""
     page = run_page("", {}, {}, tour="")
     return source_digest("mjsim", "experiments") + hashlib.sha256(page.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""One self-contained HTML file that shows a run: the client's modules, the scene and the recorded run in it."""
+"""A self-contained HTML file that shows a run, with the client's modules, the scene and the recorded run."""
 
 import base64
 import gzip
@@ -37,16 +37,16 @@ def view_page(
     catalogue: str | None = None,
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> str:
-    """HTML of the page that shows a run, which is simulated again for that.
+    """Replay a run, and return the HTML of a page that shows it.
 
     Args:
         directory: Directory of a run, or of a failed run.
-        catalogue: Where the catalogue of its house lies now, if not where it was.
-        on_progress: Called with the numbers of replayed and of recorded control steps.
+        catalogue: Current path of its house's catalogue, if it has moved.
+        on_progress: Called with the numbers of replayed and recorded control steps.
 
     Raises:
         RecordError: `directory` is not a run directory.
-        ReplayError: It cannot be replayed, or differs from the record.
+        ReplayError: The run cannot be replayed, or differs from the record.
     """
     watched: list[tuple[Replayer, RunRecorder]] = []
 
@@ -62,7 +62,7 @@ def view_page(
 
 
 def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
-    """HTML of the page that shows a run as it is recorded, in a scene of these files; `values` are the template's."""
+    """Return the HTML of a page that shows a run in a scene of these files. `values` are passed to the template."""
     urls = {name: _data_url(name, content) for name, content in scene.items()}
     texts = trial_texts(read_words())
     packed = {"run": _packed(run), "scene": _packed(urls)}
@@ -70,7 +70,7 @@ def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **v
 
 
 def own_page(template: str, entry: str, **values: Any) -> str:
-    """HTML of a page that runs the module `entry` of the client, with nothing in another file."""
+    """Return the HTML of a self-contained page that runs the client's module `entry`."""
     modules = {name: _data_url(name, source.encode()) for name, source in modules_of(entry).items()}
     page: str = (
         Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True, trim_blocks=True)
@@ -86,7 +86,7 @@ def own_page(template: str, entry: str, **values: Any) -> str:
 
 
 def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
-    """What the page reads: `Run` of view/run.js."""
+    """Return the page's data, which are a `Run` of view/run.js."""
     person = record.person
     catalogue = house.catalogue.objects
     return {
@@ -114,7 +114,7 @@ def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
 
 
 def _scene(house: House, models: set[str]) -> dict[str, bytes]:
-    """The files that draw a house with objects of some models, by name."""
+    """Return the files of a scene by name, restricted to the objects of some models."""
     folder = cached_scene(house.catalogue, scenes_folder())
     found = {}
     for path in sorted(folder.rglob("*.*")):
@@ -131,7 +131,7 @@ def _title(record: Record) -> str:
 
 
 def _packed(value: Any) -> str:
-    """JSON, compressed, in base64."""
+    """Encode as gzipped JSON in base64."""
     return base64.b64encode(gzip.compress(msgspec.json.encode(value), 9, mtime=0)).decode()
 
 

@@ -1,4 +1,4 @@
-"""Collects what a page needs to show a run: poses and HUD at every control step."""
+"""Recording of poses and HUD states for a page that shows a run."""
 
 import dataclasses
 from typing import Any
@@ -16,22 +16,21 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-DECIMALS = 4  # of m, rad and quaternions
-HEIGHT = 480  # px of the picture in which pointers are found
+DECIMALS = 4  # of metres, radians and quaternions
+HEIGHT = 480  # height of the picture for pointers, in pixels
 
 
 class RunRecorder(Viewer):
-    """A viewer of a session that keeps what it is shown.
+    """A session viewer that stores what it is shown.
 
     Attributes:
-        time: Of each control step, s.
-        body: Position, m, heading and pitch, rad, at each, flat: four numbers a step.
-        hands: Positions of the left and the right hand in the body's frame, m, flat: six numbers a step.
-        objects: For each object its poses where they changed: step, position, m, and quaternion wxyz, flat: eight
-            numbers each.
-        hud: Step and state without markers, wherever it changed.
-        markers: All markers that were shown, each once.
-        shown: Step and indices into `markers`, wherever they changed.
+        time: Time of each control step, in seconds.
+        body: Position in metres, heading and pitch in radians, flat, four numbers per control step.
+        hands: Positions of the left and right hand in the body's frame in metres, flat, six numbers per control step.
+        objects: Changed poses by object: step, position in metres and quaternion wxyz, flat, eight numbers each.
+        hud: Step and state without markers, whenever the state changed.
+        markers: All distinct markers.
+        shown: Step and indices into `markers`, whenever they changed.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -47,12 +46,12 @@ class RunRecorder(Viewer):
         self._poses: dict[str, list[float]] = {}
 
     def camera(self, world: World) -> CameraView:
-        """The eye camera, in the shape of a film."""
+        """Return the eye camera, in the aspect ratio of a film."""
         pose = camera_pose(world.model, world.data, avatar.EYE, PICTURE_ASPECT)
         return CameraView(pose.position, pose.rotation, pose.fovy, round(PICTURE_ASPECT * HEIGHT), HEIGHT)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Keep the present state; a state that is shown twice is kept once."""
+        """Store the current state, unless it was shown before."""
         if self.time and self.time[-1] == observation.time:
             return
         step = len(self.time)
@@ -86,7 +85,7 @@ class RunRecorder(Viewer):
             self.shown.append((step, shown))
 
     def _number_of(self, marker: Any) -> int:
-        """Index of a marker, of which the page gets one even if it was shown at every step."""
+        """Return the index of a marker, adding it if it is new."""
         place = tuple(round(value, DECIMALS) for value in marker.position)
         kept = dataclasses.replace(marker, position=place)
         if kept not in self._number:

@@ -1,4 +1,4 @@
-"""Contact sheets of homes: a floor plan, two views and a caption for each."""
+"""Contact sheets of homes, with a floor plan, two views and a caption for each."""
 
 import errno
 from collections.abc import Iterator, Sequence
@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from experiments.web.viewing.homes import PLAN, VIEW, Home
 
 COLUMNS, ROWS = 2, 5
-GAP, CAPTION = 24, 44  # px
-WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # of a home
+GAP, CAPTION = 24, 44  # pixels
+WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of a home's card
 INK, QUIET, PAPER = (22, 33, 43), (74, 85, 96), 255
 Image = NDArray[np.uint8]
 
 
 def sheets(homes: Sequence[tuple[Home, Path]]) -> Iterator[Image]:
-    """Sheets of homes and the folders with their pictures, ten a sheet, RGB."""
+    """Yield RGB sheets of ten homes each, given with the folders of their pictures."""
     for first in range(0, len(homes), COLUMNS * ROWS):
         cards = [_card(home, folder) for home, folder in homes[first : first + COLUMNS * ROWS]]
         rows = -(-len(cards) // COLUMNS)

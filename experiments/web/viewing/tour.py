@@ -1,4 +1,4 @@
-"""The page of a home without a run: the way of the fly-through film instead of a person's."""
+"""The page of a home without a run, which replays the camera path of the fly-through."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,25 +11,25 @@ from experiments.web.viewing.page import run_page
 from hud.state import HudState, InventorySlot
 from mjsim.values.person_parameters import PersonParameters
 
-INTERVAL = 0.2  # s between two poses, which the page mixes
-NEAR = 0.05  # m from the place in a room where the tour looks around
-INSIDE = (0.0, 0.0, 0.8) * 2  # m; hands have nothing to do, and are out of sight in the body
+INTERVAL = 0.2  # time between two poses, which the page interpolates, in seconds
+NEAR = 0.05  # distance at which a viewpoint is reached, in metres
+INSIDE = (0.0, 0.0, 0.8) * 2  # positions of the idle hands in metres, hidden in the body
 _HUD = HudState("", (), (), (None, InventorySlot()))
 
 
 def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
-    """HTML of a page, without any other file, that shows a home: from outside, from above, and on a tour through it.
+    """Return the HTML of a self-contained page that shows a home from outside, from above, and on a tour.
 
     Args:
         house: The home.
-        scene: Its files, of `mjsim.formats.gltf`.
-        caption: What is said of it.
+        scene: Its files, by `mjsim.formats.gltf`.
+        caption: Caption of the page.
     """
     return run_page(house.catalogue.label, _tour(house), scene, tour=caption)
 
 
 def _tour(house: House) -> dict[str, Any]:
-    """The tour as a run: `Run` of view/run.js."""
+    """Return the tour as a `Run` of view/run.js."""
     path, person = camera_path(house), PersonParameters()
     times = np.arange(0.0, path.duration, INTERVAL)
     rows = path.at(times)

@@ -1,4 +1,4 @@
-"""A worker process: one world with one session, its clock, its frames and its journal.
+"""A worker process with the world, clock, frames and journal of one session.
 
-It serves the server, which starts one for each session and forwards its messages to the browser.
+The server starts a worker per session, and forwards its messages to the browser.
 """

@@ -1,4 +1,4 @@
-"""The clock of a session: 25 control steps a second, none skipped, each acknowledged once it is on the disk."""
+"""The clock of a session: 25 control steps per second, none skipped, each acknowledged once it is on disk."""
 
 import time
 from collections.abc import Callable
@@ -9,18 +9,19 @@ from experiments.web.state import OVER, READY, RUNNING, Trigger
 from experiments.web.worker.control import Promise, SessionControl
 from experiments.web.worker.live_session import LiveSession
 
-LATE = 0.02  # s after its time at which a control step counts as late
-MAX_LAG = 1.0  # s behind schedule from which the process must have been stopped: the clock restarts from now
-MAX_UNWRITTEN = 10  # control steps without an input that are not written through to the disk at once
-SHOW_PERIOD = 0.1  # s between two looks at a session that is not running
+LATE = 0.02  # delay from which a control step counts as late, in seconds
+MAX_LAG = 1.0  # delay after which the process must have been suspended and the clock restarts, in seconds
+MAX_UNWRITTEN = 10  # maximum number of unsynced control steps without an input
+SHOW_PERIOD = 0.1  # polling period of a session that is not running, in seconds
 
 Send = Callable[[WireMessage], None]
 
 
 class Clock:
-    """Steps a session in real time; `sync` writes its journal through to the disk, `show` shows its state.
+    """Steps a session in real time. `sync` syncs its journal to disk, and `show` shows its state.
 
-    With `as_inputs_come` a control step is due as soon as its inputs are promised, and states between are not shown.
+    With `as_inputs_come`, a control step is due as soon as its inputs are promised, and states in between are not
+    shown.
     """
 
     def __init__(
@@ -37,10 +38,13 @@ class Clock:
         self._live, self._control, self._show = live, control, show
         self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
-        self._missed = False  # whether the last step was taken without the inputs that were promised
+        self._missed = False  # True if the last step was taken without its promised inputs
 
     def run(self) -> str:
-        """Run until the session is over; the reason. After a failure, run until the server ends this process."""
+        """Run the session to its end, and return the reason.
+
+        After a failure, run until the server ends this process.
+        """
         live, control = self._live, self._control
         try:
             while live.end_reason is None and (phase := control.state.phase) is not OVER:
@@ -63,7 +67,7 @@ class Clock:
         return control.state.reason
 
     def _wait_and_step(self) -> None:
-        """Take a control step when it is due and its inputs are there, unless the session stops meanwhile."""
+        """Take a control step once it is due and its inputs have arrived, unless the session stops first."""
         live, schedule = self._live, self._schedule
         session, step = live.session, live.session.record.step
         if self._as_inputs_come:
@@ -79,11 +83,11 @@ class Clock:
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
         if not self._follows_at_once():
-            self._show()  # else the state after the next step is shown
+            self._show()  # otherwise the state after the next step is shown
         self._acknowledger.request(live.input, session.record.step)
 
     def _follows_at_once(self) -> bool:
-        """Whether the inputs of the next control step are there, and it is due."""
+        """Return True if the next control step is due and its inputs have arrived."""
         if self._control.state.phase is not RUNNING:
             return False
         promise = self._control.wait_for_promise(self._live.session.record.step, 0.0)
@@ -94,7 +98,7 @@ class Clock:
         return self._schedule.wait(time.monotonic(), promised=True) <= 0.0
 
     def _note_lateness(self, promise: Promise) -> None:
-        """Log a control step that is late by this machine's fault, and the first one without promised inputs."""
+        """Log a control step delayed by this machine, and the first one without its promised inputs."""
         due, now = self._schedule.due, time.monotonic()
         late = now - (due if promise.came is None else max(due, promise.came))
         if promise.missing:
@@ -113,7 +117,7 @@ class Clock:
 
 
 class _Acknowledger:
-    """Writes the journal through to the disk in a thread of its own, then acknowledges what it holds."""
+    """Syncs the journal in a separate thread, then acknowledges its contents."""
 
     def __init__(self, sync: Callable[[], None], send: Send) -> None:
         self._sync, self._send = sync, send
@@ -122,14 +126,14 @@ class _Acknowledger:
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Everything up to this input and control step is in the journal; without a new input, some steps may wait."""
+        """Acknowledge everything up to this input and control step. Without a new input, some steps may be delayed."""
         if number == self._number and step < self._newest + MAX_UNWRITTEN:
             return
         self._number, self._newest = number, step
         self._thread.submit(self._acknowledge, number, step)
 
     def check(self) -> None:
-        """Raise the error of a disk that did not take what was written."""
+        """Raise the error of a failed sync."""
         if self._error is not None:
             raise self._error
 
@@ -138,7 +142,7 @@ class _Acknowledger:
 
     def _acknowledge(self, number: int, step: int) -> None:
         if step < self._newest or self._error is not None:
-            return  # a later call writes this as well
+            return  # a later call syncs this too
         try:
             self._sync()
         except OSError as error:
@@ -147,38 +151,38 @@ class _Acknowledger:
             self._send(Taken(number, step))
 
 
-PATIENCE = 0.75  # s after its time at which a control step is taken without the inputs that were promised
-WINDOW = 25  # control steps after which the clock follows that of the page
-PULL = 0.05  # share by which it may run faster for that
+PATIENCE = 0.75  # how long a control step waits for its promised inputs, in seconds
+WINDOW = 25  # period of adjusting to the page's clock, in control steps
+PULL = 0.05  # largest relative speed-up for that
 
 
 class Schedule:
-    """Control steps are due every `period` s from `due` on.
+    """Due times of control steps, every `period` seconds.
 
-    A page that promises its inputs has a clock of its own, and its promises travel. If all promises of a while came
-    after the steps for which they were due, steps are due later from then on; if all came before, earlier. What comes
-    late once is waited for, and the steps that have become due meanwhile follow at once.
+    A page that promises its inputs has its own clock, and its promises take time to arrive. If all promises of a period
+    arrive after their steps are due, later steps are delayed. If all arrive before, they are advanced. A single late
+    promise is waited for, and the steps that have become due follow at once.
 
     Attributes:
-        due: When the next control step is due, s.
+        due: Due time of the next control step, in seconds.
     """
 
     def __init__(self, period: float, now: float) -> None:
         self.due = now
         self._period = period
-        self._late: list[float] = []  # by how much promises came after their steps were due, s
+        self._late: list[float] = []  # delays of promises after their steps were due, in seconds
 
     def start(self, now: float) -> None:
-        """Begin anew: a control step is due now."""
+        """Restart. A control step is due now."""
         self.due = now
         self._late.clear()
 
     def wait(self, now: float, *, promised: bool) -> float:
-        """How long to wait before the next control step, s; `promised` is whether its inputs are there."""
+        """Return the time until the next control step, in seconds. `promised` is True if its inputs have arrived."""
         return max(0.0, self.due + (0.0 if promised else PATIENCE) - now)
 
     def take(self, came: float | None) -> None:
-        """The control step is taken; `came` is when its inputs were there, None where nothing is promised."""
+        """Record a control step. `came` is the arrival time of its inputs, or None without promises."""
         if came is None:
             self._late.clear()
         else:

@@ -1,4 +1,4 @@
-"""The state of a session and what the person pressed; one thread receives, another one steps."""
+"""State and inputs of a session, shared by a receiving and a stepping thread."""
 
 import threading
 import time
@@ -12,24 +12,24 @@ from experiments.web.controls import Input
 from experiments.web.protocol import MAX_SILENCE, State
 from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, Trigger
 
-MAX_NOTES = 1000  # that wait for a control step
-MAX_PROMISES = 64  # whose times are remembered
-Note = tuple[str, dict[str, Any]]  # name and fields of an event of the log
+MAX_NOTES = 1000  # maximum number of pending events
+MAX_PROMISES = 64  # maximum number of stored promises
+Note = tuple[str, dict[str, Any]]  # name and fields of a logged event
 
 
 class Promise(NamedTuple):
-    """Whether the inputs of a control step are there: since when, monotonic; None where nothing was promised."""
+    """Arrival of a control step's inputs: the monotonic time, or None if none were promised."""
 
     came: float | None
-    missing: bool  # whether they were promised, and are not there
+    missing: bool  # True if they were promised but have not arrived
 
 
 class SessionControl:
-    """Thread-safe queue of inputs, and the state machine of a session.
+    """Thread-safe queue of inputs, and state machine of a session.
 
     Args:
         announce: Called with every new state.
-        now: A clock, s.
+        now: Clock, in seconds.
     """
 
     def __init__(self, announce: Callable[[State], None], now: Callable[[], float] = time.monotonic) -> None:
@@ -37,21 +37,20 @@ class SessionControl:
         self._now = now
         self._announce = announce
         self._inputs: list[Input] = []
-        # promises, the oldest first: all inputs for control steps before the first number have come, and when
+        # promises, oldest first: all inputs before this control step have arrived, at this time
         self._promises: deque[tuple[int, float]] = deque(maxlen=MAX_PROMISES)
         self._notes: list[Note] = []
         self._changed = threading.Condition()
-        self._asked = False  # to be shown at once
-        self._ready = 0.0  # when the session could first be started, monotonic
-        self._heard = now()  # when the page was heard last
+        self._asked = False  # a frame was requested
+        self._ready = 0.0  # monotonic time from which the session could be started
+        self._heard = now()  # time of the last message from the page
 
     def apply(
         self, trigger: Trigger, reason: str = "", *, last: int | None = None, until: int | None = None
     ) -> None:
-        """Change the state as the table says.
+        """Change the state according to the table of transitions.
 
-        `last` is the number of the last input of a restored session, `until` what a page promises that lets the clock
-        run.
+        `last` is the last input of a restored session. `until` is the promise of a page that starts the clock.
         """
         with self._changed:
             before = self.state if last is None else msgspec.structs.replace(self.state, input=last)
@@ -75,9 +74,9 @@ class SessionControl:
             self._changed.notify_all()
 
     def add(self, inputs: list[Input], until: int | None = None) -> None:
-        """Queue the inputs that are new; a browser that reconnects repeats those that were not acknowledged.
+        """Queue inputs, ignoring repeated ones from a reconnected browser.
 
-        `until` promises that all inputs for the control steps before it have come.
+        `until` promises that all inputs for the control steps before it have arrived.
         """
         with self._changed:
             running = self.state.phase is RUNNING
@@ -89,25 +88,25 @@ class SessionControl:
                 self._promise(until)
 
     def hear(self) -> None:
-        """The page gave a sign of life."""
+        """Record a message from the page."""
         with self._changed:
             self.pause_if_silent()
             self._heard = self._now()
 
     def pause_if_silent(self) -> None:
-        """Stop the clock of a page that gave no sign of life for a while."""
+        """Pause if the page has been silent for too long."""
         with self._changed:
             if self.state.phase is RUNNING and self._now() - self._heard > MAX_SILENCE:
                 self.apply(Trigger.PAUSE, "silent")
 
     def note(self, event: str, **fields: Any) -> None:
-        """Note something that the page told, for the log; too much of it is dropped."""
+        """Record an event of the page for the log. Excess events are dropped."""
         with self._changed:
             if len(self._notes) < MAX_NOTES:
                 self._note(event, **fields)
 
     def take_inputs(self, step: int) -> tuple[Input, ...]:
-        """The inputs that count at a control step, in order: those for it, for earlier ones, and for none."""
+        """Return the inputs for a control step, in order: those for it, for earlier steps, and without a step."""
         with self._changed:
             later = (i for i, new in enumerate(self._inputs) if new.step is not None and new.step > step)
             count = next(later, len(self._inputs))
@@ -115,9 +114,9 @@ class SessionControl:
         return taken
 
     def wait_for_promise(self, step: int, seconds: float) -> Promise:
-        """Wait until all inputs for a control step have come, or the session stops, but no longer than `seconds`.
+        """Wait until all inputs for a control step have arrived or the session stops, for at most `seconds`.
 
-        A page that promises nothing is not waited for.
+        Return at once if the page makes no promises.
         """
         with self._changed:
             self._changed.wait_for(
@@ -133,20 +132,20 @@ class SessionControl:
             return Promise(came, missing=False) if until > step else Promise(None, missing=True)
 
     def take_notes(self) -> list[Note]:
-        """All that is to be logged since the last call."""
+        """Return all events to be logged since the last call."""
         with self._changed:
             taken, self._notes = self._notes, []
         return taken
 
     def ask_to_show(self) -> None:
-        """Somebody has just connected, or has another view."""
+        """Request a frame for a new connection or view."""
         with self._changed:
             self._asked = True
             self._ready = self._ready or self._now()
             self._changed.notify_all()
 
     def wait_for_change(self, phase: SessionPhase, seconds: float) -> None:
-        """Wait until the session has left a phase or is to be shown, but no longer than `seconds`."""
+        """Wait until the session has left a phase or a frame is requested, for at most `seconds`."""
         with self._changed:
             self._changed.wait_for(lambda: self._asked or self.state.phase is not phase, seconds)
             self._asked = False

@@ -1,4 +1,4 @@
-"""Draws the person's view: the newest state, as large and as often as possible."""
+"""Drawing of the person's view: always the latest state, as large and as often as possible."""
 
 import dataclasses
 import threading
@@ -17,35 +17,35 @@ from mjsim.house.scene.scene import Scene
 from mjsim.render import FAST, Renderer
 from mjsim.world.world import World
 
-COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # of the smallest size
-MAX_IN_FLIGHT = 3  # frames sent that the browser has not yet shown
+COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile of the smallest size
+MAX_IN_FLIGHT = 3  # maximum number of sent frames that are not yet shown
 
 
 class _Moment(NamedTuple):
-    """A state to draw: a copy of the simulator's data, markers, the control step, the last input."""
+    """A state to draw."""
 
-    data: Any
+    data: Any  # copy of the simulator's data
     markers: tuple[Marker, ...]
     step: int
     input: int
-    hidden: bool  # whether the clock is not running: then nothing of the task is shown
+    hidden: bool  # the clock is stopped, so nothing of the task is shown
 
     def content(self) -> object:
-        """What a frame depends on."""
+        """Return everything that the frame depends on."""
         return self.hidden or (self.data.qpos.tobytes(), self.markers)
 
 
 class _Job(NamedTuple):
-    """A frame to draw, for which view, whether it has to be a key frame, how long it waited for the link, s."""
+    """A frame to draw."""
 
     moment: _Moment
     view: View
     key: bool
-    waited: float
+    waited: float  # time waiting for the connection, in seconds
 
 
 class Drawer:
-    """Draws and sends frames in a separate thread until it is closed; the session fails if nothing can be drawn."""
+    """Draws and sends frames in a thread until it is closed. The session fails if drawing fails."""
 
     def __init__(
         self,
@@ -62,13 +62,13 @@ class Drawer:
         self._drawn: object = None
         self._sent = self._seen = 0
         self._key = self._closed = False
-        self._spare: list[Any] = []  # copies of states that are not needed any more
+        self._spare: list[Any] = []  # simulator data for reuse
         self._renderers: dict[int, Renderer] = {}
         self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
         self._thread.start()
 
     def set_view(self, view: View) -> None:
-        """Draw for a browser that has just connected; its first frame is a key frame."""
+        """Draw for a new connection, starting with a key frame."""
         with self._changed:
             self._view, self._key, self._drawn = view, True, None
             if view.codec == "none":
@@ -84,11 +84,11 @@ class Drawer:
 
     @property
     def hidden(self) -> bool:
-        """Whether nothing is shown now: the clock does not run."""
+        """True while the clock is stopped and nothing is shown."""
         return self._control.state.phase is not RUNNING
 
     def draw(self, world: World, state: HudState, step: int, number: int, hidden: bool) -> None:
-        """Take what is to be drawn next; what was not drawn yet is dropped."""
+        """Queue a state, in place of one that was not drawn yet."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
@@ -106,7 +106,7 @@ class Drawer:
     def _run(self) -> None:
         try:
             self._draw_all()
-        except Exception as error:  # there will be no frames
+        except Exception as error:  # without frames, the session cannot continue
             self._control.apply(Trigger.FAIL, describe(error))
         for renderer in self._renderers.values():
             renderer.close()
@@ -145,13 +145,13 @@ class Drawer:
         self._send(Frame(number, step, count, job.view.codec, key, *size, round(1000.0 * took, 2), data))
 
     def _drop(self, moment: _Moment | None) -> None:
-        """Keep the memory of a moment for the next one."""
+        """Keep the memory of a state for reuse."""
         if moment is not None:
             self._spare.append(moment.data)
 
     def _next(self) -> _Job | None:
-        """Wait for something new to draw, and for the browser to keep up; None once closed."""
-        ready: float | None = None  # since when there is something to draw that the link has no room for
+        """Wait for a new state and for the browser to keep up. Return None once closed."""
+        ready: float | None = None  # time since which a state waits for the connection
         with self._changed:
             while not self._closed:
                 moment, view = self._moment, self._view

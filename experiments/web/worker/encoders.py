@@ -1,4 +1,4 @@
-"""Frames compressed for a browser: JPEG, or H.264 with little delay."""
+"""Compression of frames for a browser, by JPEG or low-latency H.264."""
 
 import base64
 import statistics
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
-QUALITY = 75  # of JPEG
+QUALITY = 75  # JPEG quality
 H264_OPTIONS = {
     "preset": "superfast",
     "tune": "zerolatency",
@@ -20,28 +20,27 @@ H264_OPTIONS = {
     "profile": "baseline",
     "threads": "1",
 }
-KEY_EVERY = 250  # frames
+KEY_EVERY = 250  # largest distance of key frames
 
 
 class Encoder(Protocol):
     """Compresses frames of one size."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:
-        """A frame, uint8 RGB (h, w, 3), compressed, and whether it can be decoded by itself; `key` requests that."""
+        """Compress a uint8 RGB frame (h, w, 3). Return the bytes, and True for a key frame. `key` requests one."""
         ...
 
 
 class JpegEncoder:
-    """Every frame by itself."""
+    """JPEG, in which each frame is a key frame."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:  # noqa: ARG002 - each is a key frame
-        """See `Encoder`."""
         _, data = cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
         return data.tobytes(), True
 
 
 class H264Encoder:
-    """A stream without delay: one packet in Annex B per frame. Width and height are even."""
+    """H.264 without delay: one Annex B packet per frame. Width and height must be even."""
 
     def __init__(self, width: int, height: int) -> None:
         self._codec: Any = av.CodecContext.create("libx264", "w")
@@ -54,7 +53,6 @@ class H264Encoder:
         self._count = 0
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:
-        """See `Encoder`."""
         picture = av.VideoFrame.from_ndarray(frame, format="rgb24").reformat(format="yuv420p")
         picture.pts, self._count = self._count, self._count + 1
         picture.pict_type = av.video.frame.PictureType.I if key else av.video.frame.PictureType.NONE
@@ -63,24 +61,27 @@ class H264Encoder:
 
 
 def data_url(picture: Image) -> str:
-    """A picture, uint8 RGBA (h, w, 4), as the data URL of a WebP."""
+    """Return a uint8 RGBA picture (h, w, 4) as the data URL of a WebP."""
     _, data = cv2.imencode(
         ".webp", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_WEBP_QUALITY, 85]
     )
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
-SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # px
+SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # pixels
 FIRST_SIZE = 2
-FRAMES = 20  # between two changes of the size
-SLOW, QUICK = 0.033, 0.022  # s a frame may take before the size decreases, and at most to increase
-HELD_UP = 0.06  # s a frame may wait for the link before the size decreases
-SHARE = 0.65  # of the time that may be spent on drawing; the rest is left to other sessions
-RETRY = 30.0  # s after which a size that was too large is tried again
+FRAMES = 20  # number of frames between changes of the size
+SLOW, QUICK = (
+    0.033,
+    0.022,
+)  # frame times above which the size decreases and below which it increases, in seconds
+HELD_UP = 0.06  # wait for the connection above which the size decreases, in seconds
+SHARE = 0.65  # share of time for drawing; the rest is left to other sessions
+RETRY = 30.0  # time until a size that was too large is tried again, in seconds
 
 
 class FrameSize:
-    """Index of the size of the next frame, in `SIZES`. It decreases when frames take long or wait for the link."""
+    """Index of the next frame's size in `SIZES`. It decreases when frames take long or wait for the connection."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self.index, self._largest = FIRST_SIZE, len(SIZES) - 1
@@ -90,13 +91,13 @@ class FrameSize:
         self._retry_at = 0.0
 
     def limit(self, width: int, height: int) -> None:
-        """No frame is larger than a view, px, unless that is smaller than the smallest."""
+        """Limit frames to the size of a view in pixels, but at least to the smallest size."""
         fitting = [i for i, (w, h) in enumerate(SIZES) if w <= width and h <= height]
         self._largest = max(fitting, default=0)
         self._set(min(self.index, self._largest))
 
     def note(self, took: float, waited: float) -> None:
-        """Note the time to draw and compress a frame, and how long it had waited for the link, s."""
+        """Record the time for drawing and compressing a frame, and its wait for the connection, in seconds."""
         self._frames.append((took, waited))
         if len(self._frames) < FRAMES:
             return
@@ -114,5 +115,5 @@ class FrameSize:
 
 
 def pause_after(took: float) -> float:
-    """Pause after a frame that took `took` seconds, s."""
+    """Return the pause after a frame that took `took` seconds, in seconds."""
     return took / SHARE - took

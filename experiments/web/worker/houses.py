@@ -1,4 +1,4 @@
-"""Houses and the pictures of their objects, loaded once a process and shared with the processes forked from it."""
+"""Houses and pictures of their objects, loaded once and shared with forked processes."""
 
 import functools
 import gc
@@ -15,18 +15,16 @@ from mjsim.formats.gltf.cache import cached_floor, cached_scene
 from mjsim.formats.gltf.store import scenes_folder
 from mjsim.render import render_house_map, render_pictures
 
-DRAWING_TIMEOUT = 60.0  # s
+DRAWING_TIMEOUT = 60.0  # seconds
 _pictures: dict[str, dict[str, Image]] = {}
 
 
 @functools.cache
 def house(name: str) -> House:
-    """A house by its name or path."""
     return House.load(name)
 
 
 def pictures(name: str) -> dict[str, Image]:
-    """Pictures of a house's objects and receptacles."""
     if name not in _pictures:
         _pictures[name] = render_pictures(house(name).catalogue)
     return _pictures[name]
@@ -34,7 +32,7 @@ def pictures(name: str) -> dict[str, Image]:
 
 @functools.cache
 def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
-    """The pictures of a house as data URLs, and its floor plan if that is needed; to be called where one draws."""
+    """Return a house's pictures as data URLs, and its floor plan if needed. Call this where OpenGL is available."""
     found = dict(pictures(name))
     if floor_plan:
         found[FLOORPLAN] = render_house_map(house(name).catalogue, house(name).bounds)
@@ -42,12 +40,12 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
 
 
 def scene_files(house: House) -> tuple[str, str]:
-    """Folder of the files of a house's scene on the server, and path of its floor for the house's person.
+    """Return the URL paths of a house's scene and of its floor file, creating the files if needed.
 
-    They are made unless they are there, which takes seconds.
+    Creating them takes seconds.
 
     Raises:
-        AssetError: The house shows something that cannot be exported.
+        AssetError: Part of the house cannot be exported.
         OSError: The files cannot be written.
     """
     scene = cached_scene(house.catalogue, scenes_folder())
@@ -56,29 +54,28 @@ def scene_files(house: House) -> tuple[str, str]:
 
 
 def preload(name: str) -> None:
-    """Load a house, its pictures and the kernels before workers are forked; they retry and report what fails here.
+    """Load a house, its pictures and the kernels before workers are forked. Workers retry and report failures.
 
-    It uses one thread and no OpenGL, neither of which survives a fork: a process of its own draws the pictures. Another
-    one makes the files from which browsers draw.
+    Threads and OpenGL do not survive a fork. So a child process draws the pictures, and another one exports the scene.
     """
     with suppress(Exception):
         loaded = house(name)
         _begin(scene_files, loaded)
         with get_context("fork").Pool(1) as drawing:
             drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
-            warmup.compile_kernels(loaded)  # a little of each trial also leaves hashes and versions in memory
+            warmup.compile_kernels(loaded)  # this also caches hashes and versions
             _pictures[name] = drawn.get(DRAWING_TIMEOUT)
         encoded_pictures(name, False)
-    gc.freeze()  # collecting garbage would copy what is shared
+    gc.freeze()  # garbage collection would copy shared pages
 
 
 def _begin(work: Callable[[House], object], house: House) -> None:
-    """Have work done by a process that nobody waits for. The fork server may have no children but its workers."""
+    """Run `work` in a detached process, since the fork server may have no children but its workers."""
     between = os.fork()
     if not between:
         try:
             if not os.fork():
                 work(house)
-        finally:  # whatever comes: who needs the result tries again and reports it
+        finally:  # callers retry and report errors
             os._exit(0)
     os.waitpid(between, 0)

@@ -1,4 +1,4 @@
-"""A session with a person: stepped from outside, journalled step by step, and resumed after a crash."""
+"""A session with a person: stepped from outside, journalled at each step, and resumable after a crash."""
 
 import json
 import logging
@@ -41,15 +41,15 @@ from mjsim.world.world import World
 from planner.service import Mode, Planner
 
 LOG = logging.getLogger("mjsim.play")
-MAX_JOURNAL = 512 * 1024**2  # bytes after which a session ends: about 7 h with 6 objects, 3 h with 24
+MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; about 7 h with 6 objects, 3 h with 24
 
 
 class PersonState(msgspec.Struct):
-    """State of the participant in a session with a person.
+    """State of the participant.
 
     Attributes:
-        controls: What is held down and where the mouse points.
-        input: Number of the last input that counted.
+        controls: Held controls and target angles of the mouse.
+        input: Number of the last input that took effect.
     """
 
     controls: Controls = Controls()
@@ -60,12 +60,12 @@ class Human:
     """The participant of a session with a person.
 
     Args:
-        world: The world in which it acts.
+        world: The world in which the participant acts.
 
     Attributes:
-        state: Its state.
-        inputs: Inputs since the last control step; the next one takes them.
-        seen: The state of the world before the next control step.
+        state: State of the participant.
+        inputs: Inputs for the next control step.
+        seen: Observation before the next control step.
     """
 
     needs: frozenset[str] = frozenset()
@@ -76,7 +76,7 @@ class Human:
         self.seen = world.observation()
         self._world = world
 
-    def act(self, percept: Percept) -> Action:  # noqa: ARG002 - a person sees the frame
+    def act(self, percept: Percept) -> Action:  # noqa: ARG002 - a person sees the picture
         world, state = self._world, self.state
         action, state.controls = control_step(
             state.controls,
@@ -93,26 +93,26 @@ class Human:
 
 
 class LiveSession:
-    """A session of the trial that a journal is about, from its last control step on.
+    """A session of the trial in a journal, continued from its last control step.
 
     Args:
-        journal: Takes every control step. An empty one begins with `config`.
-        house: The house of the trial.
-        config: The trial; None for the one in the journal.
-        viewer: Sees every control step.
-        before: The phases before this one, as in the events `phase_ended`.
-        language: Language of the labels and of the HUD.
-        texts: Words of the HUD; None for those of the language.
+        journal: Journal of all control steps. An empty one starts with `config`.
+        house: House of the trial.
+        config: Settings of the trial, or None for those in the journal.
+        viewer: Shown every control step.
+        before: Earlier phases, as fields of `phase_ended` events.
+        language: Language of the labels and the HUD.
+        texts: Texts of the HUD, or None for those of the language.
 
     Attributes:
-        config: The trial.
-        shown: The house with labels in the language.
+        config: Settings of the trial.
+        shown: House with labels in the language.
         world: The world.
         session: The session.
-        resumed: Whether an earlier process started it.
+        resumed: True if an earlier process started it.
 
     Raises:
-        RecordError: The journal is empty, the session is over, or its record does not lead to the states that it holds.
+        RecordError: The journal is empty, the session is over, or a replay of the journal reaches different states.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class LiveSession:
             journal.append(Header(config.settings(), self.scene.episode.to_json()))
             journal.sync()
         record = read_journal(journal.entries) if len(journal.entries) > 1 else None
-        journal.entries = ()  # those of an hour take some 80 MB
+        journal.entries = ()  # entries of an hour take some 80 MB
         self.resumed = record is not None
         options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
@@ -177,20 +177,20 @@ class LiveSession:
 
     @property
     def input(self) -> int:
-        """Number of the last input that counted."""
+        """Number of the last input that took effect."""
         return self._human.state.input
 
     @property
     def end_reason(self) -> str | None:
-        """Why the task is over; None while it is not."""
+        """Reason why the task is over, or None."""
         return self.session.end_reason or (INTERRUPTED if self._journal.size > MAX_JOURNAL else None)
 
     def release(self) -> None:
-        """Nothing is held or pressed any more."""
+        """Release all controls."""
         self._human.state.controls = Controls()
 
     def step(self, inputs: Sequence[Input]) -> None:
-        """One control step; it is safe once the journal was synced.
+        """Take a control step. It is durable once the journal is synced.
 
         Raises:
             PhysicsError: The physics failed.
@@ -204,7 +204,7 @@ class LiveSession:
         self.session.record.commit(self._human.state)
 
     def end(self, reason: str) -> None:
-        """End the session; the run directory can then be made from the journal.
+        """End the session. The run directory can then be made from the journal.
 
         Raises:
             OSError: The journal cannot be written.
@@ -224,35 +224,35 @@ def _config_in(journal: Journal) -> TrialConfig | None:
 
 
 def is_over(journal: Journal) -> bool:
-    """Whether the session of a journal that was opened is over."""
+    """Return True if the session of an open journal is over."""
     last = journal.entries[-1] if journal.entries else None
     return isinstance(last, Entry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
 
 
 def open_journal(folder: Path) -> Journal:
-    """The journal of the session in a folder, which is made if it is not there."""
+    """Open the journal in a folder, creating both if needed."""
     folder.mkdir(parents=True, exist_ok=True)
     return Journal(folder / JOURNAL)
 
 
 def journal_of(run: Path) -> Path | None:
-    """Folder of the journal from which a run directory that is not there yet will be made, or None."""
+    """Return the folder of the journal for a missing run directory, or None."""
     folders = (run, run.parent / JOURNALS / run.name)
     return next((folder for folder in folders if (folder / JOURNAL).is_file()), None)
 
 
 def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan: bool = True) -> None:
-    """Make the run directory of a session, also of an unfinished one, and then its floor plan.
+    """Make the run directory of a finished or unfinished session, and then its floor plan.
 
     Args:
-        folder: Of the journal.
-        run: The run directory; what exists of it is not made again.
-        house: The house of the trial; None to load it.
-        floor_plan: Whether to draw one.
+        folder: Folder of the journal.
+        run: The run directory. Existing parts are kept.
+        house: House of the trial, or None to load it.
+        floor_plan: True to draw a floor plan.
 
     Raises:
-        RecordError: There is no journal, it holds no control step, or the run directory cannot be made.
-        ReplayError: The run directory that exists cannot be read.
+        RecordError: There is no journal or control step, or the run directory cannot be made.
+        ReplayError: The existing run directory cannot be read.
         OSError: The journal cannot be read.
     """
     if is_run(run) and ((run / TOPDOWN).is_file() or not floor_plan):
@@ -269,9 +269,9 @@ def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan:
 
 
 def remove_journal(folder: Path, run: Path) -> None:
-    """Delete the journal of a session that is over, once its run directory holds the same record on the disk.
+    """Delete the journal of a finished session, once its run directory holds the same record on disk.
 
-    A journal that differs from its run directory, or cannot be compared with it, is kept, and a warning is logged.
+    A journal that differs from its run directory, or cannot be compared, is kept with a warning in the log.
     """
     if not (folder / JOURNAL).is_file():
         return

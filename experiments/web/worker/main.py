@@ -1,4 +1,4 @@
-"""A worker process: one world, one session at a time. It ends with its server; the journal keeps the session."""
+"""The main loop of a worker process, which runs one session at a time and ends with its server."""
 
 import os
 import socket
@@ -48,7 +48,7 @@ from hud.texts import HudTexts
 
 
 class Worker:
-    """Runs one session after the other."""
+    """Runs sessions, one after the other."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
@@ -71,7 +71,7 @@ class Worker:
             self._connection.sendall(protocol.packed(message))
 
     def _receive(self) -> None:
-        """Take messages until the server is gone; a worker has nothing to tidy up then."""
+        """Handle messages until the server is gone, then exit at once, since the journal keeps the session."""
         with suppress(OSError), self._connection.makefile("rb") as stream:
             while len(head := stream.read(protocol.LENGTH.size)) == protocol.LENGTH.size:
                 (length,) = protocol.LENGTH.unpack(head)
@@ -81,7 +81,7 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        if not isinstance(message, Open | Pause):  # which the server may send by itself
+        if not isinstance(message, Open | Pause):  # these may come from the server itself
             self._control.hear()
         match message:
             case Open():
@@ -120,7 +120,7 @@ class Worker:
         """Start or resume the session, and return when it is over."""
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
-            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it by now
+            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it
                 live = LiveSession(
                     journal,
                     house,
@@ -148,5 +148,4 @@ class Worker:
 
 
 def _texts(opened: Open) -> HudTexts | None:
-    """Words of the HUD that replace those of the language."""
     return HudTexts(**opened.texts) if opened.texts else None

@@ -1,4 +1,4 @@
-"""Imported once by the fork server: everything that workers share is loaded here, before they are forked."""
+"""Module imported by the fork server, which loads everything that workers share."""
 
 import os
 

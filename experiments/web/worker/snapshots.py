@@ -1,4 +1,4 @@
-"""The states of a session for a client that draws: what it may know, and of that what has changed."""
+"""Snapshots of a session for clients that draw: the objects that a client may know, and their changes."""
 
 import logging
 
@@ -13,14 +13,14 @@ from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
-HORIZON = 0.3  # s of walking and turning that may bring an object into view, from which on it is known
-LINGERING = 25  # control steps for which it stays known after it no longer can
-LOOK_EVERY = 3  # control steps after which it is found out anew what is known
-DECIMALS = 4  # of positions, m, and orientations
+HORIZON = 0.3  # an object is sent once it may come into view within this time, in seconds
+LINGERING = 25  # how long an object is still sent after that, in control steps
+LOOK_EVERY = 3  # period of updating the objects to send, in control steps
+DECIMALS = 4  # of positions in metres, and of orientations
 
 
 def field_of_view(live: LiveSession, view: View) -> float:
-    """How wide a view is, rad: the person's field of view, or what the person chose within the study's limits."""
+    """Return the field of view in radians: the person's choice within the study's limits, or the default."""
     own, limits = live.scene.person.field_of_view, live.config.view_limits
     if limits is None or view.codec != "none":
         return own
@@ -29,7 +29,7 @@ def field_of_view(live: LiveSession, view: View) -> float:
 
 
 def scene_of(live: LiveSession, view: View) -> Scene:
-    """Where the files of a session's scene are, how its person moves, and how wide the view is."""
+    """Return the scene message of a session."""
     person, options = live.scene.person, live.world.options
     path: str | None
     floor: str | None
@@ -50,20 +50,20 @@ def scene_of(live: LiveSession, view: View) -> Scene:
 
 
 class SnapshotStream:
-    """Snapshots of a session for a client that has seen none yet, and shows a view."""
+    """Snapshots of a session for a new client with a certain view."""
 
     def __init__(self, live: LiveSession, view: View) -> None:
         self._live, self._aspect = live, view.width / view.height
         self._foresight = Foresight(live.scene, HORIZON, field_of_view(live, view))
-        self._until: dict[str, int] = {}  # control steps before which an object stays known
+        self._until: dict[str, int] = {}  # control steps until which objects are sent
         self._models = {item.name: item.model for item in live.scene.episode.objects}
-        self._looked = -LOOK_EVERY  # the control step when it was found out what is known
-        self._hands: tuple[str | None, str | None] = (None, None)  # what was in them then
+        self._looked = -LOOK_EVERY  # control step of the last update
+        self._hands: tuple[str | None, str | None] = (None, None)  # hands at that update
         self._poses = np.full((len(self._models), 7), np.nan)
         self._sent: dict[str, list[float]] = {}
 
     def next(self, seen: Observation, step: int) -> Snapshot:
-        """The snapshot of the state before a control step."""
+        """Return the snapshot before a control step."""
         world, names = self._live.world, seen.object_names
         if step >= self._looked + LOOK_EVERY or seen.hands != self._hands:
             self._look(seen, step)
@@ -94,7 +94,7 @@ class SnapshotStream:
         )
 
     def _look(self, seen: Observation, step: int) -> None:
-        """Note which objects the client may know, and until when."""
+        """Update the objects that the client may know, and how long."""
         self._looked, self._hands = step, seen.hands
         soon = self._foresight.may_see(seen, self._aspect)
         for i in np.flatnonzero(soon).tolist():

@@ -1,4 +1,4 @@
-"""Watches a session for the browser: frames, or states for a client that draws, and the HUD beside the picture."""
+"""A session viewer for the browser, which sends frames or snapshots, and the HUD next to the picture."""
 
 import dataclasses
 import math
@@ -25,13 +25,13 @@ from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
 HUD_EVERY = (
-    4  # control steps after which a client that draws gets the HUD anew; at once after a pick or place
+    4  # period of HUD updates for clients that draw, in control steps; a pick or place updates at once
 )
-HEIGHT = 480  # px of the picture for which things are projected; any will do
+HEIGHT = 480  # height of the picture for projections, in pixels; the value is arbitrary
 
 
 class BrowserViewer(Viewer):
-    """Sends the changes of each control step. `live` and `drawer` are None while no session is open."""
+    """Sends the changes of each control step. `live` and `drawer` are None without an open session."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -42,18 +42,18 @@ class BrowserViewer(Viewer):
         self._shown_to: tuple[View, LiveSession] | None = None
         self._sent: dict[type[WireMessage], WireMessage] = {}
         self._snapshots: SnapshotStream | None = None
-        self._step = -1  # of the last snapshot
-        self._looked = -HUD_EVERY  # the control step when the HUD was looked at
-        self._glance: object = None  # what it showed then
+        self._step = -1  # control step of the last snapshot
+        self._looked = -HUD_EVERY  # control step of the last HUD update
+        self._glance: object = None  # state at that update
 
     def set_view(self, view: View | None) -> None:
-        """Show everything anew, to a browser that has just connected; None repeats the view before."""
+        """Show everything again to a new connection. None repeats the last view."""
         self.view = view or self.view
         if self.drawer is not None and self.view is not None:
             self.drawer.set_view(self.view)
 
     def camera(self, world: World) -> CameraView | None:
-        """The eye camera, for a pointer to targets out of view: as wide as the picture, in the view's shape."""
+        """Return the eye camera for off-screen pointers, in the view's aspect ratio."""
         view = self.view
         if view is None:
             return None
@@ -67,7 +67,7 @@ class BrowserViewer(Viewer):
         return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def look(self) -> None:
-        """Show the present state: to a client that draws, what is beside the picture only now and then."""
+        """Show the current state. A client that draws gets the HUD less often."""
         live = self.live
         if live is None:
             return
@@ -81,7 +81,7 @@ class BrowserViewer(Viewer):
             self._send_snapshot(self._snapshots, seen, step)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Send what changed since the last call."""
+        """Send the changes since the last call."""
         view, live = self.view, self.live
         if live is None or self.drawer is None or view is None:
             return
@@ -113,7 +113,6 @@ class BrowserViewer(Viewer):
             self._send(snapshots.next(seen, step))
 
     def _begin(self, view: View, live: LiveSession) -> None:
-        """Begin to show a session in a view."""
         self._shown_to, self._shown, self._step, self._snapshots = (view, live), None, -1, None
         self._sent.clear()
         if view.codec == "none":
@@ -125,7 +124,6 @@ class BrowserViewer(Viewer):
     def _beside(
         self, live: LiveSession, seen: Observation, state: HudState, step: int
     ) -> Iterator[WireMessage]:
-        """What is shown beside and in the picture."""
         yield page_hud(state)
         yield self._moment(live, seen, state, step)
         yield Busy(seen.busy) if self._snapshots is None else Markers(state.markers)
@@ -137,7 +135,7 @@ class BrowserViewer(Viewer):
         return Moment(step, clock, room, self._reach(live, seen), state.pointer, state.minimap)
 
     def _reach(self, live: LiveSession, seen: Observation) -> Reach | None:
-        """What the action key would do now."""
+        """Return what the action key would do now."""
         result = live.world.answer(act(live.world.answer))
         if not result.applied or result.object is None or (camera := self.camera(live.world)) is None:
             return None
@@ -157,7 +155,7 @@ class BrowserViewer(Viewer):
 
 
 def page_hud(state: HudState) -> Hud:
-    """What the page shows beside the picture: the state without markers and without what moves."""
+    """Return the HUD next to the picture: the state without markers and moving parts."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None

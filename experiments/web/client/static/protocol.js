@@ -3,28 +3,28 @@
 /** @typedef {"jpeg" | "h264" | "none"} Codec */
 /** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
-/** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View How a page wants to see the session: size in px, and how frames are compressed; `none` where it draws itself. */
-/** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page, which may reconnect, its trial and its view. */
-/** @typedef {{ type: "takeover" }} TakeOver Continue here with a session that is open in another page; the answer to `occupied`. */
-/** @typedef {{ type: "run"; until?: number | null }} Run Start the clock, or let it run again; a page that will promise its inputs promises here what it has, or 0. */
-/** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change at the keyboard, the mouse, a gamepad or a touch screen. */
-/** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs What the person pressed, in order, each once. */
-/** @typedef {{ type: "seen"; frame: number }} Seen The browser has shown a frame, by its number. */
-/** @typedef {{ type: "beat" }} Beat A sign of life: the server sends one twice a second, and the page sends one back. */
-/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display How well the person saw the session in the last 5 s; this is only logged. */
-/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Who draws from now on, and why no longer the other one; this is only logged. */
-/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock; the reason is logged. */
-/** @typedef {{ type: "blur"; away: boolean }} Blur The page lost the keyboard to another window, or got it back; this is only logged. */
+/** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View View requested by a page: size in CSS pixels, and the codec of frames. The codec is `none` if the page draws. */
+/** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page that survives reconnects, its trial and its view. */
+/** @typedef {{ type: "takeover" }} TakeOver Continue a session here that is open in another page. Answers `occupied`. */
+/** @typedef {{ type: "run"; until?: number | null }} Run Start or resume the clock. A page that promises its inputs sends its current promise, or 0. */
+/** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change of the keyboard, mouse, gamepad or touch screen. */
+/** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs Inputs of the person, in order, each once. */
+/** @typedef {{ type: "seen"; frame: number }} Seen Number of a frame that the browser has shown. */
+/** @typedef {{ type: "beat" }} Beat Heartbeat. The server sends two per second, and the page answers each. */
+/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display Quality of the display during the last 5 s, which is only logged. */
+/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Change of the drawing side, with the reason. Only logged. */
+/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock. The reason is logged. */
+/** @typedef {{ type: "blur"; away: boolean }} Blur The page lost or regained the keyboard focus. Only logged. */
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
-/** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of the session, why it is paused, over or failed, and the number of the last input that it received. */
-/** @typedef {{ type: "taken"; input: number; step: number }} Taken Everything up to this input and control step counts, and is safe on the disk. */
-/** @typedef {{ max_speed: number; max_turn: number; max_look: number; acceleration: number; turn_acceleration: number; dt: number; substeps: number; mass: number; walk_gain: number; walk_force: number; inertia: number; turn_gain: number; turn_force: number; head_inertia: number; head_stiffness: number; head_damping: number; head_force: number; lowest: number; highest: number; radius: number; eye_height: number; eye_forward: number }} Gait Limits and servos of walking, as the field of `mjsim.world.fidelity.kinematics.Gait`; SI units. */
-/** @typedef {{ walking_speed: number; turning_speed: number; looking_speed: number }} Speeds Speeds of the person at full deflection of the controls, m/s and rad/s. */
-/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: Gait; speeds: Speeds; field_of_view: number; field_of_view_range: [number, number] | null; step_duration: number }} Scene What a client that draws needs once: where the files of the scene are, and how the person moves. */
-/** @typedef {{ type: "snapshot"; step: number; input: number; time: number; busy: boolean; body: Array<number>; eye: Array<number>; hands: Array<Array<number>>; held: [string | null, string | null]; objects: Record<string, Array<number>>; models: Record<string, string>; gone: Array<string> }} Snapshot The state at the start of a control step, for clients that draw; once a step. */
+/** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State State of the session, the reason if it is paused, over or failed, and the number of the last received input. */
+/** @typedef {{ type: "taken"; input: number; step: number }} Taken All inputs and control steps up to these numbers are processed and on disk. */
+/** @typedef {{ max_speed: number; max_turn: number; max_look: number; acceleration: number; turn_acceleration: number; dt: number; substeps: number; mass: number; walk_gain: number; walk_force: number; inertia: number; turn_gain: number; turn_force: number; head_inertia: number; head_stiffness: number; head_damping: number; head_force: number; lowest: number; highest: number; radius: number; eye_height: number; eye_forward: number }} Gait Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`. */
+/** @typedef {{ walking_speed: number; turning_speed: number; looking_speed: number }} Speeds Speeds of the person at full deflection of the controls, in m/s and rad/s. */
+/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: Gait; speeds: Speeds; field_of_view: number; field_of_view_range: [number, number] | null; step_duration: number }} Scene Scene for clients that draw, sent once. */
+/** @typedef {{ type: "snapshot"; step: number; input: number; time: number; busy: boolean; body: Array<number>; eye: Array<number>; hands: Array<Array<number>>; held: [string | null, string | null]; objects: Record<string, Array<number>>; models: Record<string, string>; gone: Array<string> }} Snapshot State at the start of a control step for clients that draw, sent once per step. */
 /** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null; outlined: boolean }} Marker A world-locked digital object. */
-/** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers The markers of the HUD, for clients that draw; when they change. */
-/** @typedef {{ type: "pictures"; pictures: Record<string, string> }} Pictures The pictures that a `hud` names, as data URLs, by their keys; sent once to a page. */
+/** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers Markers of the HUD for clients that draw, sent when they change. */
+/** @typedef {{ type: "pictures"; pictures: Record<string, string> }} Pictures Pictures named by a `hud`, as data URLs by key. Sent once per page. */
 /** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean; carried: boolean }} ChecklistItem A row of the task list. */
 /** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list that every condition shows: picture, name and semantic location. */
 /** @typedef {{ label: string | null; picture: string | null }} InventorySlot One hand: what it holds, or nothing. */
@@ -32,16 +32,16 @@
 /** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal that is out of view. */
 /** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
 /** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
-/** @typedef {{ type: "hud"; state: HudState }} Hud What is shown beside the picture: the state of the HUD without its markers, and without what a `moment` has. */
-/** @typedef {{ object: string; receptacle: string | null; at: [number, number] | null; instance: string; place: [number, number, number] }} Reach What the action key would do: the object, the receptacle if it is put there, and where that is. */
-/** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment What changes as the person moves: the clock in whole seconds, the room, what is in reach, pointer and map. */
-/** @typedef {{ type: "busy"; busy: boolean }} Busy Whether a pick or place is under way, for clients that show frames; keys pressed then are handled afterwards. */
-/** @typedef {{ type: "saved" }} Saved The run directory of a session that is over has been written. */
-/** @typedef {{ type: "queue" }} Queue All slots are taken. The page has to be loaded again, and then shows the queue. */
-/** @typedef {{ type: "occupied" }} Occupied The session is open in another page; `takeover` continues here. */
-/** @typedef {{ type: "replaced" }} Replaced Another page took the session over; this connection is closed. */
-/** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was refused and does not count: a code, and the reason in words. */
-/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, by number from 1: the start of a control step, the last input that counts, and the picture. */
+/** @typedef {{ type: "hud"; state: HudState }} Hud State of the HUD next to the picture, without markers and the values of a `moment`. */
+/** @typedef {{ object: string; receptacle: string | null; at: [number, number] | null; instance: string; place: [number, number, number] }} Reach What the action key would do: the object, and the receptacle if the object would be placed. */
+/** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment Values that change as the person moves: clock in whole seconds, room, object in reach, pointer and map. */
+/** @typedef {{ type: "busy"; busy: boolean }} Busy Start or end of a pick or place, for clients that show frames. Keys pressed during it are handled afterwards. */
+/** @typedef {{ type: "saved" }} Saved The run directory of a finished session has been written. */
+/** @typedef {{ type: "queue" }} Queue All slots are taken. The page must reload, and then shows the queue. */
+/** @typedef {{ type: "occupied" }} Occupied The session is open in another page. `takeover` continues it here. */
+/** @typedef {{ type: "replaced" }} Replaced Another page took the session over. This connection is closed. */
+/** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was rejected, with a code and a reason. */
+/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it. */
 /** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
 /** @typedef {State | Taken | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
