@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from experiments.web.viewing.gallery import sheets
 from experiments.web.viewing.homes import draw_home
-from experiments.web.viewing.sheet import sheets
 
 FIRST_SEED = 7
 

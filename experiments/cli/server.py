@@ -72,7 +72,7 @@ def http_server(app: Any) -> Any:
     import uvicorn  # imported here, so that other commands start fast
 
     from experiments.web.protocol import MAX_TEXT
-    from experiments.web.server.connections import QuickConnection
+    from experiments.web.server.guards import QuickConnection
 
     return uvicorn.Server(
         uvicorn.Config(

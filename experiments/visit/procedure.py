@@ -16,8 +16,7 @@ from experiments.errors import RecordError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK
 from experiments.visit.folders import Ended, VisitFolder, VisitFolders
 from experiments.visit.phases import phases_of
-from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, Visitor
-from experiments.visit.phases.played import Played
+from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, Played, Visitor
 from experiments.visit.plan import PHASES, PLAYED, RESULT, VisitPlan
 from experiments.visit.recruiter import AFTER
 from experiments.visit.store import Assignment, Person, Status, Store

@@ -1,17 +1,31 @@
-"""Files of the client: their modules, URLs and caching."""
+"""Files and pages that browsers load: the client, scenes, and rendered templates."""
 
 import functools
+import gzip
 import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.routing import Mount
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
+from starlette.templating import Jinja2Templates
 
-STATIC = Path(__file__).parent / "client" / "static"
+from hud.texts import filled
+from mjsim.formats.gltf.store import GZIP
+
+CLIENT = Path(__file__).parent / "client"
+STATIC = CLIENT / "static"
 _IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
+IMMUTABLE = "public, max-age=31536000, immutable"
+CHECKED = "no-cache"  # revalidated by ETag
+SCENE_HEADERS = {"Cache-Control": IMMUTABLE, "Vary": "Accept-Encoding"}
+_MEDIA_TYPES = {".glb": "model/gltf-binary", ".json": "application/json", ".webp": "image/webp"}
+_HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
 def modules_of(entry: str) -> Mapping[str, str]:
@@ -38,10 +52,6 @@ def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
     return named
 
 
-IMMUTABLE = "public, max-age=31536000, immutable"
-CHECKED = "no-cache"  # revalidated by ETag
-
-
 @functools.cache
 def _folder() -> str:
     digest = hashlib.sha256()
@@ -66,3 +76,62 @@ def static_caching(path: str) -> str | None:
     if path.startswith(f"{_folder()}/"):
         return IMMUTABLE
     return CHECKED if path.startswith("/static/") else None
+
+
+def scene_route(folder: Path) -> Route:
+    """Serve the scenes in a folder written by `mjsim.formats.gltf.cache`. No token is needed."""
+
+    def serve(request: Request) -> Response:
+        scene, name = request.path_params["hash"], request.path_params["name"]
+        path = folder / scene / name
+        kind = _MEDIA_TYPES.get(path.suffix)
+        if kind is None or not _HASH.fullmatch(scene) or not _NAME.fullmatch(name):
+            return PlainTextResponse("not found\n", 404)
+        compressed = path.with_name(f"{path.name}{GZIP}")
+        if compressed.is_file():
+            if _accepts_gzip(request):
+                headers = {**SCENE_HEADERS, "Content-Encoding": "gzip"}
+                return FileResponse(compressed, headers=headers, media_type=kind)
+            return Response(gzip.decompress(compressed.read_bytes()), headers=SCENE_HEADERS, media_type=kind)
+        if path.is_file():
+            return FileResponse(path, headers=SCENE_HEADERS, media_type=kind)
+        return PlainTextResponse("not found\n", 404)
+
+    return Route("/scene/{hash}/{name:path}", serve)
+
+
+def _accepts_gzip(request: Request) -> bool:
+    """Return True if the Accept-Encoding header allows gzip."""
+    for coding in request.headers.get("accept-encoding", "").lower().split(","):
+        name, _, quality = coding.partition(";")
+        if name.strip() in ("gzip", "*"):
+            return not re.fullmatch(r"\s*q=0(\.0*)?\s*", quality)
+    return False
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+@functools.cache
+def _modules(entry: str) -> tuple[str, ...]:
+    """Return the paths of a page's modules, which the browser can preload in parallel."""
+    return tuple(modules_of(entry))
+
+
+_templates = Jinja2Templates(CLIENT / "templates")
+_templates.env.filters.update(duration=_duration, filled=filled)
+_templates.env.globals.update(modules=_modules, static=static_url)
+_templates.env.trim_blocks = True
+_templates.env.auto_reload = False  # would check the file for each page
+
+
+def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
+    """Render the template with this name."""
+    return _templates.TemplateResponse(request, f"{name}.html", values, status)
+
+
+def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Return the texts of the trial page by name, from a language's texts by section."""
+    return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -1,12 +1,18 @@
 """A dry run: a rehearsal in a temporary folder, with one participant for each way out of a study."""
 
-from collections.abc import Awaitable, Callable, Iterator
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import AbstractContextManager, asynccontextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import httpx
 import msgspec
 import numpy as np
+import uvicorn
 
 from experiments.house import House
 from experiments.study.data.collect import collect
@@ -14,9 +20,7 @@ from experiments.study.file import Cell, Study
 from experiments.study.plan import plan_of
 from experiments.study.rehearsal.person import Person, Rehearsed, Surroundings
 from experiments.study.rehearsal.plan import Leaving, Planned, link_parameters, rehearsed
-from experiments.study.rehearsal.reading import words_of
 from experiments.study.rehearsal.report import STATUS
-from experiments.study.rehearsal.server import serving
 from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.phases.base import FormPhase
 from experiments.visit.plan import COMPREHENSION, CONSENT, DEVICE
@@ -62,7 +66,7 @@ async def dry_run(
     folders, rng = VisitFolders(folder / VISITS), np.random.default_rng(0)
     procedure = Procedure(plan_of(study, platform=platform), store, folders, rng)
     app = VisitServer(procedure, pool, ServerOptions(b"dry run", workers=1)).app("127.0.0.1")
-    async with serving(app) as base, httpx.AsyncClient(base_url=base, timeout=TIMEOUT_S) as client:
+    async with _serving(app) as base, httpx.AsyncClient(base_url=base, timeout=TIMEOUT_S) as client:
         around = Surroundings(
             base,
             client,
@@ -120,7 +124,7 @@ class _Walk:
         async def watch(name: str, page: httpx.Response) -> None:
             if planned.leaves is None and name not in shown:
                 shown.append(name)
-                self.walked.words[name] = words_of(page.text) if "data-trial" not in page.text else 0
+                self.walked.words[name] = _words_of(page.text) if "data-trial" not in page.text else 0
                 await self._photograph(name, str(page.url))
             elif name == "withdrawal":
                 await self._photograph(name, str(page.url))
@@ -152,3 +156,52 @@ class _Walk:
             gone.faults.append(f"the last page of a participant who is {wanted} lacks the code {code}")
         in_a_phase = planned.leaves_in and wanted != "withdrawn"
         await self._photograph(f"{planned.leaves_in}-{wanted}" if in_a_phase else wanted, str(page.url))
+
+
+def _words_of(page: str) -> int:
+    """Count the visible words of an HTML page."""
+    text = _Text()
+    text.feed(page)
+    return text.words
+
+
+class _Text(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.words, self._hidden = 0, 0
+
+    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - of the base
+        self._hidden += tag in ("head", "script", "noscript")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._hidden -= tag in ("head", "script", "noscript")
+
+    def handle_data(self, data: str) -> None:
+        if not self._hidden:
+            self.words += len(data.split())
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves signal handling to the command."""
+
+    def capture_signals(self) -> AbstractContextManager[None]:  # type: ignore[override]
+        return nullcontext()
+
+
+@asynccontextmanager
+async def _serving(app: Any) -> AsyncIterator[str]:
+    """Serve an application on a free local port, and yield its URL."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        config = uvicorn.Config(
+            app, log_config=None, access_log=False, log_level="error", ws="websockets-sansio",
+            timeout_graceful_shutdown=3,
+        )  # fmt: skip
+        server = _Server(config)
+        task = asyncio.create_task(server.serve(sockets=[listener]))
+        try:
+            while not server.started and not task.done():
+                await asyncio.sleep(0.01)
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+        finally:
+            server.should_exit = True
+            await task

@@ -25,12 +25,10 @@ from experiments.study.researcher.metrics import Metrics
 from experiments.study.researcher.overview import overview
 from experiments.visit.store import Person, Researcher, Role, Store, StudyState
 from experiments.visit.texts import words_of
-from experiments.web.client_files import static_routes
+from experiments.web.client_files import page, scene_route, static_routes, trial_texts
 from experiments.web.server.browser_socket import BrowserSocket
 from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
-from experiments.web.server.pages import page, trial_texts
 from experiments.web.server.played_session import PlayedSession
-from experiments.web.server.scene_files import scene_route
 from experiments.web.server.sessions import Sessions
 from mjsim.formats.gltf.store import scenes_folder
 

@@ -6,9 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK, TRAINING
 from experiments.visit import plan as names
-from experiments.visit.phases.base import Comprehension, Consent, FormPhase, Phase, Result, Story, Survey
+from experiments.visit.phases.base import (
+    Comprehension,
+    Consent,
+    FormPhase,
+    Phase,
+    Played,
+    Result,
+    Story,
+    Survey,
+)
 from experiments.visit.phases.device import DeviceCheck
-from experiments.visit.phases.played import Played
 from experiments.visit.plan import VisitPlan
 
 KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {

@@ -1,4 +1,4 @@
-"""The interface of phases, and the phases that consist of a text and a form."""
+"""The interface of phases, the phases with a text and a form, and the ones that are trials."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -6,11 +6,16 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, runtime_checkable
 
 from starlette.datastructures import ImmutableMultiDict
+from wtforms import IntegerField, RadioField, SelectMultipleField, StringField, TextAreaField
+from wtforms.fields.choices import SelectChoice
+from wtforms.form import BaseForm
+from wtforms.meta import DefaultMeta
+from wtforms.validators import InputRequired, Length, NumberRange, Optional
+from wtforms.widgets import CheckboxInput, ListWidget
 
-from experiments.visit.phases.forms import form_of
 from experiments.visit.plan import VisitPlan
 from experiments.visit.texts import Section
-from experiments.visit.texts.items import Item
+from experiments.visit.texts.items import MAX_LINE, MAX_TEXT, Item
 
 Outcome = Literal["next", "no_consent", "screened_out"]
 Answers = Mapping[str, Any]
@@ -202,3 +207,47 @@ class Survey(FormPhase):
             return read
         wrong = sum(item.is_wrong(read.answers.get(item.name)) for item in self.items)
         return dataclasses.replace(read, outcome="screened_out") if wrong > allowed else read
+
+
+def form_of(items: Sequence[Item], scale: Sequence[str], common: Section, language: str = "en") -> BaseForm:
+    """Return a form with a field per item. `scale` has the labels of the points of scales."""
+    meta = DefaultMeta()
+    meta.locales = [language]  # language of WTForms' own messages
+    return BaseForm({item.name: _field(item, scale, common) for item in items}, meta=meta)
+
+
+def _field(item: Item, scale: Sequence[str], common: Section) -> Any:
+    needed: list[Any] = [InputRequired(common["required"]) if item.required else Optional()]
+    label = item.text if item.required else f"{item.text} {common['optional']}"
+    match item.kind:
+        case "scale":
+            points = [SelectChoice(str(point), word) for point, word in enumerate(scale, 1)]
+            return RadioField(label, needed, choices=points, coerce=int, validate_choice=item.required)
+        case "choice":
+            choices = [SelectChoice(choice) for choice in item.choices]
+            return RadioField(label, needed, choices=choices, validate_choice=item.required)
+        case "several":
+            widget = {"widget": ListWidget(prefix_label=False), "option_widget": CheckboxInput()}
+            return SelectMultipleField(
+                label, needed, choices=[SelectChoice(c) for c in item.choices], **widget
+            )
+        case "number":
+            return IntegerField(label, [*needed, NumberRange(item.low, item.high)])
+        case "line":
+            return StringField(label, [*needed, Length(max=MAX_LINE)])
+        case "text":
+            return TextAreaField(label, [*needed, Length(max=MAX_TEXT)])
+
+
+class Played:
+    """A phase that is a trial. The server makes its page, and it ends with the trial."""
+
+    def __init__(self, plan: VisitPlan, name: str) -> None:
+        self.name = name
+        self._plan = plan
+
+    def page(self, visitor: Visitor, refused: Again | None = None) -> Page:  # noqa: ARG002 - nothing is sent
+        return Page("play", {"trial": self.name})
+
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - it ends by itself
+        return Again(self._plan.texts["common"]["too_early"])

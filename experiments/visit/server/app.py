@@ -16,8 +16,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError, StoreError
-from experiments.visit.phases.base import Again
-from experiments.visit.phases.played import Played
+from experiments.visit.phases.base import Again, Played
 from experiments.visit.plan import RESULT
 from experiments.visit.procedure import Now, Procedure
 from experiments.visit.server.admission import Arrivals
@@ -26,11 +25,10 @@ from experiments.visit.server.pages import VisitPages
 from experiments.visit.server.trials import Trials
 from experiments.visit.store import Assignment, Person
 from experiments.visit.tokens import TOKEN, Keys, token_hash
-from experiments.web.client_files import static_routes
+from experiments.web.client_files import scene_route, static_routes
 from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
 from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
-from experiments.web.server.scene_files import scene_route
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")

@@ -13,7 +13,7 @@ from experiments.visit.procedure import Now
 from experiments.visit.recruiter import Leaving
 from experiments.visit.server.trials import Queued
 from experiments.visit.store import Person
-from experiments.web.server.pages import page
+from experiments.web.client_files import page
 
 
 class VisitPages:

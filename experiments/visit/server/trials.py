@@ -18,13 +18,12 @@ from experiments.visit.plan import PLAYED
 from experiments.visit.procedure import BrowserPlayer, Now, Procedure
 from experiments.visit.store import Person
 from experiments.visit.texts import words_of
+from experiments.web.client_files import page, trial_texts
 from experiments.web.server.browser_socket import BrowserSocket
-from experiments.web.server.capacity import Capacity, usable_cores
 from experiments.web.server.limit import SessionLimit
-from experiments.web.server.pages import page, trial_texts
 from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
-from experiments.web.server.sessions import Sessions
+from experiments.web.server.sessions import Capacity, Sessions, usable_cores
 
 LOG = logging.getLogger("mjsim.study")
 BEAT_PERIOD = 60.0  # period of recording the participant's activity, in seconds

@@ -13,14 +13,13 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 from experiments.errors import StoreError
 from experiments.visit.store.assignments import Assignments
 from experiments.visit.store.copies import back_up, one_file
-from experiments.visit.store.endings import Endings
 from experiments.visit.store.engine import Database
 from experiments.visit.store.erasure import Erasure
 from experiments.visit.store.hosts import Hosts
 from experiments.visit.store.ledger import Ledger
 from experiments.visit.store.part import new_id, note
 from experiments.visit.store.people import People
-from experiments.visit.store.phases import Phases
+from experiments.visit.store.phases import Endings, Phases
 from experiments.visit.store.researchers import PASSWORD_MEMORY_KIB, Researchers
 from experiments.visit.store.tables import audit, study
 from experiments.visit.store.upgrade import upgrade

@@ -1,16 +1,21 @@
-"""Checks of all requests, and headers of all responses."""
+"""Checks of all requests, headers of all responses, and limits of connections."""
 
+import asyncio
 import re
 import socket
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+from typing import ClassVar
 from urllib.parse import parse_qsl, urlsplit
 
+import h11
 from starlette.datastructures import Headers, ImmutableMultiDict, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from experiments.web.client_files import static_caching
 
@@ -31,6 +36,9 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; media-src 'self'; "
     "connect-src 'self' blob: {sockets}; base-uri 'none'; form-action {forms}; frame-ancestors {frames}"
 )
+MAX_FIELDS = 500
+REQUEST_TIMEOUT = 10.0  # timeout for receiving a request, in seconds
+MAX_OPEN = 2000  # maximum number of connections, WebSockets excluded
 
 
 def allowed_hosts(host: str, public: str | None) -> Sequence[str]:
@@ -191,9 +199,6 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
     )
 
 
-MAX_FIELDS = 500
-
-
 async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
     """Return the fields of a submitted form. Empty if it is malformed or has too many."""
     text = (await request.body()).decode("utf-8", "replace")
@@ -201,3 +206,50 @@ async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
         return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))
     except ValueError:
         return ImmutableMultiDict()
+
+
+class QuickConnection(H11Protocol):
+    """A uvicorn connection with timeouts. Beyond the limit, the address with the most connections loses one."""
+
+    _open: ClassVar[dict["QuickConnection", str]] = {}  # clients by connection, oldest first
+    _timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._open[self] = machine_of(address_of(self.client[0] if self.client else ""))
+        self._watch()
+        if len(self._open) > MAX_OPEN:
+            [(busiest, _)] = Counter(self._open.values()).most_common(1)
+            oldest = next(one for one, machine in self._open.items() if machine == busiest)
+            oldest._forget()
+            oldest.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        self._forget()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self in self._open:
+            self._watch()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """Exempt the connection, since WebSockets have their own limits."""
+        self._forget()
+        super().handle_websocket_upgrade(event)
+
+    def _watch(self) -> None:
+        """Start the timeout of a request, or stop it if the request is complete."""
+        if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
+            self._stop()
+        elif self._timer is None:
+            self._timer = self.loop.call_later(REQUEST_TIMEOUT, self.transport.abort)
+
+    def _stop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _forget(self) -> None:
+        self._open.pop(self, None)
+        self._stop()

@@ -1,9 +1,11 @@
-"""A home of a gallery: its pictures, page and description, in its own folder."""
+"""A home of a gallery: its pictures, description, and page with a tour, in its own folder."""
 
 import functools
 import hashlib
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import msgspec
@@ -11,9 +13,10 @@ import numpy as np
 
 from experiments.errors import ConfigError
 from experiments.house import House
+from experiments.session.camera_path import camera_path
 from experiments.session.house_pictures import floor_plan, room_views
 from experiments.web.viewing.page import run_page
-from experiments.web.viewing.tour import tour_page
+from hud.state import HudState, InventorySlot
 from mjsim.formats.gltf.export import export_scene
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.generated_names import parse_name
@@ -21,10 +24,15 @@ from mjsim.house.catalogue.house_ref import parse_house
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import Renderer
 from mjsim.support.files import exchange, source_digest, work_folder
+from mjsim.values.person_parameters import PersonParameters
 
 PLAN, VIEW = (480, 400), (300, 200)  # sizes in pixels
 PAGE, ABOUT = "index.html", "home.json"
 _WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
+INTERVAL = 0.2  # time between two poses, which the page interpolates, in seconds
+NEAR = 0.05  # distance at which a viewpoint is reached, in metres
+INSIDE = (0.0, 0.0, 0.8) * 2  # positions of the idle hands in metres, hidden in the body
+_HUD = HudState("", (), (), (None, InventorySlot()))
 
 
 class Home(msgspec.Struct, frozen=True):
@@ -141,3 +149,49 @@ def _code() -> str:
     """Return a hash of the Python sources and the page's, which determine the files of all homes."""
     page = run_page("", {}, {}, tour="")
     return source_digest("mjsim", "experiments") + hashlib.sha256(page.encode()).hexdigest()
+
+
+def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
+    """Return the HTML of a self-contained page that shows a home from outside, from above, and on a tour.
+
+    Args:
+        house: The home.
+        scene: Its files, by `mjsim.formats.gltf`.
+        caption: Caption of the page.
+    """
+    return run_page(house.catalogue.label, _tour(house), scene, tour=caption)
+
+
+def _tour(house: House) -> dict[str, Any]:
+    """Return the tour as a `Run` of view/run.js."""
+    path, person = camera_path(house), PersonParameters()
+    times = np.arange(0.0, path.duration, INTERVAL)
+    rows = path.at(times)
+    body = np.column_stack([rows.positions[:, :2], rows.headings, rows.pitches])
+    moments = []
+    for key, places in house.viewpoints.items():
+        gaps = np.linalg.norm(rows.positions[:, :2] - places[0], axis=1)
+        reached = times[np.flatnonzero(gaps < gaps.min() + NEAR)[0]]
+        moments.append({"t": round(float(reached), 1), "kind": "room", "text": house.rooms.label(key)})
+    return {
+        "title": house.catalogue.label,
+        "person": {
+            "eye_height": person.eye_height,
+            "eye_forward": 0.0,
+            "body_radius": person.body_radius,
+            "field_of_view": person.field_of_view,
+        },
+        "bounds": house.bounds,
+        "models": {},
+        "labels": {},
+        "time": times.round(1).tolist(),
+        "body": body.round(3).ravel().tolist(),
+        "hands": INSIDE * len(times),
+        "objects": {},
+        "hud": [(0, _HUD)],
+        "markers": [],
+        "shown": [(0, [])],
+        "moments": sorted(moments, key=lambda moment: moment["t"]),
+        "plans": [],
+        "pictures": {},
+    }

@@ -13,8 +13,7 @@ from experiments.house import House, read_words
 from experiments.record.reader import Record
 from experiments.trials.replay.replay import replay
 from experiments.trials.replay.replayer import Replayer
-from experiments.web.client_files import STATIC, modules_of
-from experiments.web.server.pages import CLIENT, trial_texts
+from experiments.web.client_files import CLIENT, STATIC, modules_of, trial_texts
 from experiments.web.viewing import timeline
 from experiments.web.viewing.recorder import RunRecorder
 from experiments.web.worker.encoders import data_url

@@ -23,7 +23,7 @@ from experiments.errors import ConfigError, RecordError, StatisticsError
 from experiments.house import read_words
 from experiments.record.phases import RECORDED, SIMULATED
 from experiments.trials.table import read_rows, write_tables
-from experiments.web.server.pages import CLIENT
+from experiments.web.client_files import CLIENT
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
 

@@ -11,8 +11,8 @@ from study_site import phase_of, served
 from websockets.sync.client import connect
 
 from experiments.study.payments.rules import due
-from experiments.web.server import capacity
-from experiments.web.server.capacity import MOST, Capacity
+from experiments.web.server import sessions
+from experiments.web.server.sessions import MOST, Capacity
 
 PHASES = 'phases = ["consent", "task", "completion"]\n'
 CODES = 'completed = "C0MPLETE"\nscreened_out = "C0UT"\nno_consent = "C0NO"\n'
@@ -130,7 +130,7 @@ def test_where_places_fill_up_people_leave_by_the_platform_and_are_paid_by_rule(
 def test_a_machine_lets_in_as_many_as_its_cores_hold(monkeypatch):
     clock = SimpleNamespace(now=0.0)
     clock.monotonic, clock.process_time = (lambda: clock.now), (lambda: 0.0)
-    monkeypatch.setattr(capacity, "time", clock)
+    monkeypatch.setattr(sessions, "time", clock)
     machine = Capacity(cores=4)
     assert machine.measure({}, ()) == 8, "sessions may need a third of a core, until more is known"
     playing = {str(number): SimpleNamespace(processor_time=0.0) for number in range(8)}

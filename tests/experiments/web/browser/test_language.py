@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.support.play_server import PATIENCE
 from experiments.house import read_words
-from experiments.web.server.pages import trial_texts
+from experiments.web.client_files import trial_texts
 from tests.experiments.web.browser.study_visit import STUDY
 from tests.experiments.web.browser.test_layout import check_shapes
 

@@ -15,8 +15,7 @@ import pytest
 from jinja2 import Environment, FileSystemLoader
 
 from experiments.house import read_words
-from experiments.web.client_files import STATIC
-from experiments.web.server.pages import CLIENT, trial_texts
+from experiments.web.client_files import CLIENT, STATIC, trial_texts
 from experiments.web.worker.viewer import page_hud
 from hud import stencils
 from hud.compose import compose

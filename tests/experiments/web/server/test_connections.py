@@ -7,8 +7,7 @@ import pytest
 import uvicorn
 from starlette.responses import PlainTextResponse
 
-from experiments.web.server.connections import QuickConnection
-from experiments.web.server.guards import Guards
+from experiments.web.server.guards import Guards, QuickConnection
 
 HEAD = b"POST / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
 WHOLE = HEAD + b"Content-Length: 0\r\n\r\n"
@@ -47,7 +46,7 @@ async def ask(port, request, machine="127.0.0.1"):
     "request_", [b"", HEAD, HEAD + b"Content-Length: 9\r\n\r\nopene", WHOLE + HEAD], ids=repr
 )
 def test_a_request_that_does_not_end_is_closed(monkeypatch, request_):
-    monkeypatch.setattr("experiments.web.server.connections.REQUEST_TIMEOUT", 0.2)
+    monkeypatch.setattr("experiments.web.server.guards.REQUEST_TIMEOUT", 0.2)
 
     async def answer():
         async with serving() as port:
@@ -60,7 +59,7 @@ def test_a_request_that_does_not_end_is_closed(monkeypatch, request_):
 
 
 def test_who_opens_most_connections_makes_room(monkeypatch):
-    monkeypatch.setattr("experiments.web.server.connections.MAX_OPEN", 10)
+    monkeypatch.setattr("experiments.web.server.guards.MAX_OPEN", 10)
 
     async def answer():
         async with serving() as port:

@@ -9,7 +9,7 @@ from scripted_workers import ScriptedPool
 from starlette.applications import Starlette
 from starlette.testclient import TestClient
 
-from experiments.web.server.scene_files import scene_route
+from experiments.web.client_files import scene_route
 from mjsim.formats.gltf.store import GZIP, scenes_folder
 
 HASH = "0123456789abcdef0123"
