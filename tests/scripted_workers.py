@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from experiments.record import records
-from experiments.web.protocol import Inputs, Leave, Open, Pause, Run, Saved, State, Taken
-from experiments.web.state import Trigger
+from experiments.web.protocol import Inputs, Leave, Open, Pause, RunMessage, Saved, Taken
+from experiments.web.state import State, Trigger
 
 LAST = 100  # rows scrolled at once, with which a scripted trial ends as if all was delivered
 ORIGIN = "http://127.0.0.1:8000"
@@ -39,7 +39,7 @@ class ScriptedWorker:
             case Open(run=run):
                 self._run, self._state = Path(run), State()
                 self._move(Trigger.OPENED)
-            case Run():
+            case RunMessage():
                 self._move(Trigger.RUN)
             case Pause(reason):
                 self._move(Trigger.PAUSE, reason)

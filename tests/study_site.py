@@ -15,8 +15,8 @@ from scripted_workers import ScriptedPool
 from experiments.cli.server import http_server, listen, url_of
 from experiments.study.file import read_people_study
 from experiments.study.plan import plan_of
-from experiments.study.researcher.app import ResearcherServer, Watched
-from experiments.study.researcher.metrics import Metrics, Timed
+from experiments.study.researcher.app import ResearcherContext, ResearcherServer
+from experiments.study.researcher.metrics import ServerMetrics, Timed
 from experiments.visit.folders import VisitFolders
 from experiments.visit.procedure import Procedure
 from experiments.visit.server.app import ServerOptions, VisitServer
@@ -106,7 +106,7 @@ def served(folder, settings="", researchers=ROLES, workers=20):
         known = {one.name for one in await site.store.researchers.all()}
         for role in set(researchers) - known:
             await site.store.researchers.add(role, PASSWORD, role)
-        metrics = Metrics()
+        metrics = ServerMetrics()
         site.store.on_write(metrics.wrote)
         folders, rng = VisitFolders(folder / "visits"), np.random.default_rng(0)
         procedure = Procedure(plan_of(site.study, folder / "film.mp4"), site.store, folders, rng)
@@ -115,7 +115,7 @@ def served(folder, settings="", researchers=ROLES, workers=20):
             procedure, site.pool, ServerOptions(b"secret", proxies, metrics, workers=workers)
         )
         site.people = server.app(HOST)
-        watched = Watched(site.study, site.store, server.sessions, metrics)
+        watched = ResearcherContext(site.study, site.store, server.sessions, metrics)
         site.researchers = ResearcherServer(watched, proxies=proxies).app(HOST)
         with listen(HOST, 0) as first, listen(HOST, 0) as second:
             site.url, site.researcher_url = url_of(first), url_of(second)

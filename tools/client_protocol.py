@@ -36,7 +36,7 @@ def client_protocol() -> str:
     lines = [_HEAD]
     lines += [f"/** @typedef {{{_literals(alias)}}} {name} */" for name, alias in ALIASES.items()]
     found: dict[str, str] = {}
-    for union in (*UNIONS.values(), protocol.Frame):
+    for union in (*UNIONS.values(), protocol.FrameMessage):
         for info in inspect.multi_type_info(getattr(union, "__args__", (union,))):
             _collect(info, found)
     lines += found.values()
@@ -93,7 +93,10 @@ def _object(cls: type, fields: tuple[inspect.Field, ...], extra: list[str], foun
     name = "HudMessage" if cls.__module__ == "hud.state" and cls.__name__ == "Message" else cls.__name__
     if name not in found:
         found[name] = ""  # it may contain itself
-        sent = issubclass(cls, msgspec.Struct) and cls not in (*protocol.ToBrowser.__args__, protocol.Frame)
+        sent = issubclass(cls, msgspec.Struct) and cls not in (
+            *protocol.ToBrowser.__args__,
+            protocol.FrameMessage,
+        )
         optional = ["?" if sent and not field.required else "" for field in fields]
         parts = extra + [
             f"{field.encode_name}{mark}: {_collect(field.type, found)}"

@@ -72,7 +72,7 @@ def http_server(app: Any) -> Any:
     import uvicorn  # imported here, so that other commands start fast
 
     from experiments.web.protocol import MAX_TEXT
-    from experiments.web.server.guards import QuickConnection
+    from experiments.web.server.guards import TimedConnection
 
     return uvicorn.Server(
         uvicorn.Config(
@@ -82,7 +82,7 @@ def http_server(app: Any) -> Any:
             log_level="warning",
             server_header=False,
             proxy_headers=False,  # the guards believe those that are named
-            http=QuickConnection,
+            http=TimedConnection,
             ws="websockets-sansio",
             ws_max_size=MAX_TEXT,
             ws_ping_interval=5.0,

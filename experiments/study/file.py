@@ -70,7 +70,7 @@ class Recruitment(_Table, frozen=True):
             raise ValueError(f"api_url is {self.api_url!r}; it gets a secret, so it must begin with https://")
 
 
-class Settings(_Table, frozen=True):
+class StudySettings(_Table, frozen=True):
     """The table `[study]`."""
 
     name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
@@ -132,7 +132,7 @@ class Study:
 
     path: Path
     sha256: str  # hash of the file
-    settings: Settings
+    settings: StudySettings
     cells: Sequence[Cell]
     texts: Texts
     story: str
@@ -158,7 +158,7 @@ def read_people_study(path: Path) -> Study:
             f"{path} has no table [study], which a study with people needs; `mjsim study init` writes one"
         )
     try:
-        settings = msgspec.convert({"study": table}, _File).study
+        settings = msgspec.convert({"study": table}, _StudyFile).study
     except msgspec.ValidationError as error:
         raise ConfigError(at_line(path, content.decode(), str(error))) from error
     own_texts = path.parent / settings.texts if settings.texts else None
@@ -188,8 +188,8 @@ def read_people_study(path: Path) -> Study:
     )
 
 
-class _File(msgspec.Struct):
-    study: Settings
+class _StudyFile(msgspec.Struct):
+    study: StudySettings
 
 
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
@@ -205,7 +205,7 @@ def _without_seeds(trial: TrialConfig) -> str:
     return repr({name: value for name, value in trial.settings().items() if name not in SEEDS})
 
 
-def _values(settings: Settings) -> Mapping[str, str]:
+def _values(settings: StudySettings) -> Mapping[str, str]:
     pay = settings.pay
     paid = {"pay": f"{Decimal(str(pay.reward)):.2f} {pay.currency}"} if pay.reward else {}
     return {

@@ -16,10 +16,10 @@ from experiments.errors import RecordError
 from experiments.record.phases import FLYTHROUGH, STORY, TASK
 from experiments.visit.folders import Ended, VisitFolder, VisitFolders
 from experiments.visit.phases import phases_of
-from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, Played, Visitor
+from experiments.visit.phases.base import Again, Answers, Done, FormData, Phase, TrialPhase, Visitor
 from experiments.visit.plan import PHASES, PLAYED, RESULT, VisitPlan
 from experiments.visit.recruiter import AFTER
-from experiments.visit.store import Assignment, Person, Status, Store
+from experiments.visit.store import Assignment, PersonRow, Status, Store
 from experiments.visit.store.values import utc_now
 from experiments.web.server.player import LiveTrial
 
@@ -29,7 +29,7 @@ ATTEMPTS = "attempts"  # name of the answer that counts attempts at a phase
 
 
 @dataclass(frozen=True)
-class Now:
+class PhaseState:
     """Current state of a visit.
 
     Attributes:
@@ -38,7 +38,7 @@ class Now:
         wait: Seconds before the phase may be ended.
     """
 
-    person: Person
+    person: PersonRow
     phase: Phase | None
     number: int
     visitor: Visitor
@@ -63,10 +63,10 @@ class Procedure:
         self.names = [phase.name for phase in self.phases]
         self._rng = rng
 
-    async def now(self, person: Person, path: str) -> Now:
+    async def now(self, person: PersonRow, path: str) -> PhaseState:
         """Return the current state of a visit, and record when the phase was first shown."""
         if not person.active and person.status != "finished":
-            return Now(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
+            return PhaseState(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
         if person.phase not in self.names:
             person = await self._leave_missing_phase(person)
         number = self.names.index(person.phase)
@@ -74,9 +74,9 @@ class Procedure:
         rows = await self.store.answers(person.id)
         answers = {row.item: row.value for row in rows if row.phase == person.phase}
         visitor = Visitor(answers, passed, answers.get(ATTEMPTS, 0), path, self._metrics(person))
-        return Now(person, self.phases[number], number + 1, visitor, wait)
+        return PhaseState(person, self.phases[number], number + 1, visitor, wait)
 
-    async def times(self, person: Person) -> tuple[float, float]:
+    async def times(self, person: PersonRow) -> tuple[float, float]:
         """Return the seconds since the phase was first shown, and those until it may be ended."""
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
@@ -84,13 +84,13 @@ class Procedure:
         # A negative time has passed if the clock was set back.
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
-    async def submit(self, now: Now, phase: str, sent: FormData) -> Again | None:
+    async def submit(self, now: PhaseState, phase: str, sent: FormData) -> Again | None:
         """Handle a submitted form.
 
         Return an error message, or None if it was accepted or belongs to an earlier page.
         """
         current = now.phase
-        if current is None or phase != current.name or isinstance(current, Played):
+        if current is None or phase != current.name or isinstance(current, TrialPhase):
             return None
         if phase == self.names[-1]:
             return None
@@ -109,7 +109,7 @@ class Procedure:
             await self.store.finish_phase(now.person.id, phase, phase, answers, status=read.outcome)
         return None
 
-    async def save(self, now: Now, phase: str, sent: FormData) -> None:
+    async def save(self, now: PhaseState, phase: str, sent: FormData) -> None:
         """Store the answers of a form that has not been submitted yet."""
         current = now.phase
         if current is None or phase != current.name or not hasattr(current, "drafts"):
@@ -117,21 +117,21 @@ class Procedure:
         if drafts := current.drafts(sent):
             await self.store.save_answers(now.person.id, phase, drafts)
 
-    async def assign(self, person: Person) -> Assignment | None:
+    async def assign(self, person: PersonRow) -> Assignment | None:
         """Return the participant's place in a cell, or None if all cells are full."""
         plan = self.plan
         return await self.store.assign(
             person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
         )
 
-    async def begin_playing(self, person: Person, place: Assignment) -> VisitFolder:
+    async def begin_playing(self, person: PersonRow, place: Assignment) -> VisitFolder:
         """Create the visit's folder with the settings of its trials."""
         played = [name for name in self.names if name in PLAYED]
         ended = await self._before_playing(person)
         trials = self.plan.trials(await self._after_earlier_visit(person, place))
         return await asyncio.to_thread(self.folders.create, person.token_hash, played, trials, ended)
 
-    async def withdraw(self, person: Person, *, delete: bool) -> None:
+    async def withdraw(self, person: PersonRow, *, delete: bool) -> None:
         await self.store.withdraw(person.id, delete=delete)
         if delete:
             await asyncio.to_thread(self.folders.remove, person.token_hash)
@@ -141,13 +141,13 @@ class Procedure:
         wanted = [cell.wanted for cell in self.plan.cells]
         return await self.store.room(wanted, self.names[0], self._away)
 
-    async def turn_away(self, person: Person) -> Person:
+    async def turn_away(self, person: PersonRow) -> PersonRow:
         """End a participation for which there is no place."""
         here = person.phase
         await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
         return await self.store.person(person.id)
 
-    async def record_trials(self, person: Person) -> Person:
+    async def record_trials(self, person: PersonRow) -> PersonRow:
         """Record the participant's trials whose runs have been written, and return the updated participant."""
         while person.active and person.phase in PLAYED:
             folder = self.folders.find(person.token_hash)
@@ -186,7 +186,7 @@ class Procedure:
                     here = next(name for name in self.names if name in folder.stored.trials)
                 await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
 
-    async def _leave_missing_phase(self, person: Person) -> Person:
+    async def _leave_missing_phase(self, person: PersonRow) -> PersonRow:
         """Advance a participant whose phase is not in the plan, such as the film of a server without one."""
         order = (*PHASES, RESULT)
         later = order[order.index(person.phase) + 1 :] if person.phase in order else ()
@@ -201,11 +201,11 @@ class Procedure:
     def _away(self) -> datetime.timedelta:
         return datetime.timedelta(seconds=self.plan.limits.abandoned_after)
 
-    def _metrics(self, person: Person) -> Mapping[str, Any] | None:
+    def _metrics(self, person: PersonRow) -> Mapping[str, Any] | None:
         folder = self.folders.find(person.token_hash) if person.phase == RESULT else None
         return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
 
-    async def _after_earlier_visit(self, person: Person, place: Assignment) -> Assignment:
+    async def _after_earlier_visit(self, person: PersonRow, place: Assignment) -> Assignment:
         """Use the next house seed if the participant has seen the result of the same episode."""
         earlier = (await self.store.identity(person.id)).get(AFTER)
         folder = self.folders.find(earlier) if earlier else None
@@ -213,13 +213,15 @@ class Procedure:
             return place
         return dataclasses.replace(place, house_seed=folder.settings(TASK)["house_seed"] + 1)
 
-    async def _before_playing(self, person: Person) -> list[Ended]:
+    async def _before_playing(self, person: PersonRow) -> list[Ended]:
         wanted = [name for name in (STORY, FLYTHROUGH) if name in self.names]
         found = {phase.name: phase for phase in await self.store.phases(person.id)} if wanted else {}
         shown = [found[name] for name in wanted if name in found]
         return [Ended(phase.name, phase.duration_s or 0.0) for phase in shown]
 
-    async def _move_on(self, person: Person, phase: str, answers: Answers, reason: str | None = None) -> None:
+    async def _move_on(
+        self, person: PersonRow, phase: str, answers: Answers, reason: str | None = None
+    ) -> None:
         """End a phase. Reaching the last phase finishes the participation."""
         names = self.names
         following = names[names.index(phase) + 1]
@@ -230,7 +232,7 @@ class Procedure:
 class BrowserPlayer:
     """A participant of a procedure who plays in a browser."""
 
-    def __init__(self, procedure: Procedure, person: Person) -> None:
+    def __init__(self, procedure: Procedure, person: PersonRow) -> None:
         self.key = person.token_hash
         self._procedure, self._id = procedure, person.id
 

@@ -11,7 +11,7 @@ Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_
 
 
 @dataclass(frozen=True)
-class Arrival:
+class Candidate:
     """A person who may take part.
 
     Attributes:
@@ -29,7 +29,7 @@ class Preview:
 
 
 @dataclass(frozen=True)
-class Refusal:
+class InvalidLink:
     """A link that the platform could not have made."""
 
     reason: str
@@ -68,7 +68,7 @@ class Recruiter(Protocol):
     has_time_limit: bool
     embedded_by: tuple[str, ...]
 
-    def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
+    def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
         """Check the query of a link."""
         ...
 
@@ -93,9 +93,9 @@ class OpenLink:
         self.platform, self._code = platform, code
         self.parameters: tuple[str, ...] = (AFTER,) if repeats else ()
 
-    def arrive(self, query: Mapping[str, str]) -> Arrival:
+    def arrive(self, query: Mapping[str, str]) -> Candidate:
         earlier = query.get(AFTER, "") if AFTER in self.parameters else ""
-        return Arrival(identity={AFTER: token_hash(earlier)} if TOKEN.fullmatch(earlier) else {})
+        return Candidate(identity={AFTER: token_hash(earlier)} if TOKEN.fullmatch(earlier) else {})
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - there are no ids
         code = self._code if how == "finished" else ""

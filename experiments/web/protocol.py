@@ -10,8 +10,17 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from experiments.web.controls import Input
-from experiments.web.state import LOADING, TRANSITIONS, SessionPhase, Trigger
-from hud.state import HudState, Marker, MiniMap, Pointer
+from experiments.web.state import (
+    Busy,
+    Hud,
+    Markers,
+    Moment,
+    Pictures,
+    SceneMessage,
+    Snapshot,
+    State,
+    WireMessage,
+)
 
 HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable with the house that the fork server preloads
 VERSION = 1  # version of the header of frames
@@ -22,9 +31,7 @@ LENGTH = struct.Struct("!I")  # length prefix of messages between server and wor
 CODECS = {"jpeg": 1, "h264": 2}
 BEAT_PERIOD = 0.5  # time between heartbeats, in seconds
 MAX_SILENCE = 1.0  # silence after which the connection is considered lost, in seconds
-MAX_STEPS_AHEAD = (
-    25  # how far inputs and promises may be ahead of the last control step, in control steps (1 s)
-)
+MAX_STEPS_AHEAD = 25  # largest lead of inputs and promises over the last control step, in control steps
 DISPLAY_PERIOD = 5.0  # time between `display` messages, in seconds
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSocket close codes
@@ -37,10 +44,6 @@ Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # pixels
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Angle = Annotated[float, msgspec.Meta(gt=0.0, lt=3.0)]  # horizontal field of view, in radians
 Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
-
-
-class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """A message. Its `type` is the lower-case name of its class."""
 
 
 class View(WireMessage, frozen=True):
@@ -67,7 +70,7 @@ class TakeOver(WireMessage, frozen=True):
     """Continue a session here that is open in another page. Answers `occupied`."""
 
 
-class Run(WireMessage, frozen=True):
+class RunMessage(WireMessage, frozen=True, tag="run"):
     """Start or resume the clock. A page that promises its inputs sends its current promise, or 0."""
 
     until: Count | None = None
@@ -168,25 +171,12 @@ class Open(WireMessage, frozen=True):
     folder: str
     run: str
     config: dict[str, Any]
-    before: list[dict[str, Any]] = []
+    before: list[dict[str, Any]] = msgspec.field(default_factory=list)
     restarted: bool = False
     as_inputs_come: bool = False
     floor_plan: bool = True
     language: str = "en"
-    texts: dict[str, str] = {}
-
-
-class State(WireMessage, frozen=True):
-    """State of the session, the reason if it is paused, over or failed, and the number of the last received input."""
-
-    phase: SessionPhase = LOADING
-    reason: str = ""
-    input: int = 0
-
-    def after(self, trigger: Trigger, reason: str = "") -> "State":
-        """Return the next state, or the same object if the trigger has no effect."""
-        phase = TRANSITIONS.get((self.phase, trigger))
-        return self if phase is None else State(phase, reason, self.input)
+    texts: dict[str, str] = msgspec.field(default_factory=dict)
 
 
 class Taken(WireMessage, frozen=True):
@@ -196,7 +186,7 @@ class Taken(WireMessage, frozen=True):
     step: int
 
 
-class Frame(WireMessage, frozen=True):
+class FrameMessage(WireMessage, frozen=True, tag="frame"):
     """A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it.
 
     H.264 is in Annex B format, one access unit per frame. `key` frames can be decoded without earlier ones.
@@ -217,142 +207,6 @@ class Frame(WireMessage, frozen=True):
         codec, key = CODECS[self.codec], KEY_FLAG if self.key else 0
         head = (VERSION, codec, key, 0, self.width, self.height, self.number, self.step, self.input)
         return FRAME_HEAD.pack(*head, self.milliseconds) + self.data
-
-
-class Gait(msgspec.Struct, frozen=True):
-    """Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`."""
-
-    max_speed: float
-    max_turn: float
-    max_look: float
-    acceleration: float
-    turn_acceleration: float
-    dt: float
-    substeps: int
-    mass: float
-    walk_gain: float
-    walk_force: float
-    inertia: float
-    turn_gain: float
-    turn_force: float
-    head_inertia: float
-    head_stiffness: float
-    head_damping: float
-    head_force: float
-    lowest: float
-    highest: float
-    radius: float
-    eye_height: float
-    eye_forward: float
-
-
-class Speeds(msgspec.Struct, frozen=True):
-    """Speeds of the person at full deflection of the controls, in m/s and rad/s."""
-
-    walking_speed: float
-    turning_speed: float
-    looking_speed: float
-
-
-class Scene(WireMessage, frozen=True):
-    """Scene for clients that draw, sent once.
-
-    Attributes:
-        path: URL path of the scene's files on this server. If None, the server draws.
-        floor: File of the obstacles for `gait`, or None if walking cannot be predicted.
-        gait: Limits and servos of walking.
-        speeds: Speeds of the person.
-        field_of_view: Horizontal field of view for any shape of the view, in radians.
-        field_of_view_range: Limits of the person's choice of the field of view, or None.
-        step_duration: Duration of a control step, in seconds.
-    """
-
-    path: str | None
-    floor: str | None
-    gait: Gait
-    speeds: Speeds
-    field_of_view: float
-    field_of_view_range: tuple[float, float] | None
-    step_duration: float
-
-
-class Snapshot(WireMessage, frozen=True):
-    """State at the start of a control step for clients that draw, sent once per step.
-
-    Attributes:
-        step: Control step that starts with this state.
-        input: Number of the last input that counts in it.
-        time: Simulated time, in seconds.
-        busy: True during a pick or place.
-        body: Position, speeds, commands and servos of the body (docs/protocol.md).
-        eye: Position in metres, heading and pitch in radians.
-        hands: Positions of the left and right hand in the body's frame, in metres.
-        held: Instance names of the objects in the hands.
-        objects: Position in metres (3) and orientation wxyz (4) by instance name, if changed since the last snapshot.
-        models: Models by instance name, of objects that are new to the client or were `gone`.
-        gone: Instance names of objects without further updates.
-    """
-
-    step: int
-    input: int
-    time: float
-    busy: bool
-    body: list[float]
-    eye: list[float]
-    hands: list[list[float]]
-    held: tuple[str | None, str | None]
-    objects: dict[str, list[float]]
-    models: dict[str, str]
-    gone: list[str]
-
-
-class Markers(WireMessage, frozen=True):
-    """Markers of the HUD for clients that draw, sent when they change."""
-
-    markers: tuple[Marker, ...]
-
-
-class Pictures(WireMessage, frozen=True):
-    """Pictures named by a `hud`, as data URLs by key. Sent once per page."""
-
-    pictures: dict[str, str]
-
-
-class Hud(WireMessage, frozen=True):
-    """State of the HUD next to the picture, without markers and the values of a `moment`."""
-
-    state: HudState
-
-
-class Reach(msgspec.Struct, frozen=True):
-    """What the action key would do: the object, and the receptacle if the object would be placed.
-
-    `instance` is the object's instance name. `place` is the position of the object or the receptacle in metres. `at` is
-    that position in the view, as shares of its width and height, or None if it is out of view.
-    """
-
-    object: str
-    receptacle: str | None
-    at: tuple[float, float] | None
-    instance: str
-    place: tuple[float, float, float]
-
-
-class Moment(WireMessage, frozen=True):
-    """Values that change as the person moves: clock in whole seconds, room, object in reach, pointer and map."""
-
-    step: int
-    clock: float | None
-    room: str
-    reach: Reach | None
-    pointer: Pointer | None
-    minimap: MiniMap | None
-
-
-class Busy(WireMessage, frozen=True):
-    """Start or end of a pick or place, for clients that show frames. Keys pressed during it are handled afterwards."""
-
-    busy: bool
 
 
 class Saved(WireMessage, frozen=True):
@@ -378,11 +232,13 @@ class Error(WireMessage, frozen=True):
     message: str
 
 
-FromBrowser = Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
+FromBrowser = (
+    Hello | TakeOver | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
+)
 ToBrowser = (
     State
     | Taken
-    | Scene
+    | SceneMessage
     | Snapshot
     | Markers
     | Pictures
@@ -396,8 +252,10 @@ ToBrowser = (
     | Replaced
     | Error
 )
-ToWorker = Open | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
-FromWorker = State | Taken | Frame | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
+ToWorker = Open | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave
+FromWorker = (
+    State | Taken | FrameMessage | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Saved
+)
 
 decode_from_browser: Any = msgspec.json.Decoder(FromBrowser).decode
 encode_to_browser = msgspec.json.Encoder().encode

@@ -15,8 +15,8 @@ from experiments.session.signals import run_until_signal
 if TYPE_CHECKING:
     from experiments.study.file import Study
     from experiments.study.rehearsal.person import Rehearsed
-    from experiments.study.rehearsal.report import Report
-    from experiments.study.rehearsal.run import Settings
+    from experiments.study.rehearsal.report import RehearsalReport
+    from experiments.study.rehearsal.run import RehearsalSettings
 
 SHOWN = 20  # faults that are printed
 DESCRIPTION = """\
@@ -57,10 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     require_extra("study")
     from experiments.study.rehearsal.report import REPORT
-    from experiments.study.rehearsal.run import Settings
+    from experiments.study.rehearsal.run import RehearsalSettings
 
     people = arguments.people or study.people
-    settings = Settings(
+    settings = RehearsalSettings(
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor
     )
     found = run_until_signal(_run(study, settings, arguments))
@@ -77,7 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if found.passed else 1
 
 
-async def _run(study: "Study", settings: "Settings", arguments: argparse.Namespace) -> "Report":
+async def _run(
+    study: "Study", settings: "RehearsalSettings", arguments: argparse.Namespace
+) -> "RehearsalReport":
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars

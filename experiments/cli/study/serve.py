@@ -112,8 +112,8 @@ async def _serve(
     from experiments.study.data.collect import check_people
     from experiments.study.data.retention import forget_daily
     from experiments.study.plan import plan_of
-    from experiments.study.researcher.app import ResearcherServer, Watched
-    from experiments.study.researcher.metrics import Metrics, Timed
+    from experiments.study.researcher.app import ResearcherContext, ResearcherServer
+    from experiments.study.researcher.metrics import ServerMetrics, Timed
     from experiments.visit.folders import VISITS, VisitFolders
     from experiments.visit.procedure import Procedure
     from experiments.visit.server.app import ServerOptions, VisitServer
@@ -124,7 +124,7 @@ async def _serve(
     check_people(study, await store.people())
     folders = VisitFolders(arguments.out.absolute() / VISITS)
     procedure = Procedure(plan_of(study, film), store, folders, np.random.default_rng())
-    metrics = Metrics()
+    metrics = ServerMetrics()
     store.on_write(metrics.wrote)
     days = study.settings.limits.keep_days
     options = ServerOptions(
@@ -139,7 +139,7 @@ async def _serve(
     app = Timed(server.app(arguments.host, arguments.public_url), metrics)
     beside, (listener, researchers) = [], listeners
     if researchers is not None:
-        watched = Watched(study, store, server.sessions, metrics)
+        watched = ResearcherContext(study, store, server.sessions, metrics)
         page = ResearcherServer(watched, arguments.researcher_url, arguments.trusted_proxy)
         beside.append((page.app(arguments.researcher_host), researchers))
     await serve(app, listener, arguments, beside)

@@ -20,7 +20,7 @@ from experiments.study.file import Study
 from experiments.trials.batch_folder import read_trial
 from experiments.trials.table import write_tables
 from experiments.visit.plan import SURVEY
-from experiments.visit.store import Answer, Person, PhaseRow, Store, TrialRow
+from experiments.visit.store import Answer, PersonRow, PhaseRow, Store, TrialRow
 from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
@@ -82,7 +82,7 @@ def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
     return {person: list(mine) for person, mine in groupby(rows, attrgetter("person_id"))}
 
 
-def check_people(study: Study, people: Sequence[Person]) -> None:
+def check_people(study: Study, people: Sequence[PersonRow]) -> None:
     """Check that real and simulated participants are not mixed.
 
     Raises:
@@ -127,7 +127,7 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
     return [*write_tables(out, collected.rows), out / TEXTS]
 
 
-def person_name(person: Person) -> str:
+def person_name(person: PersonRow) -> str:
     """Return the name of a participant in tables, such as `p00012`."""
     return f"p{person.id:05d}"
 
@@ -150,7 +150,7 @@ def harmless(text: str) -> str:
     return f"'{text}" if text.startswith(FORMULA) else text
 
 
-def _about(person: Person, trial: TrialRow, phases: Sequence[PhaseRow]) -> dict[str, Any]:
+def _about(person: PersonRow, trial: TrialRow, phases: Sequence[PhaseRow]) -> dict[str, Any]:
     durations = {f"phase_{phase.name}_s": phase.duration_s for phase in phases if phase.name.isidentifier()}
     return {
         "participant": person_name(person),
@@ -188,7 +188,7 @@ def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]
 
 
 def _texts(
-    items: Sequence[Item], people: Sequence[Person], answers: Sequence[Answer]
+    items: Sequence[Item], people: Sequence[PersonRow], answers: Sequence[Answer]
 ) -> list[tuple[str, str, str]]:
     free = {item.name for item in items if item.kind in FREE}
     names = {person.id: person_name(person) for person in people}

@@ -15,7 +15,7 @@ from experiments.study.data.copies import DATABASES, Copy, copies, forget_copies
 from experiments.study.data.export import DATA, RUNS
 from experiments.trials.table import NAME, read_rows, write_tables
 from experiments.visit.folders import VISITS, VisitFolders
-from experiments.visit.store import Person, Store, change_database
+from experiments.visit.store import PersonRow, Store, change_database
 from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
 LEFTOVER_S = 3600.0  # age from which temporary files are considered abandoned, in seconds
@@ -55,7 +55,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     return told
 
 
-async def _erase_from_copies(store: Store, folder: Path, person: Person, who: str) -> list[str]:
+async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who: str) -> list[str]:
     async def gone(other: Store) -> bool:
         # After an older backup is restored, the number may belong to another participant.
         same = {one.id for one in await other.people() if one.created == person.created} & {person.id}

@@ -18,7 +18,7 @@ from experiments.study.data.copies import INDEX, note_copy
 from experiments.study.file import Study
 from experiments.trials.dictionary import trial_columns
 from experiments.visit.plan import SURVEY
-from experiments.visit.store import Answer, Person, Store, TrialRow
+from experiments.visit.store import Answer, PersonRow, Store, TrialRow
 from experiments.visit.texts.items import Item
 from mjsim.support.files import exchange, work_folder, write_text_atomically
 
@@ -145,7 +145,7 @@ def _name(row: TrialRow) -> str:
     return f"p{row.person_id:05d}"
 
 
-async def _phases(store: Store, people: Mapping[int, Person]) -> Table:
+async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
     rows: list[dict[str, Any]] = []
     order: dict[int, int] = {}
     for phase in sorted(await store.phases(), key=lambda row: (row.person_id, row.shown)):

@@ -12,7 +12,7 @@ from typing import NoReturn
 from experiments.errors import StoreError
 from experiments.study.data.collect import person_name, visit_name
 from experiments.study.data.erase import change_databases, erase, remove_from_files
-from experiments.visit.store import Person, Store, utc_now
+from experiments.visit.store import PersonRow, Store, utc_now
 
 LOG = logging.getLogger("mjsim.study")
 WHO = "keep_days"  # author in the audit log
@@ -82,14 +82,14 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
         await asyncio.sleep(DAY)
 
 
-async def _names(store: Store, people: Sequence[Person]) -> dict[int, str]:
+async def _names(store: Store, people: Sequence[PersonRow]) -> dict[int, str]:
     """Return new folder names by participant. The hash of a link would allow a participant to be recognized."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
 
 
-async def _forget(store: Store, visits: Path, people: Sequence[Person], names: Mapping[int, str]) -> None:
+async def _forget(store: Store, visits: Path, people: Sequence[PersonRow], names: Mapping[int, str]) -> None:
     numbers = [person.id for person in people]
 
     async def gone(backup: Store) -> bool:

@@ -9,7 +9,7 @@ from experiments.record.phases import ALL_DELIVERED, TASK
 from experiments.study.data.collect import person_name
 from experiments.study.file import Pay, Study
 from experiments.visit.plan import PLAYED
-from experiments.visit.store import PaymentEvent, Person, Store, TrialRow
+from experiments.visit.store import PaymentEvent, PersonRow, Store, TrialRow
 from experiments.visit.store.ledger import ONCE
 from experiments.visit.store.values import PaymentKind
 
@@ -33,7 +33,7 @@ class Due:
 
 
 def due(
-    study: Study, people: Sequence[Person], trials: Sequence[TrialRow], rejected: Collection[int] = ()
+    study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
     """Return the payments by the rules of the study file, in order of arrival.
 
@@ -88,7 +88,7 @@ async def decide(store: Store, payments: Sequence[Due]) -> int:
     return new
 
 
-async def reject(store: Store, person: Person, currency: str, why: str) -> None:
+async def reject(store: Store, person: PersonRow, currency: str, why: str) -> None:
     """Record the rejection of a finished participant. The platform receives it with the payments.
 
     Raises:
@@ -104,6 +104,6 @@ async def reject(store: Store, person: Person, currency: str, why: str) -> None:
     await store.ledger.decide(person.id, "rejection", 0, currency, f"{name}-rejection", why)
 
 
-def _due(person: Person, kind: PaymentKind, amount: float, pay: Pay, why: str) -> Due:
+def _due(person: PersonRow, kind: PaymentKind, amount: float, pay: Pay, why: str) -> Due:
     cents = int((Decimal(str(amount)) * 100).to_integral_value(ROUND_HALF_UP))
     return Due(person.id, kind, f"{person_name(person)}-{kind}", cents, pay.currency, why)

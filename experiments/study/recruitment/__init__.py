@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from experiments.errors import ConfigError
-from experiments.study.file import Recruitment, Settings
+from experiments.study.file import Recruitment, StudySettings
 from experiments.study.payments.platform import Payer
 from experiments.study.recruitment.connect import Connect, ConnectPayer
 from experiments.study.recruitment.external_question import ExternalQuestion, ExternalQuestionPayer
@@ -39,7 +39,7 @@ def recruiter(settings: Recruitment) -> Recruiter:
             return ExternalQuestion(settings)
 
 
-def payer(settings: Settings) -> Payer:
+def payer(settings: StudySettings) -> Payer:
     """Return the client that pays through a study's platform.
 
     Raises:

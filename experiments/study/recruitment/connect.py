@@ -11,7 +11,7 @@ from typing import Any
 
 from experiments.study.file import Recruitment
 from experiments.study.payments.platform import LISTED_AFTER, Api, Order, secret
-from experiments.visit.recruiter import Arrival, Leaving, Refusal, WayBack
+from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, ASSIGNMENT, PROJECT = "participantId", "assignmentId", "projectId"
 SITE, API = "https://connect.cloudresearch.com", "https://connect-api.cloudresearch.com"
@@ -35,13 +35,13 @@ class Connect:
         self._code, self._project = settings.completed, settings.study_id
         self._site = (*settings.sites, SITE)[0]
 
-    def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
+    def arrive(self, query: Mapping[str, str]) -> Candidate | InvalidLink:
         ids = {name: query.get(name, "") for name in self.parameters}
         if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
-            return Refusal(f"{bad[0]} is missing or is no id")
+            return InvalidLink(f"{bad[0]} is missing or is no id")
         if self._project and ids[PROJECT] != self._project:
-            return Refusal(f"{PROJECT} is not that of this study")
-        return Arrival(ids[PERSON], ids)
+            return InvalidLink(f"{PROJECT} is not that of this study")
+        return Candidate(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
         if how != "finished":

@@ -13,7 +13,7 @@ from typing import Any
 from experiments.errors import ConfigError
 from experiments.study.file import Recruitment
 from experiments.study.payments.platform import LISTED_AFTER, Api, Order, UnsureError, secret
-from experiments.visit.recruiter import Arrival, Leaving, Preview, Refusal, WayBack
+from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, Preview, WayBack
 
 ASSIGNMENT, TASK, PERSON, SITE = "assignmentId", "hitId", "workerId", "turkSubmitTo"
 PREVIEW = "ASSIGNMENT_ID_NOT_AVAILABLE"
@@ -37,19 +37,19 @@ class ExternalQuestion:
     def __init__(self, settings: Recruitment) -> None:
         self.embedded_by, self._task = settings.sites, settings.study_id
 
-    def arrive(self, query: Mapping[str, str]) -> Arrival | Preview | Refusal:
+    def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
         """Return a Preview before the task is accepted. A form is only sent to one of the platform's sites."""
         if query.get(ASSIGNMENT) == PREVIEW:
             return Preview()
         ids = {name: query.get(name, "") for name in self.parameters}
         ids[SITE] = ids[SITE].rstrip("/")
         if bad := [name for name in (ASSIGNMENT, TASK, PERSON) if not _ID.fullmatch(ids[name])]:
-            return Refusal(f"{bad[0]} is missing or is no id")
+            return InvalidLink(f"{bad[0]} is missing or is no id")
         if ids[SITE] not in self.embedded_by:
-            return Refusal(f"{SITE} is not among study.recruitment.sites")
+            return InvalidLink(f"{SITE} is not among study.recruitment.sites")
         if self._task and ids[TASK] != self._task:
-            return Refusal(f"{TASK} is not that of this study")
-        return Arrival(ids[PERSON], ids)
+            return InvalidLink(f"{TASK} is not that of this study")
+        return Candidate(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
         site = identity.get(SITE, "")

@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 
 from experiments.study.file import Recruitment
 from experiments.study.payments.platform import Api, DeclinedError, Order, UnsureError, secret
-from experiments.visit.recruiter import Arrival, Leaving, Refusal, WayBack
+from experiments.visit.recruiter import Candidate, InvalidLink, Leaving, WayBack
 
 PERSON, STUDY, SUBMISSION = "PROLIFIC_PID", "STUDY_ID", "SESSION_ID"
 SITE, API = "https://app.prolific.com", "https://api.prolific.com"
@@ -37,13 +37,13 @@ class Prolific:
         self._study = settings.study_id
         self._site = (*settings.sites, SITE)[0]
 
-    def arrive(self, query: Mapping[str, str]) -> Arrival | Refusal:
+    def arrive(self, query: Mapping[str, str]) -> Candidate | InvalidLink:
         ids = {name: query.get(name, "") for name in self.parameters}
         if bad := [name for name, value in ids.items() if not _ID.fullmatch(value)]:
-            return Refusal(f"{bad[0]} is missing or is no id")
+            return InvalidLink(f"{bad[0]} is missing or is no id")
         if self._study and ids[STUDY] != self._study:
-            return Refusal(f"{STUDY} is not that of this study")
-        return Arrival(ids[PERSON], ids)
+            return InvalidLink(f"{STUDY} is not that of this study")
+        return Candidate(ids[PERSON], ids)
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
         code = self._codes.get(how, "")

@@ -29,14 +29,14 @@ GUEST = "guest"  # participant if the file names no simulated one
 
 
 @dataclass(frozen=True)
-class Played:
+class TrialDurations:
     """Mean durations of simulated trials, in seconds."""
 
     training: float
     tasks: Mapping[str, float]  # by cell
 
 
-def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Played:
+def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
     """Run trials of simulated participants, and leave their runs in `folder`.
 
     Args:
@@ -57,7 +57,7 @@ def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Pla
         times = [seconds(f"{cell.label} {k}", trial) for k, trial in enumerate(own)]
         tasks[cell.label] = mean(times)
     trained = TRAINING in study.settings.phases
-    return Played(seconds(TRAINING, training_config(trials[0][0])) if trained else 0.0, tasks)
+    return TrialDurations(seconds(TRAINING, training_config(trials[0][0])) if trained else 0.0, tasks)
 
 
 def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
@@ -75,7 +75,7 @@ def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
 
 
 def durations(
-    study: Study, phases: Sequence[Phase], words: Mapping[str, int], played: Played
+    study: Study, phases: Sequence[Phase], words: Mapping[str, int], played: TrialDurations
 ) -> dict[str, float]:
     """Return the expected duration of each phase, in seconds.
 

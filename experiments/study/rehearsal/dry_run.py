@@ -18,7 +18,7 @@ from experiments.house import House
 from experiments.study.data.collect import collect
 from experiments.study.file import Cell, Study
 from experiments.study.plan import plan_of
-from experiments.study.rehearsal.person import Person, Rehearsed, Surroundings
+from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.plan import Leaving, Planned, link_parameters, rehearsed
 from experiments.study.rehearsal.report import STATUS
 from experiments.visit.folders import VISITS, VisitFolders
@@ -130,7 +130,7 @@ class _Walk:
                 await self._photograph(name, str(page.url))
 
         gone = Rehearsed(planned.number)
-        person = Person(planned, replace(self._around, watch=watch), gone)
+        person = SimulatedPerson(planned, replace(self._around, watch=watch), gone)
         try:
             await person.begin()
             await person.go()

@@ -11,7 +11,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Origin
 
-from experiments.study.rehearsal.player import STEPS, Player
+from experiments.study.rehearsal.player import STEPS, SimulatedPlayer
 
 ANSWER_TIMEOUT = 2.0  # time to wait for a new state before sending the next input, in seconds
 DELAYED = 15  # number of delayed messages
@@ -35,7 +35,7 @@ class Link:
         refused: Texts of the server's `error` messages.
     """
 
-    def __init__(self, socket: ClientConnection, player: Player) -> None:
+    def __init__(self, socket: ClientConnection, player: SimulatedPlayer) -> None:
         self._socket, self._player = socket, player
         self._phase, self._saved, self._occupied, self._number = "", False, False, 0
         self._news = asyncio.Event()
@@ -137,7 +137,9 @@ class Link:
 
 
 @asynccontextmanager
-async def connected(base: str, path: str, trial: str, tab: str, player: Player) -> AsyncIterator[Link]:
+async def connected(
+    base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
+) -> AsyncIterator[Link]:
     """Connect a page to a trial, and disconnect it at the end.
 
     Args:

@@ -14,7 +14,7 @@ from experiments.house import House
 from experiments.record.phases import FLYTHROUGH
 from experiments.study.rehearsal.link import Link, LostError, connected
 from experiments.study.rehearsal.plan import Planned, moment
-from experiments.study.rehearsal.player import Player
+from experiments.study.rehearsal.player import SimulatedPlayer
 from experiments.visit.phases.base import FormPhase, Phase
 from experiments.visit.plan import COMPREHENSION
 from experiments.visit.texts.items import Item
@@ -76,7 +76,7 @@ class Surroundings:
     watch: Watch = _ignore  # receives the name of each page and the page
 
 
-class Person:
+class SimulatedPerson:
     """Visits the study according to the plan."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
@@ -200,7 +200,7 @@ class Person:
         breaks += [(moment(trial, rng), "leave")] * leaves
         self._reloaded |= planned.reloads_in == trial
         self._returned |= planned.returns_in == trial
-        player, tab, done = Player(self._around.house, rng), f"rehearsal-{rng.integers(10**9)}", 0
+        player, tab, done = SimulatedPlayer(self._around.house, rng), f"rehearsal-{rng.integers(10**9)}", 0
         for _ in range(TRIES + len(breaks)):
             player.state = None
             at, what = min(breaks, default=(10**9, ""))
@@ -232,7 +232,7 @@ class Person:
             link.cut()
             return tab
         if what == "second page":
-            idle, page = Player(self._around.house, self._rng), f"second-{tab}"
+            idle, page = SimulatedPlayer(self._around.house, self._rng), f"second-{tab}"
             async with connected(self._around.base, self.rehearsed.link, trial, page, idle) as second:
                 await second.occupied()
             return tab

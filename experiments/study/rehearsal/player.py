@@ -20,7 +20,7 @@ BACKWARDS = 3  # number of backward inputs after being stuck
 PRESS_GAP = 15  # shortest time between two presses, in control steps
 
 
-class Player:
+class SimulatedPlayer:
     """Tidies up along shortest paths.
 
     It follows the display's goal. Without one, it walks to the nearest known object or bin, or else searches the house.

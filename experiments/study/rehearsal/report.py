@@ -15,7 +15,7 @@ from experiments.study.data.export import export
 from experiments.study.file import Study
 from experiments.study.payments.rules import decide, due
 from experiments.study.rehearsal.person import Rehearsed
-from experiments.study.rehearsal.run import SERVED, Settings
+from experiments.study.rehearsal.run import SERVED, RehearsalSettings
 from experiments.visit.recruiter import Leaving
 from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
@@ -33,7 +33,7 @@ STATUS: dict[str, Leaving] = {  # status by outcome
 
 
 @dataclass(frozen=True)
-class Report:
+class RehearsalReport:
     """Result of a rehearsal.
 
     Attributes:
@@ -45,7 +45,7 @@ class Report:
         faults: Descriptions of faults.
     """
 
-    settings: Settings
+    settings: RehearsalSettings
     passed: bool
     outcomes: dict[str, int]
     cells: dict[int, int]
@@ -54,8 +54,8 @@ class Report:
 
 
 async def report(
-    study: Study, settings: Settings, store: Store, people: Sequence[Rehearsed], out: Path
-) -> Report:
+    study: Study, settings: RehearsalSettings, store: Store, people: Sequence[Rehearsed], out: Path
+) -> RehearsalReport:
     """Decide payments, collect and export, compare the database with the people's records, and write the report."""
     study, served = replace(study, rehearsal=True), out / SERVED
     known = {person.token_hash: person for person in await store.people()}
@@ -79,7 +79,7 @@ async def report(
         write_collected(found, out / TABLE)
         await export(study, store, served, out / EXPORT, replace=True)
     counts = (await store.counts()).cells
-    made = Report(
+    made = RehearsalReport(
         settings,
         not faults,
         dict(Counter(one.outcome for one in people)),

@@ -16,7 +16,7 @@ from experiments.house import House
 from experiments.study.file import Study
 from experiments.study.plan import plan_of
 from experiments.study.recruitment import recruiter
-from experiments.study.rehearsal.person import Person, Rehearsed, Surroundings
+from experiments.study.rehearsal.person import Rehearsed, SimulatedPerson, Surroundings
 from experiments.study.rehearsal.plan import Planned, link_parameters, plan_people
 from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
@@ -27,7 +27,7 @@ END_TIMEOUT = 60.0  # timeout for stopping the server, in seconds
 HTTP_TIMEOUT = 120.0  # timeout of requests, in seconds
 
 
-class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Settings of a rehearsal, stored in its folder so that it can be resumed."""
 
     study: str  # SHA-256 of the study file
@@ -39,7 +39,11 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 async def rehearse(
-    study: Study, settings: Settings, out: Path, film: Path | None, on_person: Callable[[Rehearsed], None]
+    study: Study,
+    settings: RehearsalSettings,
+    out: Path,
+    film: Path | None,
+    on_person: Callable[[Rehearsed], None],
 ) -> list[Rehearsed]:
     """Run all unfinished people. Return every result, in order.
 
@@ -81,7 +85,7 @@ def read_people(path: Path) -> dict[int, Rehearsed]:
     return found
 
 
-def _keep(settings: Settings, out: Path) -> None:
+def _keep(settings: RehearsalSettings, out: Path) -> None:
     path = out / PLAN
     text = msgspec.json.format(msgspec.json.encode(settings)).decode() + "\n"
     if path.is_file() and path.read_text() != text:
@@ -91,7 +95,9 @@ def _keep(settings: Settings, out: Path) -> None:
 
 
 @asynccontextmanager
-async def _server(study: Study, settings: Settings, out: Path, film: Path | None) -> AsyncIterator[str]:
+async def _server(
+    study: Study, settings: RehearsalSettings, out: Path, film: Path | None
+) -> AsyncIterator[str]:
     """Run the study's server in a subprocess, and yield its URL."""
     command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
     command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
@@ -124,7 +130,7 @@ async def _server(study: Study, settings: Settings, out: Path, film: Path | None
 
 async def _send(
     study: Study,
-    settings: Settings,
+    settings: RehearsalSettings,
     out: Path,
     base: str,
     people: Sequence[Planned],
@@ -147,7 +153,7 @@ async def _send(
             async def live(planned: Planned, wait: float) -> None:
                 await asyncio.sleep(wait)
                 rehearsed = known.setdefault(planned.number, Rehearsed(planned.number))
-                person = Person(planned, around, rehearsed)
+                person = SimulatedPerson(planned, around, rehearsed)
                 try:
                     if not rehearsed.link:
                         await person.begin()

@@ -21,9 +21,9 @@ from experiments.errors import StoreError
 from experiments.study.data.collect import person_name
 from experiments.study.file import Study
 from experiments.study.researcher.access import Access, may
-from experiments.study.researcher.metrics import Metrics
+from experiments.study.researcher.metrics import ServerMetrics
 from experiments.study.researcher.overview import overview
-from experiments.visit.store import Person, Researcher, Role, Store, StudyState
+from experiments.visit.store import PersonRow, Researcher, Role, Store, StudyState
 from experiments.visit.texts import words_of
 from experiments.web.client_files import page, scene_route, static_routes, trial_texts
 from experiments.web.server.browser_socket import BrowserSocket
@@ -44,13 +44,13 @@ Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 
 @dataclass(frozen=True)
-class Watched:
+class ResearcherContext:
     """Study, store, sessions of this server and metrics, as shown on the page."""
 
     study: Study
     store: Store
     sessions: Sessions
-    metrics: Metrics
+    metrics: ServerMetrics
 
 
 class ResearcherServer:
@@ -63,7 +63,7 @@ class ResearcherServer:
     """
 
     def __init__(
-        self, watched: Watched, public: str | None = None, proxies: tuple[Network, ...] = ()
+        self, watched: ResearcherContext, public: str | None = None, proxies: tuple[Network, ...] = ()
     ) -> None:
         self._watched, self._public, self._proxies = watched, public, proxies
         self._study, self._store = watched.study, watched.store
@@ -274,10 +274,10 @@ class ResearcherServer:
         await self._store.set_quota(cell, wanted, who.name)
         return RedirectResponse("/", 303)
 
-    async def _found(self, number: int) -> Person | None:
+    async def _found(self, number: int) -> PersonRow | None:
         return next((one for one in await self._store.people() if one.id == number), None)
 
-    def _session(self, person: Person) -> PlayedSession | None:
+    def _session(self, person: PersonRow) -> PlayedSession | None:
         """Return the participant's session if it runs on this server."""
         session = self._watched.sessions.under_way.get(person.token_hash)
         return session if session and person.active and session.trial is not None else None
@@ -300,6 +300,6 @@ class ResearcherServer:
         )
 
 
-def _described(person: Person) -> str:
+def _described(person: PersonRow) -> str:
     """Return the text of a participant's row that the search looks at."""
     return f"{person_name(person)} {person.status.replace('_', ' ')} {person.phase}".lower()

@@ -27,7 +27,7 @@ class Fault:
     text: str
 
 
-class Metrics(Meter):
+class ServerMetrics(Meter):
     """Metrics of one server since its start."""
 
     def __init__(self) -> None:
@@ -118,7 +118,7 @@ class FaultLog(logging.Handler):
 class Timed:
     """ASGI middleware that measures response times."""
 
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+    def __init__(self, app: ASGIApp, metrics: ServerMetrics) -> None:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

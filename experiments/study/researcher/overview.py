@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 
 from experiments.study.file import Study
 from experiments.visit.plan import DEVICE
-from experiments.visit.store import Person, Status, Store, StudyState, utc_now
+from experiments.visit.store import PersonRow, Status, Store, StudyState, utc_now
 from experiments.visit.store.ledger import by_key, paid
 from experiments.web.server.sessions import Sessions
 
@@ -102,7 +102,7 @@ async def overview(study: Study, store: Store, sessions: Sessions) -> Overview:
     )
 
 
-def _phase(name: str, people: Sequence[Person], away: datetime) -> PhaseLine:
+def _phase(name: str, people: Sequence[PersonRow], away: datetime) -> PhaseLine:
     here = [person for person in people if person.active]
     left = Counter(person.status for person in people if person.status in LEFT)
     return PhaseLine(name, len(here), sum(person.seen < away for person in here), left)

@@ -11,10 +11,10 @@ from experiments.visit.phases.base import (
     Consent,
     FormPhase,
     Phase,
-    Played,
-    Result,
+    ResultPhase,
     Story,
     Survey,
+    TrialPhase,
 )
 from experiments.visit.phases.device import DeviceCheck
 from experiments.visit.plan import VisitPlan
@@ -25,11 +25,11 @@ KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
     STORY: lambda plan: Story(plan, STORY),
     FLYTHROUGH: lambda plan: FormPhase(plan, FLYTHROUGH, "study_film"),
     names.COMPREHENSION: lambda plan: Comprehension(plan, names.COMPREHENSION, "comprehension"),
-    TRAINING: lambda plan: Played(plan, TRAINING),
-    TASK: lambda plan: Played(plan, TASK),
+    TRAINING: lambda plan: TrialPhase(plan, TRAINING),
+    TASK: lambda plan: TrialPhase(plan, TASK),
     names.SURVEY: lambda plan: Survey(plan, names.SURVEY),
     names.DEBRIEFING: lambda plan: FormPhase(plan, names.DEBRIEFING),
-    names.RESULT: lambda plan: Result(plan, names.RESULT, "result"),
+    names.RESULT: lambda plan: ResultPhase(plan, names.RESULT, "result"),
     names.COMPLETION: lambda plan: FormPhase(plan, names.COMPLETION, "completion"),
 }
 

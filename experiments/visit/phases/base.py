@@ -151,7 +151,7 @@ class Story(FormPhase):
         return {"paragraphs": self._plan.story_paragraphs}
 
 
-class Result(FormPhase):
+class ResultPhase(FormPhase):
     """Metrics of the task, and a link to play again unless the plan has only one episode."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
@@ -239,7 +239,7 @@ def _field(item: Item, scale: Sequence[str], common: Section) -> Any:
             return TextAreaField(label, [*needed, Length(max=MAX_TEXT)])
 
 
-class Played:
+class TrialPhase:
     """A phase that is a trial. The server makes its page, and it ends with the trial."""
 
     def __init__(self, plan: VisitPlan, name: str) -> None:

@@ -9,9 +9,9 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from experiments.visit.procedure import Procedure
-from experiments.visit.recruiter import Arrival, Preview, Refusal
+from experiments.visit.recruiter import Candidate, InvalidLink, Preview
 from experiments.visit.server.pages import VisitPages
-from experiments.visit.store import Person
+from experiments.visit.store import PersonRow
 from experiments.visit.tokens import Keys, new_token, token_hash
 from experiments.web.server.guards import Rate, sent_form
 
@@ -22,7 +22,7 @@ COUNTED_FULL = 1.0  # lifetime of a count of 0, in seconds
 TOKEN = "token"  # form field with the token that the browser has stored
 
 
-class Arrivals:
+class Admission:
     """Admits participants to a study.
 
     Args:
@@ -42,10 +42,10 @@ class Arrivals:
     async def welcome(self, request: Request) -> Response:
         """Show the welcome page, or send a returning participant to their current phase."""
         came = self._recruiter.arrive(request.query_params)
-        if isinstance(came, Refusal):
+        if isinstance(came, InvalidLink):
             LOG.warning("a link was refused: %s", came.reason)
             return self._pages.message(request, "unknown", 400)
-        if isinstance(came, Arrival) and (person := await self._known(came)) is not None:
+        if isinstance(came, Candidate) and (person := await self._known(came)) is not None:
             return await self._again(request, came, person)
         if (closed := await self._closed()) is not None:
             return self._pages.closed(request, closed)
@@ -64,7 +64,7 @@ class Arrivals:
             return self._pages.message(request, "paused", 429)
         form = {name: str(value) for name, value in (await sent_form(request)).items()}
         came = self._recruiter.arrive(form)
-        if not isinstance(came, Arrival):
+        if not isinstance(came, Candidate):
             return self._pages.message(request, "unknown", 400)
         if (person := await self._known(came)) is not None:
             return await self._again(request, came, person, form.get(TOKEN, ""))
@@ -72,11 +72,11 @@ class Arrivals:
             return self._pages.closed(request, closed)
         return await self._arrive(came)
 
-    async def _known(self, came: Arrival) -> Person | None:
+    async def _known(self, came: Candidate) -> PersonRow | None:
         """Return the participant with this platform id, if they have arrived before."""
         return None if came.key is None else await self._store.find(token_hash(self._keys.token(came.key)))
 
-    async def _again(self, request: Request, came: Arrival, person: Person, token: str = "") -> Response:
+    async def _again(self, request: Request, came: Candidate, person: PersonRow, token: str = "") -> Response:
         """Let a participant return if all ids match, or if the browser has the participant's link.
 
         The platform's id of a person alone is no proof, since others know it. Only the person knows the submission's
@@ -94,7 +94,7 @@ class Arrivals:
         ids = {name: came.identity.get(name, "") for name in self._recruiter.parameters}
         return self._pages.show(request, "returning", 403, section=section, parameters=ids)
 
-    async def _arrive(self, came: Arrival) -> Response:
+    async def _arrive(self, came: Candidate) -> Response:
         token, key = new_token(), None
         if came.key is not None:
             token, key = self._keys.token(came.key), self._keys.person(came.key)

@@ -16,14 +16,14 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from experiments.errors import RecordError, StoreError
-from experiments.visit.phases.base import Again, Played
+from experiments.visit.phases.base import Again, TrialPhase
 from experiments.visit.plan import RESULT
-from experiments.visit.procedure import Now, Procedure
-from experiments.visit.server.admission import Arrivals
+from experiments.visit.procedure import PhaseState, Procedure
+from experiments.visit.server.admission import Admission
 from experiments.visit.server.background import HostOfVisits, end_absent
 from experiments.visit.server.pages import VisitPages
 from experiments.visit.server.trials import Trials
-from experiments.visit.store import Assignment, Person
+from experiments.visit.store import Assignment, PersonRow
 from experiments.visit.tokens import TOKEN, Keys, token_hash
 from experiments.web.client_files import scene_route, static_routes
 from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
@@ -74,7 +74,7 @@ class VisitServer:
         self._trials = Trials(procedure, pool, options.workers, options.meter)
         self.sessions = self._trials.sessions
         self._pages = VisitPages(self._plan)
-        self._arrivals = Arrivals(procedure, self._pages, Keys(options.secret, self._plan.name))
+        self._arrivals = Admission(procedure, self._pages, Keys(options.secret, self._plan.name))
         self._host = (
             None if options.host is None else HostOfVisits(options.host, self._store, procedure.folders)
         )
@@ -214,16 +214,18 @@ class VisitServer:
             return
         await self._trials.play(socket, person)
 
-    async def _show_phase(self, request: Request, person: Person, refused: Again | None = None) -> Response:
+    async def _show_phase(
+        self, request: Request, person: PersonRow, refused: Again | None = None
+    ) -> Response:
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
-            if isinstance(now.phase, Played):
+            if isinstance(now.phase, TrialPhase):
                 return await self._played(request, now)
         finished = now.number == len(self._procedure.phases)
         identity = await self._store.identity(person.id) if finished else {}
         return self._pages.phase(request, now, identity, refused)
 
-    async def _played(self, request: Request, now: Now) -> Response:
+    async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person
         begun = self._procedure.folders.find(person.token_hash)  # a small file, read faster without a thread
         here = begun or await self._procedure.assign(person)
@@ -253,13 +255,13 @@ class VisitServer:
         """Answer with 404, after which a proxy asks the next host. Without one, the participant sees this page."""
         return self._pages.message(request, "paused", 404)
 
-    async def _person(self, request: Request) -> Person | None:
+    async def _person(self, request: Request) -> PersonRow | None:
         token = request.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         if person is not None and self._host is not None and not await self._host.has(person):
             raise _ElsewhereError
         return person
 
-    def _lock(self, person: Person) -> asyncio.Lock:
+    def _lock(self, person: PersonRow) -> asyncio.Lock:
         """Return a lock that keeps two pages of a participant from changing the phase concurrently."""
         return self._locks.setdefault(person.token_hash, asyncio.Lock())

@@ -9,7 +9,7 @@ from experiments.errors import StoreError
 from experiments.visit.folders import VisitFolders
 from experiments.visit.plan import PLAYED
 from experiments.visit.procedure import Procedure
-from experiments.visit.store import Person, Store, utc_now
+from experiments.visit.store import PersonRow, Store, utc_now
 from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
@@ -46,7 +46,7 @@ class HostOfVisits:
                 await sessions.release()
             await asyncio.sleep(HEARTBEAT_S)
 
-    async def has(self, person: Person) -> bool:
+    async def has(self, person: PersonRow) -> bool:
         """Return True if this host shows the participant's pages. Every host shows those of the first phases."""
         if person.host is None and person.phase not in PLAYED:
             return True

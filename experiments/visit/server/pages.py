@@ -9,10 +9,10 @@ from starlette.responses import Response
 
 from experiments.visit.phases.base import Again
 from experiments.visit.plan import CONSENT, PLAYED, VisitPlan
-from experiments.visit.procedure import Now
+from experiments.visit.procedure import PhaseState
 from experiments.visit.recruiter import Leaving
 from experiments.visit.server.trials import Queued
-from experiments.visit.store import Person
+from experiments.visit.store import PersonRow
 from experiments.web.client_files import page
 
 
@@ -50,7 +50,7 @@ class VisitPages:
         )
 
     def phase(
-        self, request: Request, now: Now, identity: Mapping[str, str], refused: Again | None = None
+        self, request: Request, now: PhaseState, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
         """Show the participant's current phase, unless it is a trial.
 
@@ -70,7 +70,7 @@ class VisitPages:
         back = self._recruiter.way_back("finished", identity)
         return self.show(request, shown.template, **values, back=back, finished=True)
 
-    def queue(self, request: Request, now: Now, queued: Queued) -> Response:
+    def queue(self, request: Request, now: PhaseState, queued: Queued) -> Response:
         """Show the queue page, which reloads itself."""
         section = self._plan.texts["queue"]
         values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
@@ -79,7 +79,7 @@ class VisitPages:
         around = {**self._around(now), "section": section, "paragraphs": []}
         return self.show(request, "queue", **around, texts=filled, refresh=round(queued.refresh))
 
-    def _around(self, now: Now) -> dict[str, Any]:
+    def _around(self, now: PhaseState) -> dict[str, Any]:
         """Return the values that the pages of all phases share."""
         common, name = self._plan.texts["common"], now.phase.name if now.phase else ""
         step = common["step"].replace("{step}", str(now.number))
@@ -95,7 +95,7 @@ class VisitPages:
             "story_title": self._plan.texts["story"]["title"],
         }
 
-    def left(self, request: Request, person: Person) -> Response:
+    def left(self, request: Request, person: PersonRow) -> Response:
         """Show the last page of a participant who did not finish."""
         names: Mapping[str, tuple[str, str, Leaving]] = {
             "no_consent": ("consent", "declined", "no_consent"),

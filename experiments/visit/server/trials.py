@@ -15,8 +15,8 @@ from experiments.errors import StoreError
 from experiments.record.phases import TASK
 from experiments.visit.folders import VisitFolder
 from experiments.visit.plan import PLAYED
-from experiments.visit.procedure import BrowserPlayer, Now, Procedure
-from experiments.visit.store import Person
+from experiments.visit.procedure import BrowserPlayer, PhaseState, Procedure
+from experiments.visit.store import PersonRow
 from experiments.visit.texts import words_of
 from experiments.web.client_files import page, trial_texts
 from experiments.web.server.browser_socket import BrowserSocket
@@ -81,7 +81,7 @@ class Trials:
             return None
         return Queued(position, self._limit.expected_wait(position, self._default_wait), refresh)
 
-    def page(self, request: Request, now: Now, folder: VisitFolder) -> Response:
+    def page(self, request: Request, now: PhaseState, folder: VisitFolder) -> Response:
         """Show the page of the next or current trial."""
         phase = now.person.phase
         settings = folder.settings(phase)
@@ -100,7 +100,7 @@ class Trials:
             xr=self._plan.headset,
         )
 
-    async def play(self, socket: WebSocket, person: Person) -> None:
+    async def play(self, socket: WebSocket, person: PersonRow) -> None:
         player, address = BrowserPlayer(self._procedure, person), socket.client.host if socket.client else ""
         sockets = (person.token_hash, address)
         folder = self._procedure.folders.find(person.token_hash)
@@ -128,7 +128,7 @@ class Trials:
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address
 
-    async def _beat(self, person: Person) -> None:
+    async def _beat(self, person: PersonRow) -> None:
         while True:
             try:
                 await self._store.beat(person.id)

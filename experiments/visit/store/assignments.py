@@ -9,7 +9,7 @@ from sqlalchemy import Select, bindparam, func, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import Part, lock_study, note
+from experiments.visit.store.part import StorePart, lock_study, note
 from experiments.visit.store.tables import assignment, person, study
 from experiments.visit.store.values import (
     ACTIVE,
@@ -51,7 +51,7 @@ _HOLDERS = (
 )
 
 
-class Assignments(Part):
+class Assignments(StorePart):
     """Rows of `assignment`."""
 
     async def assign(

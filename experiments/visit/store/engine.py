@@ -14,7 +14,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_en
 
 from experiments.errors import StoreError
 from experiments.visit.store.failures import advice, damaged, passes
-from experiments.visit.store.sqlite import quick_connection
+from experiments.visit.store.sqlite import sqlite_connection
 
 T = TypeVar("T")
 _Waiting = tuple[Callable[[AsyncConnection], Awaitable[Any]], asyncio.Future[Any]]
@@ -256,7 +256,7 @@ def _engine(url: URL) -> AsyncEngine:
         engine = create_async_engine(
             url,
             hide_parameters=True,
-            connect_args={"timeout": PATIENCE_S, "async_creator_fn": quick_connection},
+            connect_args={"timeout": PATIENCE_S, "async_creator_fn": sqlite_connection},
             pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
             max_overflow=0,  # each is a thread, and waiting is faster than starting one

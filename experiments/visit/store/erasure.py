@@ -10,14 +10,14 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 from experiments.errors import StoreError
 from experiments.visit.store import tables
 from experiments.visit.store.ledger import by_key, events_of, paid
-from experiments.visit.store.part import Part, lock_study, note
+from experiments.visit.store.part import StorePart, lock_study, note
 from experiments.visit.store.values import utc_now
 
 # In an order that keeps foreign keys valid.
 OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.identity, tables.payment)
 
 
-class Erasure(Part):
+class Erasure(StorePart):
     """Deletes rows of participants."""
 
     async def erase(

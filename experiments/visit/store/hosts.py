@@ -9,7 +9,7 @@ from sqlalchemy import delete, exists, insert, or_, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import Part, database_now, note
+from experiments.visit.store.part import StorePart, database_now, note
 from experiments.visit.store.tables import assignment, host, person
 from experiments.visit.store.values import Host
 
@@ -18,7 +18,7 @@ SILENT = timedelta(seconds=90)  # a host without heartbeats for this long may be
 HANDED_OVER = "-"  # host name that stands for any host with the journal
 
 
-class Hosts(Part):
+class Hosts(StorePart):
     """Rows of `host`, and `person.host`."""
 
     async def greet(self, name: str, *, leaves: bool = False) -> bool:

@@ -13,7 +13,7 @@ from sqlalchemy import ColumnElement, insert, select
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import Part, database_now, lock_study
+from experiments.visit.store.part import StorePart, database_now, lock_study
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
@@ -26,7 +26,7 @@ IN_DOUBT_AFTER = timedelta(minutes=10)
 _FIELDS = [column for column in payment.c if column.name != "study_id"]
 
 
-class Ledger(Part):
+class Ledger(StorePart):
     """Rows of `payment`, which are never changed."""
 
     async def decide(

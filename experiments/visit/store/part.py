@@ -17,7 +17,7 @@ _NOW = {
 }
 
 
-class Part:
+class StorePart:
     """Access to the rows of one study."""
 
     def __init__(self, database: Database, study_id: int) -> None:

@@ -9,10 +9,10 @@ from sqlalchemy import ColumnElement, bindparam, insert, select, update
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.errors import StoreError
-from experiments.visit.store.part import Part, new_id
+from experiments.visit.store.part import StorePart, new_id
 from experiments.visit.store.tables import identity as ids
 from experiments.visit.store.tables import person
-from experiments.visit.store.values import Person, Status, utc_now
+from experiments.visit.store.values import PersonRow, Status, utc_now
 
 _FIELDS = (
     person.c.id,
@@ -31,7 +31,7 @@ _FIND = select(*_FIELDS).where(
 )
 
 
-class People(Part):
+class People(StorePart):
     """Rows of `person` and `identity`."""
 
     async def arrive(
@@ -42,7 +42,7 @@ class People(Part):
         token_hash: str,
         phase: str,
         now: datetime | None = None,
-    ) -> Person:
+    ) -> PersonRow:
         """Return the participant of a link, adding a new one or finding an earlier arrival.
 
         A returning participant keeps the token hash of the first arrival, so derive the token from the key.
@@ -59,7 +59,7 @@ class People(Part):
         now = now or utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
 
-        async def work(connection: AsyncConnection) -> Person:
+        async def work(connection: AsyncConnection) -> PersonRow:
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
                 found = replace(_person(known), returning=True)
@@ -80,18 +80,18 @@ class People(Part):
             }
             number = new_id(await connection.execute(insert(person), values))
             await connection.execute(insert(ids), {"person_id": number, "ids": dict(identity)})
-            return Person(number, token_hash, platform, "arrived", phase, now, now, False)
+            return PersonRow(number, token_hash, platform, "arrived", phase, now, now, False)
 
         return await self._database.write(work)
 
-    async def find(self, token_hash: str) -> Person | None:
+    async def find(self, token_hash: str) -> PersonRow | None:
         """Return the participant of a link, or None."""
         async with self._database.reading() as connection:
             found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
             row = found.first()
             return None if row is None else _person(row)
 
-    async def person(self, person_id: int) -> Person:
+    async def person(self, person_id: int) -> PersonRow:
         """Return a participant by number. Raises StoreError if there is none."""
         async with self._database.reading() as connection:
             row = (await connection.execute(self._select(person.c.id == person_id))).first()
@@ -101,7 +101,7 @@ class People(Part):
             )
         return _person(row)
 
-    async def people(self, status: Status | None = None) -> tuple[Person, ...]:
+    async def people(self, status: Status | None = None) -> tuple[PersonRow, ...]:
         """Return all participants, or those of one status, in order of arrival."""
         query = self._select() if status is None else self._select(person.c.status == status)
         async with self._database.reading() as connection:
@@ -127,5 +127,5 @@ class People(Part):
         return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)
 
 
-def _person(row: Any) -> Person:
-    return Person(*row)
+def _person(row: Any) -> PersonRow:
+    return PersonRow(*row)

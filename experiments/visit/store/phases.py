@@ -9,7 +9,7 @@ from sqlalchemy import delete as delete_rows
 from sqlalchemy.ext.asyncio import AsyncConnection
 
 from experiments.visit.store.assignments import place_of, set_place, take_back
-from experiments.visit.store.part import Part, lock_study
+from experiments.visit.store.part import StorePart, lock_study
 from experiments.visit.store.tables import answer, identity, person, trial
 from experiments.visit.store.tables import phase as phases
 from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
@@ -40,7 +40,7 @@ _ROWS = {table: _rows_of(table) for table in (phases, answer, trial)}
 _ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for table, rows in _ROWS.items()}
 
 
-class Phases(Part):
+class Phases(StorePart):
     """Rows of `phase`, `answer` and `trial`."""
 
     async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
@@ -206,7 +206,7 @@ async def _save(
         await connection.execute(insert(answer), new)
 
 
-class Endings(Part):
+class Endings(StorePart):
     """Changes of the final status."""
 
     async def finish(self, person_id: int, status: Status = "finished", now: datetime | None = None) -> bool:

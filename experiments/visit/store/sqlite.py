@@ -10,7 +10,7 @@ QUICK = ("SELECT", "INSERT", "UPDATE", "DELETE", "SAVEPOINT", "RELEASE", "ROLLBA
 SLOW = ("Connection.commit", "Connection.close")
 
 
-class QuickConnection(aiosqlite.Connection):
+class SqliteConnection(aiosqlite.Connection):
     """Uses the thread only for operations that may wait for a lock or the disk.
 
     In WAL mode readers never wait, and writers have the lock by then.
@@ -24,9 +24,9 @@ class QuickConnection(aiosqlite.Connection):
         return fn(*args, **kwargs)
 
 
-def quick_connection(database: str, **options: Any) -> QuickConnection:
+def sqlite_connection(database: str, **options: Any) -> SqliteConnection:
     """Return an unopened connection, as SQLAlchemy's `async_creator_fn` requires."""
-    connection = QuickConnection(
+    connection = SqliteConnection(
         lambda: sqlite3.connect(database, **{**options, "check_same_thread": False}), iter_chunk_size=64
     )
     connection._thread.daemon = True

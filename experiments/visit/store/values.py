@@ -38,7 +38,7 @@ class StudyRow:
 
 
 @dataclass(frozen=True)
-class Person:
+class PersonRow:
     """A participant.
 
     Attributes:

@@ -9,20 +9,9 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from experiments.web import protocol
-from experiments.web.protocol import (
-    BEAT_PERIOD,
-    Beat,
-    Error,
-    Hello,
-    Inputs,
-    Occupied,
-    Saved,
-    State,
-    TakeOver,
-    WireMessage,
-)
+from experiments.web.protocol import BEAT_PERIOD, Beat, Error, Hello, Inputs, Occupied, Saved, TakeOver
 from experiments.web.server.played_session import PlayedSession
-from experiments.web.state import OVER
+from experiments.web.state import OVER, State, WireMessage
 
 HELLO_TIMEOUT = 10.0  # timeout of the first message, in seconds
 OCCUPIED_TIMEOUT = 60.0  # timeout of the answer to `occupied`, in seconds
@@ -90,7 +79,7 @@ class BrowserSocket:
     async def _send_all(self) -> None:
         with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser is gone
             while isinstance(item := await self._waiting.get(), WireMessage):
-                if isinstance(item, protocol.Frame):
+                if isinstance(item, protocol.FrameMessage):
                     await self._socket.send_bytes(item.packed())
                 else:
                     await self._socket.send_text(protocol.encode_to_browser(item).decode())

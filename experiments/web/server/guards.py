@@ -208,10 +208,10 @@ async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
         return ImmutableMultiDict()
 
 
-class QuickConnection(H11Protocol):
+class TimedConnection(H11Protocol):
     """A uvicorn connection with timeouts. Beyond the limit, the address with the most connections loses one."""
 
-    _open: ClassVar[dict["QuickConnection", str]] = {}  # clients by connection, oldest first
+    _open: ClassVar[dict["TimedConnection", str]] = {}  # clients by connection, oldest first
     _timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]

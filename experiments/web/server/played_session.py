@@ -23,21 +23,27 @@ from experiments.web.protocol import (
     Leave,
     Open,
     Pause,
-    Run,
+    RunMessage,
     Saved,
-    Scene,
     Seen,
-    Snapshot,
-    State,
     Taken,
     View,
-    WireMessage,
 )
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.player import LiveTrial, Meter, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
 from experiments.web.server.spectators import Spectators
-from experiments.web.state import FAILED, LOADING, READY, RUNNING, Trigger
+from experiments.web.state import (
+    FAILED,
+    LOADING,
+    READY,
+    RUNNING,
+    SceneMessage,
+    Snapshot,
+    State,
+    Trigger,
+    WireMessage,
+)
 
 LOG = logging.getLogger("mjsim.play")
 MAX_CRASHES = (
@@ -150,11 +156,11 @@ class PlayedSession:
                     self._came.append((numbers[-1], time.monotonic()))
             case Display():
                 self.display = message
-            case Run() | Leave() if self.state.phase is LOADING:
+            case RunMessage() | Leave() if self.state.phase is LOADING:
                 return Error("too early", "the session is not ready")
             case Leave() if (wait := self._leave_at - time.monotonic()) > 0.0:
                 return Error("too early", f"this phase can be ended in {wait:.0f} s")
-            case Run():
+            case RunMessage():
                 self._lost, self.state = False, self.state.after(Trigger.RUN)
             case Pause(reason):
                 self._pause(reason)
@@ -195,11 +201,11 @@ class PlayedSession:
         self.state = self.state.after(Trigger.PAUSE, reason)
         self._send(Pause(reason))
 
-    def _send(self, message: protocol.WireMessage) -> None:
+    def _send(self, message: WireMessage) -> None:
         if self._worker is not None:
             self._worker.send(message)
 
-    def _tell(self, message: protocol.WireMessage) -> None:
+    def _tell(self, message: WireMessage) -> None:
         if self.browser is not None:
             self.browser.send(message)
         self.spectators.tell(message)
@@ -271,7 +277,7 @@ class PlayedSession:
                         crashes = 0 if step > safe else crashes
                         self._taken, safe, self._step = number, step, max(self._step, step)
                         self._measure(number)
-                    case Scene(path=str(path)):
+                    case SceneMessage(path=str(path)):
                         self._scenes[opening.config["house"]] = path
                     case Snapshot(step):
                         self._step = max(self._step, step)

@@ -10,7 +10,8 @@ from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
-from experiments.web.protocol import HOUSE, LENGTH, WireMessage, decode_from_worker, packed
+from experiments.web.protocol import HOUSE, LENGTH, decode_from_worker, packed
+from experiments.web.state import WireMessage
 
 PRELOADED = "experiments.web.worker.preload"
 SETTINGS = {

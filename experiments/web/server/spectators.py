@@ -4,20 +4,17 @@ from typing import Any, Protocol
 
 import msgspec
 
-from experiments.web.protocol import (
-    IDLE,
-    Frame,
+from experiments.web.protocol import IDLE, FrameMessage
+from experiments.web.state import Hud, Markers, Moment, Pictures, SceneMessage, Snapshot, State, WireMessage
+
+KEPT = (
+    State,
+    SceneMessage,
+    Pictures,
     Hud,
     Markers,
     Moment,
-    Pictures,
-    Scene,
-    Snapshot,
-    State,
-    WireMessage,
-)
-
-KEPT = (State, Scene, Pictures, Hud, Markers, Moment)  # messages that replace earlier ones of the same type
+)  # messages that replace earlier ones of the same type
 
 
 class Spectator(Protocol):
@@ -71,11 +68,11 @@ class Spectators:
                 for name in gone:
                     self._objects.pop(name, None)
                     self._models.pop(name, None)
-            case Scene() | Frame():  # snapshots start again, or are not needed
+            case SceneMessage() | FrameMessage():  # snapshots start again, or are not needed
                 self._snapshot = None
                 self._objects, self._models = {}, {}
         if isinstance(message, KEPT):
             self._last[type(message)] = message
-        if isinstance(message, (*KEPT, Snapshot, Frame)):
+        if isinstance(message, (*KEPT, Snapshot, FrameMessage)):
             for spectator in self._all:
                 spectator.send(message)

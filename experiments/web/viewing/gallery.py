@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.errors import ConfigError, ExperimentError
 from experiments.trials.design import house_names
 from experiments.trials.workers import worker_pool
-from experiments.web.viewing.homes import PAGE, PLAN, VIEW, Home, draw_home, home_key
+from experiments.web.viewing.homes import PAGE, PLAN, VIEW, GalleryHome, draw_home, home_key
 from experiments.web.viewing.page import own_page
 from mjsim.support.files import replacing
 from mjsim.values.errors import MjsimError, RenderError
@@ -63,9 +63,9 @@ def write_gallery(
     (out / HOMES).mkdir(parents=True, exist_ok=True)
     drawn = {}
     for key, home in _drawn(homes, out / HOMES, workers):
-        if isinstance(home, Home):
+        if isinstance(home, GalleryHome):
             drawn[key] = home
-        on_home(None if isinstance(home, Home) else f"{homes[key]}: {home}")
+        on_home(None if isinstance(home, GalleryHome) else f"{homes[key]}: {home}")
     shown = [(drawn[key], out / HOMES / key) for key in homes if key in drawn]
     count = 0
     for count, sheet in enumerate(sheets(shown), 1):
@@ -81,7 +81,9 @@ def write_gallery(
     return len(homes) - len(shown)
 
 
-def _drawn(homes: Mapping[str, str], folder: Path, workers: int) -> Iterator[tuple[str, Home | Exception]]:
+def _drawn(
+    homes: Mapping[str, str], folder: Path, workers: int
+) -> Iterator[tuple[str, GalleryHome | Exception]]:
     """Yield each home, or its error, in order of completion."""
     with worker_pool(min(workers, len(homes))) as pool:
         running = {pool.submit(draw_home, name, folder / key): key for key, name in homes.items()}
@@ -94,7 +96,7 @@ def _drawn(homes: Mapping[str, str], folder: Path, workers: int) -> Iterator[tup
             yield running[future], error if isinstance(error, Exception) else future.result()
 
 
-def sheets(homes: Sequence[tuple[Home, Path]]) -> Iterator[Image]:
+def sheets(homes: Sequence[tuple[GalleryHome, Path]]) -> Iterator[Image]:
     """Yield RGB sheets of ten homes each, given with the folders of their pictures."""
     for first in range(0, len(homes), COLUMNS * ROWS):
         cards = [_card(home, folder) for home, folder in homes[first : first + COLUMNS * ROWS]]
@@ -108,7 +110,7 @@ def sheets(homes: Sequence[tuple[Home, Path]]) -> Iterator[Image]:
         yield sheet
 
 
-def _card(home: Home, folder: Path) -> Image:
+def _card(home: GalleryHome, folder: Path) -> Image:
     card = np.full((HEIGHT, WIDTH, 3), PAPER, np.uint8)
     plan, *views = (_picture(folder / name) for name in home.pictures)
     height, width = plan.shape[:2]

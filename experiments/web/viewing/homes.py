@@ -35,7 +35,7 @@ INSIDE = (0.0, 0.0, 0.8) * 2  # positions of the idle hands in metres, hidden in
 _HUD = HudState("", (), (), (None, InventorySlot()))
 
 
-class Home(msgspec.Struct, frozen=True):
+class GalleryHome(msgspec.Struct, frozen=True):
     """Description of a home in a gallery.
 
     Attributes:
@@ -85,7 +85,7 @@ def home_key(name: str) -> str:
     return key
 
 
-def draw_home(name: str, folder: Path) -> Home:
+def draw_home(name: str, folder: Path) -> GalleryHome:
     """Write pictures and page of a home into `folder` atomically, unless they are up to date.
 
     Raises:
@@ -102,7 +102,7 @@ def draw_home(name: str, folder: Path) -> Home:
     shown = catalogue.name if catalogue.ref.kind == "generated" else name
     count, area = len(house.rooms.labels), round(house.rooms.area, 1)
     with work_folder(folder.parent) as work:
-        home = Home(shown, catalogue.label, count, area, _draw(house, work), digest)
+        home = GalleryHome(shown, catalogue.label, count, area, _draw(house, work), digest)
         scene = {
             file: content
             for file, content in export_scene(catalogue).items()
@@ -137,9 +137,9 @@ def _draw(house: House, folder: Path) -> tuple[str, ...]:
     return tuple(pictures)
 
 
-def _kept(folder: Path) -> Home | None:
+def _kept(folder: Path) -> GalleryHome | None:
     try:
-        return msgspec.json.decode((folder / ABOUT).read_bytes(), type=Home)
+        return msgspec.json.decode((folder / ABOUT).read_bytes(), type=GalleryHome)
     except (OSError, msgspec.DecodeError):
         return None
 

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-from experiments.web.protocol import Taken, WireMessage
-from experiments.web.state import OVER, READY, RUNNING, Trigger
+from experiments.web.protocol import Taken
+from experiments.web.state import OVER, READY, RUNNING, Trigger, WireMessage
 from experiments.web.worker.control import Promise, SessionControl
 from experiments.web.worker.live_session import LiveSession
 

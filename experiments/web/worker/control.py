@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from experiments.web.controls import Input
-from experiments.web.protocol import MAX_SILENCE, State
-from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, Trigger
+from experiments.web.protocol import MAX_SILENCE
+from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, State, Trigger
 
 MAX_NOTES = 1000  # maximum number of pending events
 MAX_PROMISES = 64  # maximum number of stored promises

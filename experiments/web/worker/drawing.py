@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from experiments.errors import describe
-from experiments.web.protocol import Frame, Pictures, View
-from experiments.web.state import RUNNING, Trigger
+from experiments.web.protocol import FrameMessage, View
+from experiments.web.state import RUNNING, Pictures, Trigger
 from experiments.web.worker.clock import Send
 from experiments.web.worker.control import SessionControl
 from experiments.web.worker.encoders import SIZES, Encoder, FrameSize, H264Encoder, JpegEncoder, pause_after
@@ -142,7 +142,9 @@ class Drawer:
             self._sent += 1
             number = self._sent
         step, count = job.moment.step, job.moment.input
-        self._send(Frame(number, step, count, job.view.codec, key, *size, round(1000.0 * took, 2), data))
+        self._send(
+            FrameMessage(number, step, count, job.view.codec, key, *size, round(1000.0 * took, 2), data)
+        )
 
     def _drop(self, moment: _Moment | None) -> None:
         """Keep the memory of a state for reuse."""

@@ -44,7 +44,7 @@ LOG = logging.getLogger("mjsim.play")
 MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; about 7 h with 6 objects, 3 h with 24
 
 
-class PersonState(msgspec.Struct):
+class InputState(msgspec.Struct):
     """State of the participant.
 
     Attributes:
@@ -56,7 +56,7 @@ class PersonState(msgspec.Struct):
     input: int = 0
 
 
-class Human:
+class BrowserParticipant:
     """The participant of a session with a person.
 
     Args:
@@ -71,7 +71,7 @@ class Human:
     needs: frozenset[str] = frozenset()
 
     def __init__(self, world: World) -> None:
-        self.state = PersonState()
+        self.state = InputState()
         self.inputs: Sequence[Input] = ()
         self.seen = world.observation()
         self._world = world
@@ -143,7 +143,7 @@ class LiveSession:
         self.resumed = record is not None
         options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
-        self._human = Human(self.world)
+        self._human = BrowserParticipant(self.world)
         if record is None:
             self._planner = prepared_planner(config, self.house, self.scene.episode)
         else:
@@ -170,7 +170,7 @@ class LiveSession:
             self.session.begin()
             return
         self.session.resume(record)
-        self._human.state = msgspec.convert(record.participant, PersonState)
+        self._human.state = msgspec.convert(record.participant, InputState)
         source = solver_source(config, self.house)
         source.adopt(self.session.assistant.task_state(self.world.observation()))
         self._planner.use(source)

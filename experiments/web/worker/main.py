@@ -24,14 +24,13 @@ from experiments.web.protocol import (
     Leave,
     Open,
     Pause,
-    Run,
+    RunMessage,
     Saved,
     Seen,
     Taken,
     View,
-    WireMessage,
 )
-from experiments.web.state import Trigger
+from experiments.web.state import Trigger, WireMessage
 from experiments.web.worker import houses
 from experiments.web.worker.clock import Clock
 from experiments.web.worker.control import SessionControl
@@ -89,7 +88,7 @@ class Worker:
                 self._opened.put((message, self._control))
             case Inputs(inputs, until):
                 self._control.add(inputs, until)
-            case Run(until):
+            case RunMessage(until):
                 self._control.apply(Trigger.RUN, until=until)
             case Pause(reason):
                 self._control.apply(Trigger.PAUSE, reason)

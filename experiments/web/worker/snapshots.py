@@ -4,7 +4,8 @@ import logging
 
 import numpy as np
 
-from experiments.web.protocol import Gait, Scene, Snapshot, Speeds, View
+from experiments.web.protocol import View
+from experiments.web.state import GaitParameters, SceneMessage, Snapshot, Speeds
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
 from mjsim.house.sight.foresight import Foresight
@@ -28,7 +29,7 @@ def field_of_view(live: LiveSession, view: View) -> float:
     return min(high, max(low, view.field_of_view or own))
 
 
-def scene_of(live: LiveSession, view: View) -> Scene:
+def scene_of(live: LiveSession, view: View) -> SceneMessage:
     """Return the scene message of a session."""
     person, options = live.scene.person, live.world.options
     path: str | None
@@ -38,10 +39,10 @@ def scene_of(live: LiveSession, view: View) -> Scene:
     except (AssetError, OSError) as error:
         LOG.warning("no browser can draw %s: %s", live.config.house, error)
         path = floor = None
-    return Scene(
+    return SceneMessage(
         path,
         floor if live.config.fidelity == "event" else None,
-        Gait(**kinematics.Gait.of(live.scene, options)._asdict()),
+        GaitParameters(**kinematics.Gait.of(live.scene, options)._asdict()),
         Speeds(person.walking_speed, person.turning_speed, person.looking_speed),
         field_of_view(live, view),
         live.config.view_limits,

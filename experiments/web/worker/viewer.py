@@ -10,7 +10,8 @@ import numpy as np
 
 from experiments.session.viewer import Viewer
 from experiments.web.controls import act
-from experiments.web.protocol import Busy, Hud, Markers, Moment, Pictures, Reach, View, WireMessage
+from experiments.web.protocol import View
+from experiments.web.state import Busy, Hud, Markers, Moment, Pictures, Reach, WireMessage
 from experiments.web.worker import houses
 from experiments.web.worker.clock import Send
 from experiments.web.worker.drawing import Drawer

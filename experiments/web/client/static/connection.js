@@ -1,6 +1,6 @@
 // The WebSocket: reconnects after a failure, numbers inputs, and repeats them until they are taken.
 
-/** @import { Frame, FromBrowser, Input, ToBrowser } from "./protocol.js" */
+/** @import { FrameMessage, FromBrowser, Input, ToBrowser } from "./protocol.js" */
 
 import { CODECS, FRAME_HEAD_BYTES, IDLE, KEY_FLAG, MAX_INPUTS, REFUSED, REPLACED, TOO_MUCH } from "./protocol.js";
 
@@ -9,7 +9,7 @@ const MAX_WAIT = 500; // ms; a server that was restarted listens within a second
 const FINAL = new Set([REFUSED, REPLACED, IDLE, TOO_MUCH]); // codes after which the page does not reconnect by itself
 
 /** @typedef {{ type: "closed", code: number, final: boolean }} Closed */
-/** @typedef {ToBrowser | Frame | Closed} Received */
+/** @typedef {ToBrowser | FrameMessage | Closed} Received */
 
 export class Connection {
   /** @type {WebSocket | null} */
@@ -128,7 +128,7 @@ export class Connection {
 
 /**
  * @param {ArrayBuffer} buffer
- * @returns {Frame}
+ * @returns {FrameMessage}
  */
 export function readFrame(buffer) {
   const head = new DataView(buffer, 0, FRAME_HEAD_BYTES);

@@ -2,7 +2,7 @@
 
 /** @import { HeadsetPage } from "./headset.js" */
 /** @import { Thing } from "./drawing/things.js" */
-/** @import { Input, Moment, Scene, Snapshot } from "./protocol.js" */
+/** @import { Input, Moment, SceneMessage, Snapshot } from "./protocol.js" */
 
 import { World3D } from "./drawing/world.js";
 import { X, Y, eyeOf } from "./prediction/body.js";
@@ -23,7 +23,7 @@ export class DrawnView {
   world;
   #flush;
   #house = { path: "", loaded: Promise.resolve() };
-  /** @type {Scene | null} */
+  /** @type {SceneMessage | null} */
   #scene = null;
   /** @type {Walker | null} */
   #walker = null;
@@ -62,7 +62,7 @@ export class DrawnView {
     this.#house.loaded.catch(() => {});
   }
 
-  /** Loads a house; a page that reconnects, or has another size, has it or is loading it. @param {Scene} message */
+  /** Loads a house; a page that reconnects, or has another size, has it or is loading it. @param {SceneMessage} message */
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");

@@ -1,7 +1,7 @@
 // How well the person sees: frames a second, times between frames, latency from an input to the frame that shows it,
 // or, where the browser draws, to the state of the server that counts it.
 
-/** @import { Frame } from "./protocol.js" */
+/** @import { FrameMessage } from "./protocol.js" */
 
 export class Meter {
   /** @type {Map<number, number>} */
@@ -21,13 +21,13 @@ export class Meter {
     this.#sent.set(number, performance.now());
   }
 
-  /** @param {Frame} frame */
+  /** @param {FrameMessage} frame */
   came(frame) {
     this.#came++;
     this.#bytes += frame.data.length;
   }
 
-  /** @param {Frame} frame */
+  /** @param {FrameMessage} frame */
   shown(frame) {
     this.answered(frame.input);
     this.drawn();

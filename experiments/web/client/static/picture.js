@@ -1,6 +1,6 @@
 // The picture of the apartment: drawn by this browser, or frames that the server draws.
 
-/** @import { Codec, Draw, Input, Scene, View } from "./protocol.js" */
+/** @import { Codec, Draw, Input, SceneMessage, View } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
 /** @import { Drawn } from "./drawn_view.js" */
 
@@ -155,7 +155,7 @@ export class Picture {
     if (this.drawn) this.#sendView();
   }
 
-  /** Offers to choose the field of view, where that is left to the person. @param {Scene} message */
+  /** Offers to choose the field of view, where that is left to the person. @param {SceneMessage} message */
   #offer({ field_of_view_range: range, field_of_view: angle }) {
     this.#chosen = range && this.drawn && angle;
     const row = byId("field-of-view", HTMLElement);

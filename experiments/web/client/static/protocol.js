@@ -6,7 +6,7 @@
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View View requested by a page: size in CSS pixels, and the codec of frames. The codec is `none` if the page draws. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page that survives reconnects, its trial and its view. */
 /** @typedef {{ type: "takeover" }} TakeOver Continue a session here that is open in another page. Answers `occupied`. */
-/** @typedef {{ type: "run"; until?: number | null }} Run Start or resume the clock. A page that promises its inputs sends its current promise, or 0. */
+/** @typedef {{ type: "run"; until?: number | null }} RunMessage Start or resume the clock. A page that promises its inputs sends its current promise, or 0. */
 /** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change of the keyboard, mouse, gamepad or touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs Inputs of the person, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen Number of a frame that the browser has shown. */
@@ -18,9 +18,9 @@
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
 /** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State State of the session, the reason if it is paused, over or failed, and the number of the last received input. */
 /** @typedef {{ type: "taken"; input: number; step: number }} Taken All inputs and control steps up to these numbers are processed and on disk. */
-/** @typedef {{ max_speed: number; max_turn: number; max_look: number; acceleration: number; turn_acceleration: number; dt: number; substeps: number; mass: number; walk_gain: number; walk_force: number; inertia: number; turn_gain: number; turn_force: number; head_inertia: number; head_stiffness: number; head_damping: number; head_force: number; lowest: number; highest: number; radius: number; eye_height: number; eye_forward: number }} Gait Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`. */
+/** @typedef {{ max_speed: number; max_turn: number; max_look: number; acceleration: number; turn_acceleration: number; dt: number; substeps: number; mass: number; walk_gain: number; walk_force: number; inertia: number; turn_gain: number; turn_force: number; head_inertia: number; head_stiffness: number; head_damping: number; head_force: number; lowest: number; highest: number; radius: number; eye_height: number; eye_forward: number }} GaitParameters Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`. */
 /** @typedef {{ walking_speed: number; turning_speed: number; looking_speed: number }} Speeds Speeds of the person at full deflection of the controls, in m/s and rad/s. */
-/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: Gait; speeds: Speeds; field_of_view: number; field_of_view_range: [number, number] | null; step_duration: number }} Scene Scene for clients that draw, sent once. */
+/** @typedef {{ type: "scene"; path: string | null; floor: string | null; gait: GaitParameters; speeds: Speeds; field_of_view: number; field_of_view_range: [number, number] | null; step_duration: number }} SceneMessage Scene for clients that draw, sent once. */
 /** @typedef {{ type: "snapshot"; step: number; input: number; time: number; busy: boolean; body: Array<number>; eye: Array<number>; hands: Array<Array<number>>; held: [string | null, string | null]; objects: Record<string, Array<number>>; models: Record<string, string>; gone: Array<string> }} Snapshot State at the start of a control step for clients that draw, sent once per step. */
 /** @typedef {{ shape: "box" | "cylinder" | "sphere"; position: [number, number, number]; size: [number, number, number]; rgba: [number, number, number, number]; role: string; x_ray: boolean; object: string | null; outlined: boolean }} Marker A world-locked digital object. */
 /** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers Markers of the HUD for clients that draw, sent when they change. */
@@ -41,9 +41,9 @@
 /** @typedef {{ type: "occupied" }} Occupied The session is open in another page. `takeover` continues it here. */
 /** @typedef {{ type: "replaced" }} Replaced Another page took the session over. This connection is closed. */
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was rejected, with a code and a reason. */
-/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} Frame A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it. */
-/** @typedef {Hello | TakeOver | Run | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
-/** @typedef {State | Taken | Scene | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
+/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} FrameMessage A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it. */
+/** @typedef {Hello | TakeOver | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
+/** @typedef {State | Taken | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
 export const FRAME_HEAD_BYTES = 28;
 /** @type {Record<number, Codec>} */

@@ -1,6 +1,6 @@
 // Shows frames: JPEG, or H.264 where the browser can decode it.
 
-/** @import { Codec, Frame } from "./protocol.js" */
+/** @import { Codec, FrameMessage } from "./protocol.js" */
 
 const H264 = { codec: "avc1.42E01F", optimizeForLatency: true };
 
@@ -25,14 +25,14 @@ export class Screen {
   #failed;
   /** @type {VideoDecoder | null} */
   #decoder = null;
-  /** @type {Map<number, Frame>} */
+  /** @type {Map<number, FrameMessage>} */
   #waiting = new Map(); // number of a frame -> frame, while it is decoded
   #newest = 0; // number of the frame on show
   #last = 0; // number of the frame that came last
 
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {(frame: Frame) => void} shown is called with every frame that was shown
+   * @param {(frame: FrameMessage) => void} shown is called with every frame that was shown
    * @param {() => void} failed is called when H.264 cannot be decoded
    */
   constructor(canvas, shown, failed) {
@@ -57,7 +57,7 @@ export class Screen {
     this.#decoder = null;
   }
 
-  /** @param {Frame} frame */
+  /** @param {FrameMessage} frame */
   async show(frame) {
     if (frame.number <= this.#last) this.reset(); // numbers begin anew with every view
     this.#last = frame.number;
@@ -65,7 +65,7 @@ export class Screen {
     else this.#draw(await createImageBitmap(new Blob([frame.data], { type: "image/jpeg" })), frame);
   }
 
-  /** @param {Frame} frame */
+  /** @param {FrameMessage} frame */
   #decode(frame) {
     if (!this.#decoder) {
       if (!frame.key) return;
@@ -91,7 +91,7 @@ export class Screen {
     }
   }
 
-  /** @param {ImageBitmap | VideoFrame} image @param {Frame} frame */
+  /** @param {ImageBitmap | VideoFrame} image @param {FrameMessage} frame */
   #draw(image, frame) {
     if (frame.number > this.#newest) {
       this.#newest = frame.number;

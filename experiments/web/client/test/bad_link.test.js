@@ -8,7 +8,7 @@ import { Predictor } from "../static/prediction/predictor.js";
 import { Walker } from "../static/prediction/walking.js";
 import { DT, EMPTY, GAIT, SPEEDS } from "./walks.js";
 
-/** @import { Input, Scene, Snapshot } from "../static/protocol.js" */
+/** @import { Input, SceneMessage, Snapshot } from "../static/protocol.js" */
 
 vi.mock("../static/drawing/world.js", () => ({
   World3D: class {
@@ -114,7 +114,7 @@ async function played(delay, lost) {
     () => {},
   );
   const scene = { path: "/", floor: "/floor", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: DT };
-  await view.load(/** @type {Scene} */ ({ type: "scene", ...scene }));
+  await view.load(/** @type {SceneMessage} */ ({ type: "scene", ...scene }));
   view.begin(0);
   up.send({ run: true }, 0);
   let [number, jump, turn, moved] = [0, 0, 0, 0];

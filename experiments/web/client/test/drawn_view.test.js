@@ -4,7 +4,7 @@ import { DrawnView } from "../static/drawn_view.js";
 import { MAX_STEPS_AHEAD } from "../static/protocol.js";
 import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
-/** @import { Scene, Snapshot } from "../static/protocol.js" */
+/** @import { SceneMessage, Snapshot } from "../static/protocol.js" */
 
 const world = vi.hoisted(() => ({
   load: vi.fn(async () => ({ objects: { mug: {} } })), loadModels: vi.fn(), setFieldOfView: vi.fn(), resize: vi.fn(),
@@ -13,7 +13,7 @@ const world = vi.hoisted(() => ({
 }));
 vi.mock("../static/drawing/world.js", () => ({ World3D: vi.fn(function () { return world; }) }));
 
-/** @type {Scene} */
+/** @type {SceneMessage} */
 const SCENE = {
   type: "scene", path: "/scene/1/", floor: "/scene/1/floor.json", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: 0.04,
 };

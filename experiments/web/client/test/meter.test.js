@@ -2,7 +2,7 @@ import { beforeEach, expect, test, vi } from "vitest";
 
 import { Meter } from "../static/meter.js";
 
-/** @import { Frame } from "../static/protocol.js" */
+/** @import { FrameMessage } from "../static/protocol.js" */
 
 /** @type {Meter} */
 let meter;
@@ -12,7 +12,7 @@ beforeEach(() => {
 });
 
 /** @param {number} input */
-const frame = (input) => /** @type {Frame} */ ({ input, data: new Uint8Array(1000) });
+const frame = (input) => /** @type {FrameMessage} */ ({ input, data: new Uint8Array(1000) });
 
 test("frames are counted: how many a second, the times between them, those that came and were not shown", () => {
   for (let i = 0; i < 100; i++) {

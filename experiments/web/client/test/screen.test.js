@@ -3,7 +3,7 @@ import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Screen, bestCodec } from "../static/screen.js";
 
-/** @import { Frame } from "../static/protocol.js" */
+/** @import { FrameMessage } from "../static/protocol.js" */
 
 /** A decoder of which the test says when a picture is ready. */
 class Decoder {
@@ -38,7 +38,7 @@ class Decoder {
   }
 }
 
-/** @param {number} number @param {boolean} key @param {"h264" | "jpeg"} codec @returns {Frame} */
+/** @param {number} number @param {boolean} key @param {"h264" | "jpeg"} codec @returns {FrameMessage} */
 const frame = (number, key, codec = "h264") =>
   ({ type: "frame", number, key, codec, width: 320, height: 240, step: 0, input: 0, milliseconds: 0, data: new Uint8Array(3) });
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from experiments.errors import StoreError
 from experiments.study.file import Pay
 from experiments.study.payments.rules import due, reject, undecided
-from experiments.visit.store import PaymentEvent, Person, Store, TrialRow
+from experiments.visit.store import PaymentEvent, PersonRow, Store, TrialRow
 
 PHASES = ["consent", "device", "story", "training", "task", "survey", "completion"]
 NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
@@ -56,7 +56,7 @@ def oracle(pay, status, phase, delivered):
 
 
 def person(number, status, phase):
-    return Person(number, f"{number:064}", "link", status, phase, NOON, NOON, delete_wanted=False)
+    return PersonRow(number, f"{number:064}", "link", status, phase, NOON, NOON, delete_wanted=False)
 
 
 @settings(max_examples=300)

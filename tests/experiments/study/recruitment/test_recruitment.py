@@ -12,7 +12,7 @@ from experiments.errors import ConfigError
 from experiments.study.file import Recruitment, read_people_study
 from experiments.study.recruitment import recruiter
 from experiments.trials.designs import FOLDER
-from experiments.visit.recruiter import Preview, Refusal
+from experiments.visit.recruiter import InvalidLink, Preview
 from tests.experiments.visit.server.test_server import begin, go_to, phase, play_trial, post, serving
 
 CODES = {"completed": "C0MPLETE", "screened_out": "SCREEN0UT", "no_consent": "N0C0NSENT"}
@@ -40,7 +40,7 @@ def test_people_of_prolific_are_known_by_their_id_and_return_with_a_code():
     ],
 )
 def test_links_that_are_not_the_platforms_are_refused(change):
-    assert isinstance(recruiter(PROLIFIC).arrive({**IDS, **change}), Refusal)
+    assert isinstance(recruiter(PROLIFIC).arrive({**IDS, **change}), InvalidLink)
 
 
 @pytest.mark.parametrize("name", list(CODES))
@@ -54,8 +54,8 @@ def test_people_of_connect_are_known_by_their_id_and_return_to_the_page_with_the
     ids = {"participantId": "P00001", "assignmentId": "A00001", "projectId": "0123ABCD"}
     came = platform.arrive(ids)
     assert (came.key, came.identity) == ("P00001", ids)
-    assert isinstance(platform.arrive({**ids, "projectId": "0123ABCE"}), Refusal)
-    assert isinstance(platform.arrive({**ids, "participantId": ""}), Refusal)
+    assert isinstance(platform.arrive({**ids, "projectId": "0123ABCE"}), InvalidLink)
+    assert isinstance(platform.arrive({**ids, "participantId": ""}), InvalidLink)
     url = "https://connect.cloudresearch.com/participant/project/DC6CDE9748/complete"
     assert platform.way_back("finished", ids).url == url
     assert platform.way_back("screened_out", ids).gives_back
@@ -91,7 +91,7 @@ def test_people_of_an_external_question_preview_accept_and_submit():
     ],
 )
 def test_no_form_is_sent_where_a_link_says(change):
-    assert isinstance(recruiter(QUESTION).arrive({**TASK, **change}), Refusal)
+    assert isinstance(recruiter(QUESTION).arrive({**TASK, **change}), InvalidLink)
     assert recruiter(QUESTION).way_back("finished", {**TASK, "turkSubmitTo": "https://evil"}).url == ""
 
 

@@ -14,8 +14,8 @@ from experiments.study.file import read_people_study
 from experiments.study.plan import plan_of
 from experiments.study.recruitment import recruiter
 from experiments.study.rehearsal import dry_run as runs
-from experiments.study.rehearsal.costs import Played, cost, detectable, durations
-from experiments.study.rehearsal.person import Person
+from experiments.study.rehearsal.costs import TrialDurations, cost, detectable, durations
+from experiments.study.rehearsal.person import SimulatedPerson
 from experiments.study.rehearsal.pictures import browser
 from experiments.study.rehearsal.problems import located, problems_of_file, problems_of_length
 from experiments.visit.phases import phases_of
@@ -104,7 +104,7 @@ def test_cost_length_and_power(study):
         study,
         settings=msgspec.structs.replace(study.settings, phases=("consent", "story", "task", "completion")),
     )
-    played = Played(60.0, {"none": 100.0, "optimal": 80.0})
+    played = TrialDurations(60.0, {"none": 100.0, "optimal": 80.0})
     seconds = durations(shorter, phases_of(plan_of(shorter)), {"consent": 238, "story": 10}, played)
     assert seconds == {"consent": 60.0, "story": 20.0, "task": 90.0, "completion": 0.0}
     assert detectable(study).keys() == {"assistance"}
@@ -133,7 +133,7 @@ def _walked(study, folder, monkeypatch, phases=None):
 
 
 def test_a_dry_run_goes_every_way_that_there_is(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(Person, "_play", _play_nothing)
+    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     walked, pictures = _walked(study, tmp_path, monkeypatch)
     (unplayed,) = walked.faults
     assert "the run that was recorded cannot be used" in unplayed
@@ -168,7 +168,7 @@ async def _play_nothing(self, trial, leaves):  # noqa: ARG001 - everybody stays
     ],
 )
 def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
-    monkeypatch.setattr(Person, "_play", _play_nothing)
+    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     phases = 'phases = ["consent", "task", "debriefing", "completion"]'
     changed = with_text(
         tmp_path,
@@ -180,7 +180,7 @@ def test_a_dry_run_comes_from_each_platform(tmp_path, monkeypatch, settings):
 
 
 def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(Person, "_play", _play_nothing)
+    monkeypatch.setattr(SimulatedPerson, "_play", _play_nothing)
     phases = [
         _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
     ]

@@ -19,7 +19,7 @@ from experiments.cli.main import main
 from experiments.errors import StoreError
 from experiments.study.researcher.access import ATTEMPTS, COOKIE, Access
 from experiments.visit.tokens import token_hash
-from experiments.web.protocol import Snapshot
+from experiments.web.state import Snapshot
 
 PHASES = 'phases = ["consent", "task", "survey", "completion"]\n'
 

@@ -33,14 +33,14 @@ from experiments.record.run_directory import VISIT
 from experiments.visit.folders import VisitFolders
 from experiments.visit.tokens import new_token, token_hash
 from experiments.web import protocol
-from experiments.web.protocol import Frame, Inputs, Open, Pause, Snapshot, State, Taken
+from experiments.web.protocol import FrameMessage, Inputs, Open, Pause, Taken
 from experiments.web.server.guards import Guards, allowed_hosts
 from experiments.web.server.played_session import MAX_CRASHES
 from experiments.web.server.pool import HOUSE, SETTINGS, WorkerPool
-from experiments.web.state import PAUSED
+from experiments.web.state import PAUSED, GaitParameters, SceneMessage, Snapshot, Speeds, State
 
-GAIT, SPEEDS = protocol.Gait(*[1.0] * 22), protocol.Speeds(1.0, 1.0, 1.0)
-SCENE = protocol.Scene("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
+GAIT, SPEEDS = GaitParameters(*[1.0] * 22), Speeds(1.0, 1.0, 1.0)
+SCENE = SceneMessage("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
 
 
 @pytest.fixture
@@ -737,7 +737,7 @@ def test_a_damaged_visit_is_named_in_the_log_only(client, tmp_path, caplog):
 
 
 def test_frames_have_a_fixed_head():
-    frame = Frame(7, 8, 2**40, "h264", True, 640, 480, 12.5, b"picture")
+    frame = FrameMessage(7, 8, 2**40, "h264", True, 640, 480, 12.5, b"picture")
     data = frame.packed()
     assert protocol.FRAME_HEAD.size == 28 and data[28:] == b"picture"
     assert protocol.FRAME_HEAD.unpack(data[:28]) == (1, 2, 1, 0, 640, 480, 7, 8, 2**40, 12.5)

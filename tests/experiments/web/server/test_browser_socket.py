@@ -7,6 +7,7 @@ import pytest
 
 from experiments.web import protocol
 from experiments.web.server.browser_socket import MAX_WAITING, BrowserSocket
+from experiments.web.state import Snapshot
 
 
 class StalledSocket:
@@ -23,7 +24,7 @@ class StalledSocket:
 
 
 def snapshot(step):
-    return protocol.Snapshot(
+    return Snapshot(
         step=step,
         input=0,
         time=0.04 * step,

@@ -7,7 +7,7 @@ import pytest
 import uvicorn
 from starlette.responses import PlainTextResponse
 
-from experiments.web.server.guards import Guards, QuickConnection
+from experiments.web.server.guards import Guards, TimedConnection
 
 HEAD = b"POST / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
 WHOLE = HEAD + b"Content-Length: 0\r\n\r\n"
@@ -19,7 +19,7 @@ async def serving():
     config = uvicorn.Config(
         app,
         port=0,
-        http=QuickConnection,
+        http=TimedConnection,
         lifespan="off",
         log_level="error",
         timeout_keep_alive=1,

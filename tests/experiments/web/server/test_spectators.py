@@ -1,11 +1,11 @@
 """Who watches a session sees its present state first, then all that its page sees."""
 
-from experiments.web.protocol import Gait, Pictures, Scene, Snapshot, Speeds, State, Taken
+from experiments.web.protocol import Taken
 from experiments.web.server.spectators import Spectators
-from experiments.web.state import RUNNING
+from experiments.web.state import RUNNING, GaitParameters, Pictures, SceneMessage, Snapshot, Speeds, State
 
-GAIT, SPEEDS = Gait(*[1.0] * 22), Speeds(1.0, 1.0, 1.0)
-SCENE = Scene("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
+GAIT, SPEEDS = GaitParameters(*[1.0] * 22), Speeds(1.0, 1.0, 1.0)
+SCENE = SceneMessage("/scene/0123/", None, GAIT, SPEEDS, 1.5, None, 0.04)
 
 
 class Page:

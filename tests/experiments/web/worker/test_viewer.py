@@ -9,7 +9,8 @@ import pytest
 from experiments.trials.trial_config import TrialConfig
 from experiments.web import protocol
 from experiments.web.controls import Input
-from experiments.web.protocol import Hud, Markers, Moment, Scene, Snapshot, View
+from experiments.web.protocol import View
+from experiments.web.state import GaitParameters, Hud, Markers, Moment, SceneMessage, Snapshot
 from experiments.web.worker.live_session import LiveSession, open_journal
 from experiments.web.worker.viewer import HUD_EVERY, BrowserViewer
 from mjsim.house.scene.avatar import EYE
@@ -45,10 +46,10 @@ def of_kind(shown, kind):
 
 def test_nothing_of_the_task_is_sent_while_the_clock_stands(shown):
     shown.live.session.show()
-    assert kinds(shown) == {"Scene", "Pictures"} and shown.drawer.drawn == [True]
+    assert kinds(shown) == {"SceneMessage", "Pictures"} and shown.drawer.drawn == [True]
     shown.drawer.hidden = False
     shown.live.session.show()
-    assert kinds(shown) == {"Scene", "Pictures", "Snapshot", "Markers", *BESIDE}
+    assert kinds(shown) == {"SceneMessage", "Pictures", "Snapshot", "Markers", *BESIDE}
     assert shown.drawer.drawn == [True, False]
 
 
@@ -61,8 +62,8 @@ def test_a_client_that_shows_frames_gets_no_states(shown):
 
 def test_the_scene_has_what_a_prediction_needs(shown):
     shown.live.session.show()
-    (scene,) = of_kind(shown, Scene)
-    assert scene.gait == protocol.Gait(*kinematics.Gait.of(shown.live.scene, shown.live.world.options))
+    (scene,) = of_kind(shown, SceneMessage)
+    assert scene.gait == GaitParameters(*kinematics.Gait.of(shown.live.scene, shown.live.world.options))
     assert msgspec.structs.asdict(scene.gait).keys() == set(kinematics.Gait._fields)
     assert scene.field_of_view == shown.live.scene.person.field_of_view and scene.step_duration == 0.04
 
@@ -167,7 +168,7 @@ def test_a_person_chooses_how_wide_the_view_is_within_limits(shown, limits, view
     camera = shown.viewer.camera(shown.live.world)
     aspect = 16 / 9 if view.codec == "none" else 4 / 3
     assert 2.0 * np.arctan(aspect * np.tan(camera.fovy / 2.0)) == pytest.approx(angle)
-    for scene in of_kind(shown, Scene):
+    for scene in of_kind(shown, SceneMessage):
         assert scene.field_of_view == angle
         assert scene.field_of_view_range == (limits and tuple(map(float, limits.split(","))))
 

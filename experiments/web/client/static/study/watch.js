@@ -1,6 +1,6 @@
 // Shows what a participant sees during a trial. This page sends nothing: the server closes a connection that does.
 
-/** @import { Frame, ToBrowser } from "../protocol.js" */
+/** @import { FrameMessage, ToBrowser } from "../protocol.js" */
 
 import { readFrame } from "../connection.js";
 import { byId } from "../dom.js";
@@ -34,7 +34,7 @@ function world() {
   }
 }
 
-/** @param {ToBrowser | Frame} message */
+/** @param {ToBrowser | FrameMessage} message */
 function take(message) {
   switch (message.type) {
     case "state":
