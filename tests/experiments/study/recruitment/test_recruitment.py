@@ -186,7 +186,7 @@ def test_who_never_comes_back_has_timed_out_and_gives_the_place_away(tmp_path, m
         while "Your time is up" not in client.get(link).text:
             assert time.monotonic() < until
             time.sleep(0.1)
-        assert "give the task back" in client.get(link).text
+        assert "return the task" in client.get(link).text
         assert client.get("/", params=IDS).headers["location"] == link, "there is no second participation"
         assert client.get(f"{link}/withdrawal").status_code == 404
         with sqlite3.connect(tmp_path / "study.db") as database:

@@ -151,7 +151,7 @@ def test_pausing_stopping_and_quotas_hold_for_people_and_are_logged(site):
     assert assistant.post("/pause").status_code == 409
     assert assistant.post("/continue").status_code == 303
     assert owner.post("/stop").status_code == 303
-    assert "Enough people have taken part" in site.client().get("/").text
+    assert "Enough people have already taken part" in site.client().get("/").text
     assert assistant.post("/continue").status_code == 409
     assert owner.post("/reopen").status_code == 303
     for cell, wanted in (("0", "-1"), ("7", "3"), ("0", "x"), ("", ""), ("0", "²"), ("0", "9999999999")):

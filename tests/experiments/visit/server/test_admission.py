@@ -60,7 +60,7 @@ def crowd(tmp_path, monkeypatch):
 def test_people_wait_in_order_and_keep_their_place(crowd):
     site, client, links = crowd
     assert [place(client, link) for link in links] == [None, 1, 2, 3]
-    assert "time limit of the page" in client.get(links[3]).text
+    assert "time limit keeps running" in client.get(links[3]).text
     with site.client(researcher=True) as researcher:
         sessions = researcher.get("/health").json()["sessions"]
         assert sessions == {"capacity": 1, "in_use": 1, "waiting": 3}
@@ -111,9 +111,9 @@ def test_where_places_fill_up_people_leave_by_the_platform_and_are_paid_by_rule(
         links = [site.begin(client, **ids(number)) for number in range(3)]
         agree(client, links[0])
         agree(client, links[1])
-        assert "Enough people have taken part" in client.get("/", params=ids(3)).text, "two are on their way"
+        assert "Enough people have already taken part" in client.get("/", params=ids(3)).text, "two are on their way"
         closed = client.post("/begin", data=ids(3))
-        assert "give the task back" in closed.text and "location" not in closed.headers
+        assert "return the task" in closed.text and "location" not in closed.headers
         assert place(client, links[0]) is place(client, links[1]) is None
         agree(client, links[2])
         for _ in range(2):  # also when the page is loaded again

@@ -387,7 +387,7 @@ def test_a_server_without_the_film_leads_on_who_was_to_see_it(tmp_path, pool):
     (tmp_path / "film.mp4").write_bytes(b"film")
     with playing(tmp_path / "visits", pool, "--film", str(tmp_path / "film.mp4")) as client:
         link = begin(client)
-        assert "This film" in client.get(link).text
+        assert "This video" in client.get(link).text
     with playing(tmp_path / "visits", pool) as client:
         assert 'data-trial="training"' in client.get(link).text
 
@@ -500,7 +500,7 @@ def test_film_and_training_last_their_time(tmp_path, pool):
     with playing(tmp_path, pool, *words) as client:
         link = begin(client)
         for _ in range(2):
-            assert "This film" in client.get(link).text, "it is not over yet"
+            assert "This video" in client.get(link).text, "it is not over yet"
             send(client, link, "flythrough")
         ago(tmp_path, 11.0)
         send(client, link, "flythrough")
@@ -535,7 +535,7 @@ def test_pages_are_in_the_language_that_was_asked_for(tmp_path, pool):
 
 @pytest.mark.parametrize(
     ("here", "shown"),
-    [("flythrough", "This film"), ("training", 'data-trial="training"'), ("task", 'data-trial="task"')],
+    [("flythrough", "This video"), ("training", 'data-trial="training"'), ("task", 'data-trial="task"')],
 )
 def test_folders_of_visits_from_before_the_database_continue(tmp_path, pool, here, shown):
     (tmp_path / "film.mp4").write_bytes(b"film")

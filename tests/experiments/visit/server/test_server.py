@@ -208,7 +208,7 @@ def test_who_does_not_read_the_survey_ends_with_a_clear_page(tmp_path, study):
         link = begin(client)
         go_to(client, link, strict, "survey")
         post(client, link, phase="survey", **survey_answers(strict))
-        assert "to see whether they were read" in client.get(link).text
+        assert "whether you read them carefully" in client.get(link).text
         assert phase(client, link) is None
 
 
