@@ -1,10 +1,10 @@
-"""The simulator as a task for agents: one core behind the dm_env and the Gymnasium interface.
+"""Learning environments: one core behind the dm_env and the Gymnasium interface.
 
     sensors ─┐
     control ─┼─> Rearrangement (core) ─> RearrangeDmEnvironment   mjsim.make(...)
     reward  ─┘                        └> RearrangeEnv             gymnasium.make(...)
 
-Importing it registers the Gymnasium environment, as Gymnasium expects of packages with environments.
+Importing this package registers the Gymnasium environment.
 """
 
 import lazy_loader

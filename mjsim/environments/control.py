@@ -1,7 +1,7 @@
-"""What an agent can do: velocities with a trigger, or a few discrete actions.
+"""Controls: continuous velocities with a trigger, or a few discrete actions.
 
-A control turns one action of the agent into actions of the world, one for each control step. It is a generator that
-receives the result of each control step, so that an action can last until it has had its effect.
+A control turns an action of the agent into one action of the world per control step. It is a generator that receives
+the result of each control step, so that an action can last until it is done.
 """
 
 import math
@@ -33,10 +33,10 @@ class Control(Protocol):
         Args:
             action: Conforms to `spec`.
             observation: State before the action.
-            world: The world that will take them: its person and time step; not to be changed.
+            world: World of the actions, which must not be changed.
 
         Raises:
-            ActionError: The action does not conform.
+            ActionError: The action does not conform to `spec`.
         """
         ...
 
@@ -46,10 +46,10 @@ class Continuous:
     """Velocities and a trigger: (forward, left, turn, trigger), each clipped to [-1, 1].
 
     Velocities are shares of the person's limits. A trigger above 0.5 picks the nearest object in reach, below -0.5
-    places a carried object; the first control step of such an action does not walk.
+    places a carried object. The first control step of a pick or place does not walk.
 
     Attributes:
-        repeat: Control steps that an action lasts.
+        repeat: Number of control steps per action.
 
     Raises:
         EnvironmentConfigError: `repeat` is below 1.
@@ -62,15 +62,9 @@ class Continuous:
             raise EnvironmentConfigError(f"repeat must be at least 1 control step, got {self.repeat}")
 
     def spec(self) -> specs.BoundedArray:
-        """Float32, shape (4,), from -1 to 1."""
         return specs.BoundedArray((4,), np.float32, -1.0, 1.0, name="action")
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:  # noqa: ARG002
-        """Yield `repeat` actions of the world.
-
-        Raises:
-            ActionError: The action is not four finite numbers.
-        """
         try:
             values = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
@@ -93,14 +87,14 @@ MOVES = ("forward", "turn_left", "turn_right", "pick", "place")
 
 @dataclass(frozen=True)
 class Discrete:
-    """Five actions, numbered as in `MOVES`; each lasts until it is done or blocked.
+    """Five actions, numbered as in `MOVES`. Each lasts until it is done or blocked.
 
     Attributes:
-        stride: Distance that `forward` walks, m.
+        stride: Distance of `forward`, m.
         angle: Angle of a turn, rad.
 
     Raises:
-        EnvironmentConfigError: A size is not positive.
+        EnvironmentConfigError: A value is not positive.
     """
 
     stride: float = 0.25
@@ -113,15 +107,9 @@ class Discrete:
             )
 
     def spec(self) -> specs.BoundedArray:
-        """An integer: the index of the action in `MOVES`."""
         return specs.DiscreteArray(len(MOVES), dtype=np.int64, name="action")
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
-        """Yield as many actions of the world as the action takes.
-
-        Raises:
-            ActionError: The action is no index of `MOVES`.
-        """
         index = np.asarray(action)
         if index.ndim or not np.issubdtype(index.dtype, np.integer) or not 0 <= index < len(MOVES):
             raise ActionError(f"an action is a whole number below {len(MOVES)}, got {action!r}")
@@ -133,14 +121,14 @@ class Discrete:
         return _pick_or_place(Pick() if move == "pick" else Place())
 
 
-_GAIN = 8.0  # 1/s, of the controller that ends a walk or a turn
-_BRAKING = 2 / 3  # of what the body can do, for which walks are planned
+_GAIN = 8.0  # gain of the controller at the end of a walk or a turn, 1/s
+_BRAKING = 2 / 3  # planned deceleration, as a share of the limit
 _DISTANCE_TOLERANCE = 0.002  # m
 _ANGLE_TOLERANCE = math.radians(0.1)
 _STANDING = 0.01  # m/s
 _MIN_PROGRESS = 0.0005  # m per control step
-_MAX_BLOCKED_STEPS = 4  # control steps without progress after which a walk ends
-_MAX_EXTRA_TIME = 2.0  # s for a walk that slides along an obstacle
+_MAX_BLOCKED_STEPS = 4  # number of control steps without progress after which a walk ends
+_MAX_EXTRA_TIME = 2.0  # additional time for a walk that slides along an obstacle, s
 
 
 def _walk(observation: Observation, stride: float, world: World) -> Steps:
@@ -154,7 +142,7 @@ def _walk(observation: Observation, stride: float, world: World) -> Steps:
         if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        delay = braking * timestep / 2  # braking begins a step late, and acts in steps
+        delay = braking * timestep / 2  # braking starts one step late, and changes in steps
         speed = min(fastest, math.sqrt(2 * braking * left + delay**2) - delay, _GAIN * left)
         step = yield Move(forward=speed)
         now = float((step.observation.position - start) @ direction)

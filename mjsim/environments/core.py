@@ -1,4 +1,4 @@
-"""The task itself: reset, step, observe. The dm_env and the Gymnasium environment are thin adapters of it."""
+"""The task: reset, step and observe. The dm_env and the Gymnasium environment are thin adapters of it."""
 
 import contextlib
 import math
@@ -31,29 +31,30 @@ from mjsim.world.world import StepResult, World
 ObservationDict = dict[str, NDArray[Any]]
 """Sensor name -> array."""
 MAX_SEED = 2**31 - 1
-MAX_DRAWS = 10  # seeds tried by `reset_random` where the house has no room for the objects
+MAX_DRAWS = 10  # number of seeds that `reset_random` tries if the house has no room for the objects
 
 
 @dataclass(frozen=True, eq=False)
 class Transition:
     """Outcome of one step of the environment."""
 
-    observation: ObservationDict  # sensor name -> array
+    observation: ObservationDict
     reward: float
-    terminated: bool  # whether everything is delivered
-    truncated: bool  # whether the episode was cut off by the time limit or by an error of the physics
+    terminated: bool  # True if all objects are delivered
+    truncated: bool  # True if the time limit or a physics error ended the episode
     info: dict[str, Any]  # for logging and statistics; not part of the task
-    steps: tuple[StepResult, ...]  # result of each control step that the action took
+    steps: tuple[StepResult, ...]  # result of each control step
 
 
 class Rearrangement:
-    """The rearrangement task: `episodes` compiles one by seed; `sensors` fill the arrays of an observation.
+    """The rearrangement task.
 
-    `control` turns actions of the agent into those of the world. Where the physics fails, it raises, or truncates
-    the episode with `truncate_on_physics_error`. `on_control_step`, if set, gets the world after every control step.
+    `episodes` compiles an episode by seed, `sensors` make the arrays of an observation, and `control` turns actions of
+    the agent into those of the world. A physics error is raised, or truncates the episode with
+    `truncate_on_physics_error`. `on_control_step`, if set, is called with the world after every control step.
 
-    A copy, or what comes out of a pickle, is made by `rebuild`, and repeats the actions of the episode: compiled
-    models and motions under way cannot be pickled, and equal seeds and actions lead to equal states.
+    A copy or an unpickled core is made by `rebuild` and repeats the actions of the episode, because compiled models and
+    current motions cannot be pickled. Equal seeds and actions lead to equal states.
     """
 
     def __init__(
@@ -79,7 +80,7 @@ class Rearrangement:
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._episode: CompiledEpisode | None = None
         self._seed = 0
-        self._actions: list[Any] = []  # of the episode, so far
+        self._actions: list[Any] = []  # actions of the episode so far
         self._is_over = True
         self._last_observation: ObservationDict = {}
 
@@ -94,43 +95,42 @@ class Rearrangement:
 
     @property
     def action_spec(self) -> specs.BoundedArray:
-        """Spec of an action."""
         return self.control.spec()
 
     @property
     def has_episode(self) -> bool:
-        """Whether `prepare` or `reset` was called since the last `close`."""
+        """True if `prepare` or `reset` was called since the last `close`."""
         return self._episode is not None
 
     @property
     def episode(self) -> CompiledEpisode:
-        """The compiled episode; `EnvironmentStateError` before the first reset."""
+        """The compiled episode. Raises an EnvironmentStateError before the first reset."""
         if self._episode is None:
             raise EnvironmentStateError("there is no episode yet; call reset first")
         return self._episode
 
     @property
     def world(self) -> World:
-        """The simulation; treat it as read-only. Raises `EnvironmentStateError` before the first reset."""
+        """The simulation, which must not be changed. Raises an EnvironmentStateError before the first reset."""
         return self.episode.world
 
     @property
     def state(self) -> Observation:
-        """The full state now; raises `EnvironmentStateError` before the first reset."""
+        """The current state. Raises an EnvironmentStateError before the first reset."""
         return self.world.observation()
 
     def prepare(self, seed: int) -> None:
-        """Compile the episode of a seed before it is reset; raises as `reset`."""
+        """Compile the episode of a seed without resetting it. Raise errors like `reset`."""
         self._episode, self._is_over = self._episodes.get(seed), True
         self._seed, self._actions = seed, []
 
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin the episode of a seed; the observation and the info.
+        """Start the episode of a seed. Return the observation and the info.
 
         Raises:
             SamplingError: The house has no room for this seed's objects.
             AssetError: A model is malformed.
-            RenderError: Images were asked for and cannot be drawn.
+            RenderError: Images were requested and cannot be drawn.
         """
         self.prepare(seed)
         self._is_over = False
@@ -138,7 +138,7 @@ class Rearrangement:
         return self._observe(inputs), self._info(inputs, ())
 
     def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin the episode of a random seed; `SamplingError` where none of `MAX_DRAWS` has room for the objects."""
+        """Start the episode of a random seed. Raise a SamplingError if `MAX_DRAWS` seeds have no room for objects."""
         for _ in range(MAX_DRAWS - 1):
             try:
                 return self.reset(int(rng.integers(MAX_SEED)))
@@ -147,17 +147,17 @@ class Rearrangement:
         return self.reset(int(rng.integers(MAX_SEED)))
 
     def step(self, action: Any) -> Transition:
-        """Carry out one action: as many control steps as it takes, or until the episode ends.
+        """Execute one action: as many control steps as it takes, or until the episode ends.
 
         Raises:
             EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned, and such errors are not set to truncate; the episode is over.
+            PhysicsError: MuJoCo warned, and such errors do not truncate. The episode is over.
         """
         world = self.world
         if self._is_over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
-        self._actions.append(copy(action))  # the agent may write into its array again
+        self._actions.append(copy(action))  # the agent may reuse its array
         before = world.observation()
         steps, error = self._run(world, action, before)
         after = steps[-1].observation if steps else before
@@ -165,7 +165,7 @@ class Rearrangement:
         self._is_over = terminated or timed_out or error is not None
         inputs = self._sensor_input(after)
         return Transition(
-            # The state in which the physics failed cannot be observed: repeat the last observation.
+            # The state after a physics error cannot be observed, so repeat the last observation.
             observation=self._observe(inputs) if error is None else _copied(self._last_observation),
             reward=self._rewarded(world, before, after),
             terminated=terminated,
@@ -175,23 +175,23 @@ class Rearrangement:
         )
 
     def rgb(self, width: int, height: int, profile: str) -> NDArray[np.uint8]:
-        """The first-person view now, uint8, shape (height, width, 3).
+        """Draw the current first-person view, uint8, shape (height, width, 3).
 
         Raises:
-            EnvironmentStateError: Before the first reset.
-            RenderError: No OpenGL context could be made.
+            EnvironmentStateError: There is no episode yet.
+            RenderError: No OpenGL context can be created.
         """
         return self.episode.renderer(width, height, profile).rgb(self.world.data)
 
     def close(self) -> None:
-        """Free all compiled episodes; a later reset compiles them again."""
+        """Free all compiled episodes. A later reset compiles them again."""
         self._episode, self._is_over, self._actions = None, True, []
         self._episodes.close()
 
     def _run(
         self, world: World, action: Any, before: Observation
     ) -> tuple[tuple[StepResult, ...], PhysicsError | None]:
-        """The control steps of one action, until it or the episode ends, or the physics fails."""
+        """Execute the control steps of an action, until it or the episode ends, or the physics fails."""
         commands = self.control.steps(action, before, world)
         results: list[StepResult] = []
         command = next(commands)
@@ -214,7 +214,7 @@ class Rearrangement:
                 return tuple(results), None
 
     def _end(self, observation: Observation) -> tuple[bool, bool]:
-        """Whether everything is delivered, and if not, whether the time is up."""
+        """Return whether the episode terminates, and whether it is truncated by the time limit."""
         done = all(s is ObjectStatus.DELIVERED for s in observation.object_status)
         return done, not done and observation.time >= self.layout.time_limit - 1e-9
 
@@ -281,13 +281,13 @@ def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[An
         seed, actions = progress
         core.reset(seed)
         for action in actions:
-            with contextlib.suppress(ActionError, PhysicsError):  # raised when they happened
+            with contextlib.suppress(ActionError, PhysicsError):  # raised at the original step
                 core.step(action)
     return core
 
 
 def _place(code: object) -> str:
-    """File and line of a user's own function, empty where it has none."""
+    """Return file and line of a user's function, or an empty text for other objects."""
     found = getattr(code, "__code__", None)
     return f" ({found.co_filename}, line {found.co_firstlineno})" if found is not None else ""
 

@@ -14,11 +14,11 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
     """Make an environment with the dm_env interface.
 
     Args:
-        seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
+        seed: Seed of the first episode, and of the generator of all later seeds. By default a random one.
         **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
-        EnvironmentConfigError: An option is unknown or unusable.
+        EnvironmentConfigError: An option is unknown or invalid.
         AssetError: The house is malformed.
 
     Example:
@@ -32,14 +32,14 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
 
 
 class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_env has no types
-    """The task behind dm_env's interface.
+    """The task with dm_env's interface.
 
-    The last step has discount 0 where everything is delivered, and 1 where the time limit truncates the episode, so
-    that a critic still bootstraps.
+    The last step has discount 0 if all objects are delivered, and 1 if the time limit truncates the episode, so that a
+    critic still bootstraps.
 
     Args:
         core: The task.
-        seed: Seed of the first episode, and of the generator of all later seeds; None for a random one.
+        seed: As in `make`.
     """
 
     def __init__(self, core: Rearrangement, *, seed: int | None = None) -> None:
@@ -50,9 +50,9 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
     @property
     def physics(self) -> Any:
-        """The state as a `dm_control.mujoco.Physics`; before the first reset, that of the first episode.
+        """The state as a `dm_control.mujoco.Physics`, before the first reset that of the first episode.
 
-        With it, `dm_control.viewer.launch(env)` shows the environment.
+        It is needed for `dm_control.viewer.launch(env)`.
         """
         if not self.core.has_episode:
             if self._next_seed is None:
@@ -61,22 +61,22 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         return self.core.episode.physics
 
     def reset(self) -> dm_env.TimeStep:
-        """Begin the next episode."""
+        """Start the next episode."""
         seed, self._next_seed = self._next_seed, None
         observation, _ = self.core.reset_random(self._rng) if seed is None else self.core.reset(seed)
         self._is_running = True
         return dm_env.restart(observation)
 
     def step(self, action: Any) -> dm_env.TimeStep:
-        """Carry out an action. After a last step and before the first reset, begin the next episode instead.
+        """Execute an action. After the last step and before the first reset, start the next episode instead.
 
         Raises:
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned; the episode is over.
+            PhysicsError: MuJoCo warned. The episode is over.
         """
         if not self._is_running:
             return self.reset()
-        self._is_running = False  # stays so if the physics fails
+        self._is_running = False  # also if the physics fails
         taken = self.core.step(action)
         if taken.terminated:
             return dm_env.termination(taken.reward, taken.observation)
@@ -90,10 +90,8 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         return self.core.observation_spec
 
     def action_spec(self) -> specs.BoundedArray:
-        """Spec of an action."""
         return self.core.action_spec
 
     def close(self) -> None:
-        """Free all compiled episodes."""
         self._is_running = False
         self.core.close()

@@ -19,7 +19,7 @@ from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-_COUNT_STREAM = 41  # draws the number of objects independently of what the seed decides in the house
+_COUNT_STREAM = 41  # key of the generator for the number of objects, independent of other choices by the seed
 
 
 class CompiledEpisode:
@@ -30,7 +30,7 @@ class CompiledEpisode:
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
-        """The renderer of this size, px, and profile; made on first use."""
+        """Return the renderer for a size, pixels, and a profile. It is created at first use."""
         key = width, height, profile
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.world.model, width=width, height=height, profile=profile)
@@ -38,7 +38,6 @@ class CompiledEpisode:
 
     @cached_property
     def labels(self) -> Labels:
-        """Which instance and category each geom belongs to."""
         return Labels.of(self.world.scene)
 
     @cached_property
@@ -47,18 +46,18 @@ class CompiledEpisode:
         return dm_control_physics(self.world)
 
     def close(self) -> None:
-        """Free the GL resources; may be called again."""
+        """Free the GL resources. Repeated calls have no effect."""
         while self._renderers:
             self._renderers.popitem()[1].close()
 
 
 def dm_control_physics(world: World) -> Any:
-    """Wrap the state of a world as a `dm_control.mujoco.Physics`; treat it as read-only.
+    """Wrap the state of a world as a `dm_control.mujoco.Physics`, which must not be changed.
 
     Raises:
         ViewerError: dm-control is not installed.
     """
-    # Importing dm_control fixes the OpenGL backend of the process, so do it only on demand.
+    # Importing dm_control determines the OpenGL backend of the process, so it is imported only on demand.
     try:
         from dm_control import mujoco as dm_mujoco
     except ModuleNotFoundError as error:
@@ -68,17 +67,16 @@ def dm_control_physics(world: World) -> Any:
 
 
 def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int, int], seed: int) -> Episode:
-    """The episode of a seed, with a number of objects drawn from `objects`, both ends included."""
+    """Sample the episode of a seed, with a random number of objects from a range that includes both ends."""
     low, high = objects
     count = int(np.random.default_rng([seed, _COUNT_STREAM]).integers(low, high + 1))
     return sample_episode(catalogue, navigable, objects=count, seed=seed)
 
 
 class EpisodeCache:
-    """Seed -> compiled episode. Equal seeds give equal episodes, whatever was asked for before.
+    """Cache of compiled episodes by seed. Equal seeds have equal episodes, in any order of requests.
 
-    There are `count` different episodes, of which seeds are taken modulo; None for no limit. `size` compiled episodes
-    are kept, about 20 MB each.
+    With a `count`, seeds are taken modulo `count`. At most `size` compiled episodes are kept, about 20 MB each.
     """
 
     def __init__(
@@ -96,7 +94,7 @@ class EpisodeCache:
         self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
     def get(self, seed: int) -> CompiledEpisode:
-        """The compiled episode of a seed, not yet reset; raises as `Rearrangement.reset`."""
+        """Return the compiled episode of a seed, before its reset. Raise errors like `Rearrangement.reset`."""
         key = seed if self._count is None else seed % self._count
         if key not in self._compiled:
             while len(self._compiled) >= self._size:
@@ -107,6 +105,6 @@ class EpisodeCache:
         return self._compiled[key]
 
     def close(self) -> None:
-        """Free all compiled episodes; `get` compiles them again."""
+        """Free all compiled episodes. `get` compiles them again."""
         while self._compiled:
             self._compiled.popitem()[1].close()

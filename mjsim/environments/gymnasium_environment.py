@@ -11,26 +11,26 @@ from numpy.typing import NDArray
 from mjsim.environments.control import Continuous
 from mjsim.environments.core import ObservationDict
 from mjsim.environments.options import build, parse_options
-from mjsim.environments.viewer import InteractiveViewer, has_window
+from mjsim.environments.viewer import InteractiveViewer, can_open_window
 from mjsim.values.errors import EnvironmentConfigError
 
-RENDER_SIZE = (640, 480)  # px
+RENDER_SIZE = (640, 480)  # width and height, pixels
 
 
 class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
-    """The task behind Gymnasium's interface; `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`.
+    """The task with Gymnasium's interface: `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`.
 
-    `reset(seed=s)` begins the episode of seed s, the house that `mjsim house --seed s` writes, and seeds the
-    generator of later episodes.
+    `reset(seed=s)` starts the episode of seed s, the house that `mjsim house --seed s` writes, and seeds the generator
+    of later episodes.
 
     Args:
         render_mode: None, `rgb_array` for the first-person view, or `human` for dm_control's viewer.
         **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
-        EnvironmentConfigError: An option is unknown or unusable.
+        EnvironmentConfigError: An option is unknown or invalid.
         AssetError: The house is malformed.
-        ViewerError: Render mode `human`, and no window can be opened.
+        ViewerError: The render mode is `human`, and no window can be opened.
     """
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own name
@@ -44,7 +44,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         self.render_mode = render_mode
         repeat = self.core.control.repeat if isinstance(self.core.control, Continuous) else 1
         fps = max(1, round(1 / (parsed.world.control_timestep * repeat)))
-        shown = [mode for mode in modes if mode != "human" or has_window()]  # checkers try all of them
+        shown = [mode for mode in modes if mode != "human" or can_open_window()]  # checkers try all modes
         self.metadata = {**self.metadata, "render_modes": shown, "render_fps": fps}
         arrays = {name: to_space(spec) for name, spec in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
@@ -56,10 +56,10 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[ObservationDict, dict[str, Any]]:
-        """Begin an episode.
+        """Start an episode.
 
         Args:
-            seed: Seed of the episode and of the generator of later ones; None for a random one.
+            seed: Seed of the episode and of the generator of later ones. By default a random one.
             options: Must be empty.
 
         Raises:
@@ -68,28 +68,28 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """
         super().reset(seed=seed)
         if options:
-            raise EnvironmentConfigError(f"reset has no option {sorted(options)[0]!r}; it has none")
+            raise EnvironmentConfigError(f"reset has no option {sorted(options)[0]!r}; it has no options")
         first = self.core.reset_random(self.np_random) if seed is None else self.core.reset(seed)
         if self._viewer is not None:
             self._viewer.show(self.core.world)
         return first
 
     def step(self, action: Any) -> tuple[ObservationDict, float, bool, bool, dict[str, Any]]:
-        """Carry out an action.
+        """Execute an action.
 
         Raises:
             EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its space.
-            PhysicsError: MuJoCo warned; the episode is over.
+            PhysicsError: MuJoCo warned. The episode is over.
         """
         taken = self.core.step(action)
         return taken.observation, taken.reward, taken.terminated, taken.truncated, taken.info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The first-person view, uint8 (480, 640, 3), in mode `rgb_array`; None in mode `human`, which draws a window.
+        """Return the first-person view, uint8 (480, 640, 3), or in mode `human` show it in the window and return None.
 
         Raises:
-            RenderError: No OpenGL context could be made.
+            RenderError: No OpenGL context can be created.
             ViewerError: The viewer is closed.
         """
         if self._viewer is not None:
@@ -103,14 +103,13 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         return self.core.rgb(*RENDER_SIZE, self.core.layout.camera.profile)
 
     def close(self) -> None:
-        """Close the window and free all compiled episodes."""
         if self._viewer is not None:
             self._viewer.close()
         self.core.close()
 
 
 def to_space(spec: specs.Array) -> spaces.Space[Any]:
-    """The Gymnasium space of a dm_env spec; `EnvironmentConfigError` where it has no bounds."""
+    """Convert a dm_env spec to a Gymnasium space. Raise an EnvironmentConfigError if it has no bounds."""
     if isinstance(spec, specs.DiscreteArray):
         return spaces.Discrete(spec.num_values)
     if isinstance(spec, specs.BoundedArray):

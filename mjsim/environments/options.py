@@ -1,4 +1,4 @@
-"""Options of an environment, and how the core is built from them."""
+"""Options of environments, and building of the core from them."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +23,8 @@ from mjsim.values.person_parameters import PersonParameters
 T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
-DEFAULT_CACHE_SIZE = 8  # compiled episodes
-MAX_SLOTS = 1000  # rows of arrays; more objects than any house holds
+DEFAULT_CACHE_SIZE = 8  # number of compiled episodes
+MAX_SLOTS = 1000  # largest number of rows of arrays, more than any house has objects
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,21 +33,22 @@ class EnvironmentOptions:
 
     Attributes:
         house: Name under `models/houses`, or path of a `catalogue.toml` or its folder.
-        objects: Number of misplaced objects; or (min, max), from which each episode draws its own.
+        objects: Number of misplaced objects, or (min, max) for a random number in each episode.
         observations: Names of sensors or bundles, or custom `Sensor` values (docs/environments.md).
         actions: `continuous`, `discrete` or a custom `Control`.
         reward: `time`, `shaped` or a custom function.
-        time_limit: Simulated time after which an episode is truncated, s; None for 60 s per object.
-        episodes: None for a new house in every episode; a number of different houses that come again and again,
-            which makes resets fast; or a list of sampled episodes.
-        slots: Rows of the arrays with a row per object; None for the largest number of objects of an episode.
+        time_limit: Simulated time after which an episode is truncated, s. By default 60 s per object.
+        episodes: None for a new house in every episode, a number of different houses that repeat, which makes resets
+            fast, or a list of sampled episodes.
+        slots: Number of rows of arrays with a row per object. By default the largest number of objects of an episode.
         camera: Images of the eye camera.
-        person: Speeds, reach, size and eyes of the person.
-        world: Rules of the world.
-        keep: How many compiled episodes are cached, about 20 MB each; None for all if `episodes` is a number, else 8.
-        physics_errors: `raise`, or `truncate` so that training continues: an error of the physics then truncates the
-            episode, with the last valid observation and the error in `info["physics_error"]`.
-        navigable: Computes where one can walk; None for the installed builder.
+        person: Parameters of the person.
+        world: Options of the world.
+        keep: Number of compiled episodes in the cache, about 20 MB each. By default all if `episodes` is a number,
+            otherwise 8.
+        physics_errors: `raise`, or `truncate` so that training continues: a physics error then truncates the episode,
+            with the last valid observation and the error in `info["physics_error"]`.
+        navigable: Function that computes the walkable floor. By default the installed builder.
 
     Raises:
         EnvironmentConfigError: A value is out of range.
@@ -111,7 +112,7 @@ class EnvironmentOptions:
 
     @property
     def object_range(self) -> tuple[int, int]:
-        """The smallest and the largest number of objects of an episode."""
+        """The smallest and the largest number of objects in an episode."""
         if isinstance(self.episodes, Sequence) and self.episodes:
             counts = [len(e.objects) for e in self.episodes]
             return min(counts), max(counts)
@@ -119,7 +120,7 @@ class EnvironmentOptions:
 
 
 def _check_types(options: EnvironmentOptions) -> None:
-    """Raise an EnvironmentConfigError where an option is of a kind that none of its values is."""
+    """Raise an EnvironmentConfigError for an option of a wrong type."""
     episodes, made = options.episodes, options.actions
     several = isinstance(episodes, Sequence) and all(isinstance(one, Episode) for one in episodes)
     for name, fits, wanted in (
@@ -142,7 +143,7 @@ def _check_types(options: EnvironmentOptions) -> None:
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
-    """Options from keyword arguments; `EnvironmentConfigError` for an unknown name or an unusable value."""
+    """Make options from keyword arguments. Raise an EnvironmentConfigError for an unknown name or an invalid value."""
     known = [f.name for f in fields(EnvironmentOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:
@@ -151,11 +152,11 @@ def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
 
 
 def build(options: EnvironmentOptions) -> Rearrangement:
-    """Make the core: load the house and combine episodes, sensors, control and reward.
+    """Load the house and combine episodes, sensors, control and reward.
 
     Raises:
         EnvironmentConfigError: A name is unknown.
-        SamplingError: No builder of a navigable floor is installed.
+        SamplingError: No builder of a walkable floor is installed.
         AssetError: The house is malformed.
     """
     sensors = resolve_sensors(options.observations)
@@ -172,7 +173,7 @@ def build(options: EnvironmentOptions) -> Rearrangement:
         navigable = build_floor(floor.obstacles, floor.bounds) if build_floor else navigable_floor(catalogue)
         if not hasattr(navigable, "sample"):
             raise EnvironmentConfigError(
-                f"navigable answered {navigable!r:.200}; it must be a NavigableFloor"
+                f"navigable returned {navigable!r:.200}; it must return a NavigableFloor"
             )
         make = partial(sample, catalogue, navigable, options.object_range)
         count, cache_size = options.episodes, options.episodes or DEFAULT_CACHE_SIZE
@@ -205,7 +206,6 @@ def build(options: EnvironmentOptions) -> Rearrangement:
 
 
 def _named(choices: Mapping[str, T], given: str | T, option: str) -> T:
-    """The value itself, or the choice with that name."""
     if not isinstance(given, str):
         return given
     if given not in choices:

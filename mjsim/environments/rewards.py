@@ -1,4 +1,4 @@
-"""Reward: minus the time that passes, optionally with shaping towards the end of the task."""
+"""Rewards: minus the time that passes, optionally with shaping towards the end of the task."""
 
 import math
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from mjsim.values.episode import CAPACITY
 from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.observation import ObjectStatus, Observation
 
-HANDLING_TIME = 2.0  # s, about what a pick or a place takes
+HANDLING_TIME = 2.0  # approximate time for a pick or a place, s
 
 
 class RewardFunction(Protocol):
     """Reward of one step of the environment."""
 
     def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
-        """The reward for the step from `before` to `after`."""
+        """Return the reward for the step from `before` to `after`."""
         ...
 
 
@@ -27,12 +27,12 @@ class TimeReward:
     """Minus the time that passed, plus potential-based shaping if `shaping` is not 0.
 
     The shaping is `shaping * (discount * potential(after) - potential(before))`, where the potential is minus the
-    estimated time to the end. Such a term does not change the optimal policy, whatever the estimate, provided
-    that the agent uses the same discount factor (Ng, Harada and Russell 1999).
+    estimated time to the end. Such a term does not change the optimal policy, whatever the estimate, if the agent uses
+    the same discount factor (Ng, Harada and Russell 1999).
 
     Attributes:
         per_second: Cost of a second.
-        shaping: Weight of the shaping; 1 weighs an estimated second like a real one.
+        shaping: Weight of the shaping. With 1, an estimated second counts like a real one.
         discount: The agent's discount factor per environment step, 0 to 1.
 
     Raises:
@@ -52,7 +52,6 @@ class TimeReward:
             )
 
     def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
-        """The reward of one step."""
         reward = -self.per_second * (after.time - before.time)
         if self.shaping:
             gain = self.discount * potential(scene, after) - potential(scene, before)
@@ -61,7 +60,7 @@ class TimeReward:
 
 
 def potential(scene: Scene, observation: Observation) -> float:
-    """Minus a rough estimate of the time to the end, s; straight lines, one object at a time, 0 when all is done."""
+    """Return minus a rough estimate of the time to the end, s: straight lines, one object at a time, 0 at the end."""
     status = observation.object_status
     bins = np.array(
         [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]

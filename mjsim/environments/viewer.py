@@ -1,4 +1,4 @@
-"""A window that shows a running world: dm_control's viewer, driven step by step."""
+"""A window that shows a running world with dm_control's viewer, frame by frame."""
 
 import os
 import time
@@ -15,10 +15,12 @@ _REMEDY = "run it where there is a display, or use render_mode='rgb_array', whic
 
 
 class InteractiveViewer:
-    """dm_control's viewer without its own loop: `show` draws one frame, as Gymnasium's render mode `human` needs it.
+    """dm_control's viewer without its own loop, for Gymnasium's render mode `human`.
 
-    Sizes are those of the window, px; with `realtime`, `show` waits until as much time has passed as was simulated.
-    `ViewerError` without a display or GLFW.
+    Sizes are those of the window, pixels. With `realtime`, `show` waits until as much time has passed as was simulated.
+
+    Raises:
+        ViewerError: There is no display, GLFW or dm-control.
     """
 
     def __init__(self, *, width: int = 1024, height: int = 768, realtime: bool = True) -> None:
@@ -33,10 +35,10 @@ class InteractiveViewer:
         self._world: World | None = None
         self._renderer: Any = None
         self._viewer: Any = None
-        self._last_shown = (0.0, 0.0)  # clock and simulated time, s
+        self._last_shown = (0.0, 0.0)  # wall-clock and simulated time, s
 
     def show(self, world: World) -> None:
-        """Draw the present state of a world; `ViewerError` where the viewer is closed."""
+        """Draw the current state of a world. Raise a ViewerError if the viewer is closed."""
         if self._window is None:
             raise ViewerError("the viewer is closed; open another")
         if world is not self._world:
@@ -46,7 +48,7 @@ class InteractiveViewer:
         self._window.update(self._pixels)
 
     def close(self) -> None:
-        """Close the window; may be called again."""
+        """Close the window. Repeated calls have no effect."""
         self._release()
         if self._window is not None:
             self._window.close()
@@ -80,16 +82,17 @@ class InteractiveViewer:
         self._last_shown = (time.monotonic(), simulated)
 
 
-def has_window() -> bool:
-    """Whether a window can be opened, as far as the environment variables say."""
+def can_open_window() -> bool:
+    """Return True if a window can be opened, judging by environment variables."""
     here = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     return here and os.environ.get(_BACKEND, "glfw") == "glfw"
 
 
 def _load() -> tuple[Any, Any, Any, Any]:
-    """dm_control's viewer modules, with GLFW as the OpenGL backend.
+    """Load dm_control's viewer modules, with GLFW as the OpenGL backend.
 
-    A process has one backend, for windows and off screen alike, fixed by its first use: `ViewerError` for another.
+    A process has a single backend for windows and off-screen rendering, determined by its first use. Raises a
+    ViewerError if it is another one.
     """
     if os.environ.get(_BACKEND, "glfw") != "glfw":
         raise ViewerError(
@@ -103,13 +106,13 @@ def _load() -> tuple[Any, Any, Any, Any]:
         from dm_control.viewer import gui, renderer, viewer
     except ModuleNotFoundError as error:
         raise ViewerError(f"dm-control is not installed ({error}): {INSTALL_DM_CONTROL}") from error
-    except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
+    except Exception as error:  # a missing library raises ImportError, AttributeError or OSError
         raise ViewerError(f"dm_control's viewer cannot be loaded ({error!r}); {_REMEDY}") from error
     return gui, _render, viewer, renderer
 
 
 def _check_display() -> None:
-    """Ask GLFW directly first: dm_control would fix the backend of the process before it fails."""
+    """Ask GLFW directly, because dm_control would determine the backend of the process before it fails."""
     try:
         with warnings.catch_warnings(record=True) as caught:
             import glfw

@@ -1,7 +1,4 @@
-"""Off-screen rendering, the only part of the project that touches OpenGL.
-
-Each name is loaded at its first use: what only names a profile needs no OpenGL.
-"""
+"""Off-screen rendering, the only part of `mjsim` that uses OpenGL. Names are loaded at their first use."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Camera poses, and the projection that the rasteriser takes."""
+"""Cameras: poses, view volumes, and culling of geoms outside the view."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,15 +13,12 @@ from mjsim.house.scene.avatar import EYE
 from mjsim.values.errors import RenderError
 from mjsim.values.person_parameters import PICTURE_ASPECT
 
-# Nearer than any surface gets to an eye inside a body of radius 0.2 m; farther than any view indoors.
+# Nearer than any surface to an eye inside a body of radius 0.2 m, and farther than any view indoors, m
 NEAR = 0.04
 FAR = 100.0
-# Metres; far above rounding in single precision, far below what would cost time.
-_MARGIN = 0.01
-# The rasteriser draws nothing for it.
-_NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)
-# Comparing with the enumeration itself takes ten times as long.
-_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
+_MARGIN = 0.01  # tolerance of culling, far above rounding errors in single precision, m
+_NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)  # geom type that the rasteriser does not draw
+_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)  # comparing with the enumeration itself takes ten times as long
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +44,13 @@ class CameraPose:
 
     @classmethod
     def looking_at(cls, position: ArrayLike, target: ArrayLike, fovy: float) -> "CameraPose":
-        """Upright camera at `position` (3,) that looks at `target` (3,), m, with `fovy` rad."""
+        """Make an upright camera at `position` (3,), m, that looks at `target` (3,), m, with a field of view in rad."""
         eye = np.asarray(position, dtype=np.float64)
         return cls(eye, look_rotation(np.asarray(target, dtype=np.float64) - eye), fovy)
 
 
 def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Camera axes (3, 3) that look along `direction`, up as near to +z as possible (+y when vertical)."""
+    """Return camera axes (3, 3) that look along `direction`, with up closest to +z, or +y for vertical directions."""
     length = np.linalg.norm(direction)
     if not length > 0.0:
         raise RenderError(f"a camera cannot look along {direction!r}; give a target away from its position")
@@ -66,22 +63,21 @@ def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class ViewVolume:
-    """What one draw call sees."""
+    """The volume that a draw call shows."""
 
     position: NDArray[np.float64]  # eye point, m, (3,)
     rotation: NDArray[np.float64]  # camera axes as columns: right, up, backward, (3, 3)
-    half_height: float  # half the height of the image at distance 1 m; in m when orthographic
+    half_height: float  # half height of the image at distance 1 m, or half height in m if orthographic
     near: float = NEAR  # distance of the near plane, m
     far: float = FAR  # distance of the far plane, m
-    orthographic: bool = False  # parallel projection
+    orthographic: bool = False
 
     @classmethod
     def of(cls, pose: CameraPose) -> "ViewVolume":
-        """Perspective view of a camera pose."""
         return cls(pose.position, pose.rotation, float(np.tan(pose.fovy / 2)))
 
     def metres(self, raw: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Distance along the optical axis from reversed depth (1 near, 0 far); inf where nothing is."""
+        """Convert reversed depth (1 near, 0 far) to distance along the optical axis, m, inf for the background."""
         depth = np.divide(self.near * self.far, self.near + raw.astype(np.float64) * (self.far - self.near))
         if self.orthographic:
             depth = self.far - raw.astype(np.float64) * (self.far - self.near)
@@ -89,10 +85,10 @@ class ViewVolume:
         return depth.astype(np.float32)
 
     def aim(self, scene: Any) -> None:
-        """Write this view into a scene's cameras and its headlight."""
+        """Set the cameras and the headlight of a scene to this view."""
         top = self.half_height if self.orthographic else self.half_height * self.near
         forward = -self.rotation[:, 2]
-        for camera in scene.camera:  # the stereo pair; a mono image is drawn from their mean
+        for camera in scene.camera:  # a stereo pair, of which a mono image uses the mean
             camera.pos, camera.forward, camera.up = self.position, forward, self.rotation[:, 1]
             camera.frustum_center, camera.frustum_width = 0.0, 0.0
             camera.frustum_bottom, camera.frustum_top = -top, top
@@ -104,10 +100,10 @@ class ViewVolume:
 
 
 def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) -> CameraPose:
-    """Pose of the camera called `camera`, or the pose itself, for pictures with `aspect`, width over height.
+    """Return the pose of a camera of the model, or `camera` itself if it is a pose. `aspect` is width over height.
 
-    The eye has the same horizontal field of view in pictures of any shape, that of the person; any other camera of the
-    model has its vertical one, as everywhere in MuJoCo. `RenderError` for an unknown camera.
+    The eye has the person's horizontal field of view in images of any shape. Other cameras have their vertical field of
+    view, as in MuJoCo. Raises a RenderError for an unknown camera.
     """
     if isinstance(camera, CameraPose):
         return camera
@@ -123,14 +119,14 @@ def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) 
 
 
 class Bounds(NamedTuple):
-    """What the geoms of a model fill, each in its own frame."""
+    """Bounds of the geoms of a model, each in its own frame."""
 
-    radii: NDArray[np.float64]  # of spheres around their origins, m, (ngeom,); 0 means unbounded
-    boxes: NDArray[np.float64]  # centres and half-sizes of boxes, m, (ngeom, 6)
+    radii: NDArray[np.float64]  # radii of spheres around the origins, m, 0 for unbounded geoms, (ngeom,)
+    boxes: NDArray[np.float64]  # centres and half sizes of boxes, m, (ngeom, 6)
 
     @classmethod
     def of(cls, model: Any) -> "Bounds":
-        """Those of a model. The engine takes all planes for infinite, but draws those with a size as rectangles."""
+        """Compute the bounds of a model. Unlike in MuJoCo, planes with a size are rectangles, as they are drawn."""
         radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
         plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
         finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
@@ -143,7 +139,7 @@ class Bounds(NamedTuple):
 def outside(
     view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Which spheres (n,) are wholly outside a view; a radius of 0 means unbounded. Some near corners are kept."""
+    """Mask of spheres that are wholly outside a view, (n,), without some near corners. Radius 0 means unbounded."""
     right, up, backward = ((centres - view.position) @ view.rotation).T
     ahead, reach = -backward, radii + _MARGIN
     vertical, horizontal = view.half_height, view.half_height * aspect
@@ -152,16 +148,16 @@ def outside(
         if view.orthographic:
             apart |= np.abs(offset) - half > reach
         else:
-            # Signed distance to the nearer side plane of the pyramid, times the length of its normal.
+            # Signed distance to the nearer side plane of the pyramid, times the length of its normal
             apart |= np.abs(offset) - half * ahead > reach * np.hypot(1.0, half)
     return np.asarray(apart & (radii > 0.0))
 
 
 @contextmanager
 def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
-    """Draw a scene without the model geoms whose ids `hidden` (ngeom,) marks."""
+    """Hide the geoms of the mask `hidden`, (ngeom,), from a scene."""
     geoms = scene.geoms[: scene.ngeom]
-    # Geoms of other origin index the extra entry at the end.
+    # Geoms that are not the model's index the extra entry at the end.
     owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]
     chosen = [geoms[index] for index in np.flatnonzero(np.append(hidden, False)[owners])] if owners else []
     types = [geom.type for geom in chosen]

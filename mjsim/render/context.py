@@ -1,8 +1,8 @@
-"""The OpenGL context: one per process, made on first use, current only while something draws.
+"""The OpenGL context of the process, created at first use.
 
-EGL's display is a property of the process, so the context is too. Every use takes a lock, makes the context
-current in the calling thread and afterwards restores what was current before; hence any thread may draw, and
-other libraries' contexts in the same thread stay intact. One such switch costs about 0.03 ms.
+EGL's display belongs to the process, so the context does too. Every use takes a lock, makes the context current in the
+calling thread, and afterwards restores the previous one. So any thread can draw, and other libraries' contexts are not
+affected. A switch takes about 0.03 ms.
 """
 
 import atexit
@@ -27,29 +27,27 @@ EGL_REMEDY = (
     "`mjsim doctor` shows what is there"
 )
 TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
-MAX_START_TIME = 60.0  # s; the slowest drivers take a few
+MAX_START_TIME = 60.0  # default timeout for starting a driver, of which the slowest take a few seconds, s
 _MAIN_THREAD_ONLY = ("glfw", "cgl")
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 
 
 @dataclass(frozen=True)
 class GlInfo:
-    """The OpenGL driver in use."""
+    """The OpenGL driver of this process."""
 
     vendor: str  # GL_VENDOR
-    renderer: str  # GL_RENDERER, the device or the software rasteriser
+    renderer: str  # GL_RENDERER: the device or the software rasterizer
     version: str  # GL_VERSION
-    software: bool  # whether the CPU does the drawing
+    software: bool  # True if the CPU draws
 
 
 def is_software(renderer: str) -> bool:
-    """Whether a GL_RENDERER string names a rasteriser that runs on the CPU."""
+    """Return True if a GL_RENDERER string names a rasterizer that runs on the CPU."""
     return any(name in renderer.lower() for name in _SOFTWARE_RENDERERS)
 
 
 class _ProcessContext:
-    """Owns the process's GL context and the MuJoCo contexts that live in it."""
-
     def __init__(self) -> None:
         self._lock = threading.RLock()
         self._gl: Any = None
@@ -77,44 +75,41 @@ class _ProcessContext:
                     self._restore(previous)
 
     def own(self, mujoco_context: Any) -> int:
-        """Register a MuJoCo context, to be freed by `release` or when the process ends."""
         with self._lock:
             self._owned[id(mujoco_context)] = mujoco_context
             return id(mujoco_context)
 
     def release(self, key: int) -> None:
-        """Free a MuJoCo context; does nothing when that was done before."""
         with self._lock:
             mujoco_context = self._owned.pop(key, None)
-            # A forked child must not touch the parent's driver threads.
+            # A forked child must not use the parent's driver threads.
             if mujoco_context is None or self._gl is None or self._pid != os.getpid():
                 return
             with self.current():
                 mujoco_context.free()
 
     def close(self) -> None:
-        """Free everything; runs at exit before MuJoCo's own hook terminates the display."""
         with self._lock:
             if self._gl is None or self._pid != os.getpid():
                 return
-            # Hooks run last in, first out: dm_control, if imported later, has terminated the display that all share.
+            # Exit hooks run in reverse order: if dm_control was imported later, it has terminated the shared display.
             if self._display_lives():
                 for key in list(self._owned):
                     self.release(key)
                 self._gl.free()
             else:
-                self._gl._context = None  # gone with the display; the finalizer would destroy it again
+                self._gl._context = None  # freed with the display, so the finalizer must not destroy it again
             self._gl = None
 
     def _display_lives(self) -> bool:
         try:
             with self.current():
                 return True
-        except Exception:  # PyOpenGL's errors are of many types, and what is wrong does not matter here
+        except Exception:  # PyOpenGL raises errors of many types
             return False
 
     def _ensure(self) -> None:
-        if self._failure is not None:  # a driver that failed once says less the second time, or hangs again
+        if self._failure is not None:  # a second attempt would give a less useful error, or hang again
             raise self._failure
         if self._gl is None:
             try:
@@ -136,7 +131,7 @@ class _ProcessContext:
             return None
         egl = self._egl
         context = egl.eglGetCurrentContext()
-        # Ours is current here if a signal interrupted an earlier drawing just before it was released.
+        # Our own context is current if a signal interrupted an earlier drawing just before its release.
         if not context or context.address == self._gl._context.address:
             return None
         surfaces = egl.eglGetCurrentSurface(egl.EGL_DRAW), egl.eglGetCurrentSurface(egl.EGL_READ)
@@ -154,7 +149,7 @@ class _ProcessContext:
 
 @contextlib.contextmanager
 def _as_render_errors() -> Iterator[None]:
-    """Drivers may fail at any moment: a GPU is lost, memory runs out."""
+    """Turn errors of the driver, such as a lost GPU or exhausted memory, into RenderErrors."""
     try:
         yield
     except (mujoco.FatalError, *_opengl_errors()) as error:
@@ -164,15 +159,15 @@ def _as_render_errors() -> Iterator[None]:
 
 
 def _opengl_errors() -> tuple[type[Exception], ...]:
-    """PyOpenGL's errors; it is imported only where something is drawn."""
+    # PyOpenGL is imported only when something is drawn.
     module = sys.modules.get("OpenGL.error")
     return () if module is None else (module.Error,)
 
 
 def _start() -> tuple[ModuleType, Any]:
-    """The backend and a new context of it, or an error when the driver gives no answer in time.
+    """Load the backend and create a context, or raise a RenderError after a timeout.
 
-    A driver that hangs cannot be interrupted, so it is started in a thread, which is abandoned if it hangs.
+    A driver that hangs cannot be interrupted, so it starts in a thread, which is abandoned if it hangs.
     """
     limit = _time_limit()
     answers: queue.SimpleQueue[tuple[ModuleType, Any] | RenderError] = queue.SimpleQueue()
@@ -219,9 +214,9 @@ def _backend() -> ModuleType:
         raise RenderError(f"MUJOCO_GL={name!r} turns rendering off; unset it, or set it to 'egl'")
     if name not in BACKENDS:
         raise RenderError(
-            f"MUJOCO_GL={name!r} is no OpenGL backend; unset it, or set it to {' or '.join(BACKENDS)}"
+            f"MUJOCO_GL={name!r} is not an OpenGL backend; unset it, or set it to {' or '.join(BACKENDS)}"
         )
-    os.environ.setdefault(VARIABLE, name)  # dm_control, if it is used, has to draw with the same
+    os.environ.setdefault(VARIABLE, name)  # dm_control, if used, must draw with the same backend
     try:
         return importlib.import_module(f"mujoco.{name}")
     except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
@@ -229,7 +224,7 @@ def _backend() -> ModuleType:
         raise RenderError(f"cannot load the OpenGL backend {name!r} ({error}); {remedy}") from error
 
 
-# EGL keeps one display per process, and so the owner of the context is one object per process as well.
+# One per process, like EGL's display.
 _PROCESS = _ProcessContext()
 current_context = _PROCESS.current
 own = _PROCESS.own
@@ -237,12 +232,12 @@ release = _PROCESS.release
 
 
 def gl_info() -> GlInfo:
-    """Vendor, renderer and version of the OpenGL that draws in this process.
+    """Return vendor, renderer and version of OpenGL in this process, for records of runs.
 
-    A missing GPU driver falls back to software silently, so records of a run should keep this.
+    A missing GPU driver falls back to software without a warning.
 
     Raises:
-        RenderError: No OpenGL context can be made.
+        RenderError: No OpenGL context can be created.
     """
     with current_context():
         gl = importlib.import_module("OpenGL.GL")

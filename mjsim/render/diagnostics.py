@@ -1,9 +1,9 @@
-"""Report on this machine: versions, conflicting packages, and what OpenGL draws with."""
+"""The report of `mjsim doctor`: versions, conflicting packages, and OpenGL."""
 
 import importlib
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -37,7 +37,7 @@ MODULES = {
     "opencv-python-headless": "cv2",
     "pyopengl": "OpenGL",
 }  # distribution -> module that fails to import if it does not fit the others
-# dm-control requires labmaze, which has no wheels for newer Pythons and which it needs for mazes only.
+# dm-control requires labmaze, which has no wheels for newer Pythons and which only mazes need.
 WITHOUT_LABMAZE = (3, 13)
 INSTALL_DM_CONTROL = "pip install --no-deps dm-control"
 _REINSTALL = "its version does not fit the others; reinstall with pip install --upgrade mjsim"
@@ -49,25 +49,25 @@ class EnvironmentReport:
 
     python: str  # version of the interpreter
     platform: str  # operating system and processor
-    versions: Mapping[str, str | None]  # distribution -> version, or None where it is not installed
-    broken: Mapping[str, str]  # distribution -> error with which it fails to import
-    hidden: tuple[str, ...]  # what to do about packages of ours that other software hides
-    cache: str  # where compiled code is kept, and how much there is
-    egl_vendors: tuple[str, ...]  # names of the EGL vendor files found
-    gl: "GlInfo | None"  # what draws, or None where no context can be made
-    problem: str | None  # why there is no context, or None
-    advice: tuple[str, ...]  # what to do, one step per entry; empty where nothing is amiss
+    versions: Mapping[str, str | None]  # distribution -> version, or None if not installed
+    broken: Mapping[str, str]  # distribution -> error at import
+    hidden: tuple[str, ...]  # hints about packages that other software hides
+    cache: str  # folder and size of compiled code
+    egl_vendors: tuple[str, ...]  # names of EGL vendor files
+    gl: "GlInfo | None"  # driver, or None if no context can be created
+    problem: str | None  # reason why there is no context, or None
+    advice: tuple[str, ...]  # one step per entry
 
     @property
     def usable(self) -> bool:
-        """True if everything that trials need is installed and can be imported, and frames can be drawn."""
+        """True if everything that trials need can be imported, and frames can be drawn."""
         missing = {name for name, version in self.versions.items() if version is None}
         if sys.version_info >= WITHOUT_LABMAZE:
             missing.discard(DM_CONTROL)  # trials do not need it
         return self.gl is not None and not (missing or self.broken or self.hidden)
 
     def lines(self) -> tuple[str, ...]:
-        """The report as lines of text, advice last."""
+        """Format the report as lines of text, with advice last."""
         rows = [f"python {self.python} on {self.platform}"]
         for name, version in self.versions.items():
             fault = f", cannot be imported ({self.broken[name]})" if name in self.broken else ""
@@ -82,12 +82,12 @@ class EnvironmentReport:
         return (*rows, *self.hidden, *self.advice)
 
 
-def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport:
-    """Look at this machine and its folder of EGL drivers; makes an OpenGL context if that is possible."""
+def environment_report() -> EnvironmentReport:
+    """Inspect this machine. Creates an OpenGL context if possible."""
     gl: GlInfo | None = None
     problem: str | None = None
     try:
-        # Where MuJoCo or NumPy is broken, this cannot even be imported, and the report has to say so.
+        # If MuJoCo or NumPy is broken, this import fails, which the report has to show.
         from mjsim.render.context import gl_info
 
         gl = gl_info()
@@ -98,7 +98,7 @@ def environment_report(vendor_folder: Path = VENDOR_FOLDER) -> EnvironmentReport
     versions = {name: _version(name) for name in MODULES}
     installed = [name for name, version in versions.items() if version is not None]
     broken = {name: fault for name in installed if (fault := _import_error(MODULES[name]))}
-    vendors = egl_vendors(vendor_folder)
+    vendors = egl_vendors()
     return EnvironmentReport(
         python=platform.python_version(),
         platform=f"{platform.system()} {platform.machine()}",
@@ -125,23 +125,19 @@ def _cache() -> str:
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     except Exception as error:
         return f"unknown ({type(error).__name__}: {' '.join(str(error).split())})"
-    return f"{size / 1e6:.0f} MB in {folder}; may be deleted, and what is unused for 30 days is"
+    return f"{size / 1e6:.0f} MB in {folder}; it can be deleted, and files unused for 30 days are"
 
 
 def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
-    """Names of the EGL vendor files in `folder`, in the order in which they are tried."""
+    """List the EGL vendor files in `folder`, in the order in which they are tried."""
     return tuple(sorted(path.name for path in folder.glob("*.json")))
 
 
 def advise(
-    versions: Mapping[str, str | None],
-    vendors: tuple[str, ...],
-    gl: "GlInfo | None",
-    broken: Iterable[str] = (),
+    versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: "GlInfo | None"
 ) -> tuple[str, ...]:
-    """Advise on missing or broken distributions, a missing OpenGL or an unused GPU."""
+    """Advise on missing distributions, missing OpenGL, or an unused GPU."""
     steps = [_how_to_install(name) for name, version in versions.items() if version is None]
-    steps += [f"{name} is broken: {_REINSTALL}" for name in broken]
     if gl is None and chosen_gl() not in (*BACKENDS, *DISABLED):
         steps.append(f"no frame can be drawn: unset {VARIABLE}, or set it to {' or '.join(BACKENDS)}")
     elif gl is None:
@@ -171,7 +167,7 @@ def _how_to_install(name: str) -> str:
 def _import_error(module: str) -> str | None:
     try:
         importlib.import_module(module)
-    except Exception as error:  # libraries built for another numpy raise many types
+    except Exception as error:  # libraries built for another NumPy raise many types
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
     return None
 

@@ -1,4 +1,4 @@
-"""What each pixel of a segmentation belongs to: which instance, and which category."""
+"""Labels of the pixels of a segmentation: instances and categories."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,26 +13,27 @@ from mjsim.values.errors import RenderError
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
 _PERSON_ROOT = "avatar/base"
-# How far apart the same geom may lie in two compositions, m.
-_SAME = 1e-6
+_SAME = 1e-6  # largest distance of the same geom in two compositions, m
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Turns geom ids into instances and categories; -1 stays -1."""
+    """Maps geom ids to instances and categories, where -1 stays -1."""
 
-    # names by instance number: `house`, `person`, the receptacles' keys, the objects' names
-    instances: tuple[str, ...]
-    # names by category number: `house`, `person`, `receptacle`, the objects' categories
-    categories: tuple[str, ...]
-    # instance number per geom and, last, -1 for the background, int32, shape (ngeom + 1,)
+    instances: tuple[
+        str, ...
+    ]  # `house`, `person`, keys of receptacles and names of objects, by instance number
+    categories: tuple[
+        str, ...
+    ]  # `house`, `person`, `receptacle` and the objects' categories, by category number
+    # instance number of each geom, then -1 for the background, int32, (ngeom + 1,)
     instance_of_geom: NDArray[np.int32]
-    # category number per instance and, last, -1 for the background, int32
+    # category number of each instance, then -1 for the background, int32
     category_of_instance: NDArray[np.int32]
 
     @classmethod
     def of(cls, scene: Scene) -> "Labels":
-        """Labels of a composed episode; equal episodes have equal labels."""
+        """Label a composed episode. Equal episodes have equal labels."""
         model, keys = scene.model, tuple(scene.receptacles)
         instances = (HOUSE, PERSON, *keys, *scene.index.names)
         of_geom = np.zeros(model.ngeom + 1, np.int32)
@@ -50,22 +51,22 @@ class Labels:
         return cls(instances, categories, of_geom, np.array(of_instance, np.int32))
 
     def instance_map(self, segmentation: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Instance number of every pixel, from geom ids of any shape."""
+        """Convert geom ids of any shape to instance numbers."""
         return np.asarray(self.instance_of_geom[segmentation])
 
     def category_map(self, segmentation: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Category number of every pixel, from geom ids of any shape."""
+        """Convert geom ids of any shape to category numbers."""
         return np.asarray(self.category_of_instance[self.instance_of_geom[segmentation]])
 
     def pixel_counts(self, segmentation: NDArray[np.int32]) -> dict[str, int]:
-        """Pixels of each instance by its name, from geom ids of any shape; instances without any are left out."""
+        """Count the pixels of each visible instance, by name, from geom ids of any shape."""
         seen = self.instance_of_geom[segmentation].ravel()
         counts = np.bincount(seen[seen >= 0], minlength=len(self.instances))
         return {name: int(count) for name, count in zip(self.instances, counts, strict=True) if count}
 
 
 def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
-    """Ids of a receptacle's geoms: where its body has been fused into the house, those that lie as in its own model."""
+    """Find the geoms of a receptacle. If its body was fused into the house, compare poses with its own model."""
     model = scene.model
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
     if body >= 0:
@@ -92,7 +93,7 @@ def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
 
 
 def _descends(model: Any, root: int) -> NDArray[np.bool_]:
-    """Which bodies are `root` or hang from it, shape (nbody,)."""
+    """Mask of `root` and its descendants, (nbody,)."""
     inside = np.zeros(model.nbody, dtype=bool)
     inside[root] = True
     for body in range(root + 1, model.nbody):  # parents come before their children

@@ -1,4 +1,4 @@
-"""World-locked digital objects: decorative geoms that are added to a scene for one frame, seen through walls or not."""
+"""Markers: decorative geoms at places in the house, added for one frame and hidden by walls or not."""
 
 import math
 from collections.abc import Sequence
@@ -12,16 +12,13 @@ from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024
-# Most of a marker's colour is emitted and a little is lit, so that it reads as a solid but looks alike in every room.
+# A marker emits most of its colour and reflects a little light, so it appears solid but alike in every room.
 _EMITTED = 0.62
 _LIT = 0.32
-# Of an x-ray marker where something hides it.
-_HIDDEN_OPACITY = 0.3
-_AMBIENT = 0.3  # light that MuJoCo adds to a scene that has none
-# Both passes draw a visible marker at the same depth up to rounding.
-_DEPTH_TOLERANCE = 1e-4
-# Of the dark sphere behind a sphere that is outlined: its radius, in those of the other, and its colour.
-_OUTLINE = 1.4
+_HIDDEN_OPACITY = 0.3  # opacity of x-ray markers behind something
+_AMBIENT = 0.3  # ambient light that MuJoCo adds to a scene without lights
+_DEPTH_TOLERANCE = 1e-4  # difference of depth by rounding between two passes
+_OUTLINE = 1.4  # radius of the dark sphere behind an outlined one, as a multiple
 _OUTLINE_RGBA = (0.03, 0.06, 0.20, 1.0)
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
@@ -33,7 +30,7 @@ _SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
 
 
 class MarkerLike(Protocol):
-    """What a marker must offer; a sphere that has a true attribute `outlined` gets a dark outline in colour images."""
+    """Interface of a marker. A sphere with a true attribute `outlined` gets a dark outline in colour images."""
 
     @property
     def shape(self) -> str:
@@ -47,24 +44,25 @@ class MarkerLike(Protocol):
 
     @property
     def size(self) -> Sequence[float] | NDArray[np.float64]:
-        """Radius, shape (1,); radius and half-length, (2,); or half-sizes, (3,); m."""
+        """Radius (1,), radius and half length (2,), or half sizes (3,), m."""
         ...
 
     @property
     def rgba(self) -> Sequence[float] | NDArray[np.float64]:
-        """Colour and opacity, 0 to 1, shape (4,)."""
+        """Colour and opacity, 0 to 1, (4,)."""
         ...
 
     @property
     def x_ray(self) -> bool:
-        """Whether it also shows, dimmed, through walls."""
+        """True if it also shows, dimmed, through walls."""
         ...
 
 
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
-    """Append markers to a scene's geoms; `flat` gives their exact colour, opaque, in a scene without lights.
+    """Append markers to a scene's geoms. `flat` makes them opaque with their exact colour, for a scene without lights.
 
-    `RenderError` where there are too many markers, or one has an unknown shape or unusable numbers.
+    Raises:
+        RenderError: There are too many markers, or one has an unknown shape or invalid numbers.
     """
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
@@ -85,10 +83,10 @@ def add_decorative_geom(
     position: NDArray[np.float64],
     rgba: NDArray[np.float32],
 ) -> Any:
-    """Append an upright geom that belongs to no model, does not shine and is left out of segmentation."""
+    """Append an upright geom that belongs to no model, and that has no gloss and no segmentation."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, shape, size, position, np.eye(3).ravel(), rgba)
-    # Initialisation leaves these as they were, so that a slot may still name a geom of another scene.
+    # Initialization does not reset these, so a slot may still refer to a geom of another scene.
     geom.objtype, geom.objid = _NO_OBJECT, -1
     geom.category = mujoco.mjtCatBit.mjCAT_DECOR
     geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
@@ -103,9 +101,9 @@ def blend_hidden(
     scene_depth: NDArray[np.float32],
     marker_depth: NDArray[np.float32],
 ) -> None:
-    """Blend `colour` into `frame` (both (h, w, 3)) in place where a marker lies behind the scene.
+    """Blend `colour` into `frame`, both (h, w, 3), in place where a marker is behind the scene.
 
-    Depths are reversed: 1 at the near plane, 0 where nothing was drawn, shape (h, w).
+    Depths are reversed: 1 at the near plane, 0 for the background, (h, w).
     """
     hidden = (marker_depth > 0) & (marker_depth < scene_depth * (1 - _DEPTH_TOLERANCE))
     mixed = frame[hidden] * (1 - _HIDDEN_OPACITY) + colour[hidden] * _HIDDEN_OPACITY
@@ -113,12 +111,12 @@ def blend_hidden(
 
 
 def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
-    """The markers that a frame can show, in their order; raises as `add_markers`."""
+    """Return the markers that a frame can show, in order. Raise a RenderError like `add_markers`."""
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
         return []
-    for marker in markers:  # also those out of view, so that a mistake is found in every view
+    for marker in markers:  # also outside the view, so that a mistake is found in every view
         _numbers(marker, "rgba", 4)
     centres = np.array([_numbers(marker, "position", 3) for marker in markers])
     radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])
@@ -128,7 +126,7 @@ def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> l
 
 
 class _Outline:
-    """A larger dark sphere that is seen behind a sphere from all around, whatever lies behind both."""
+    """A larger dark sphere behind an outlined sphere, visible all around it."""
 
     shape, rgba, x_ray = "sphere", _OUTLINE_RGBA, False
 
@@ -140,7 +138,7 @@ class _Outline:
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
-    """Sizes (3,) in MuJoCo's convention for the marker's shape, m; `RenderError` where they are unusable."""
+    """Return the sizes (3,) of a marker in MuJoCo's convention, m. Raise a RenderError if they are invalid."""
     if marker.shape not in _SHAPES:
         raise RenderError(f"marker shape {marker.shape!r} is unknown; use one of {sorted(_SHAPES)}")
     size = _numbers(marker, "size", _SIZES[marker.shape])

@@ -1,7 +1,7 @@
-"""Occlusion culling: leaving out geoms that stand wholly behind one wall, as most do in a house of rooms.
+"""Occlusion culling: skipping geoms that are wholly behind one wall, as most are in a house of rooms.
 
-Each large opaque box in view is replaced by the rectangle through its middle. A geom that lies wholly in the shadow of
-this rectangle, with the eye as the light, cannot be seen, because the box covers it.
+Each large opaque box in view is replaced by the rectangle through its middle. A geom that is wholly in the shadow of
+the rectangle, with the eye as the light source, is invisible because the box covers it.
 """
 
 from typing import Any
@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import Bounds, ViewVolume
 from mjsim.support.kernels import inlined, kernel
 
-# Both in-plane half-sizes of a box that is worth testing against, m.
-_MIN_HALF_SIZE = 0.4
-# How many boxes are tested, those that look largest first: further ones hide nothing more in a house.
-_TESTED = 40
-# Metres; far above rounding in single precision.
-_MARGIN = 0.01
+_MIN_HALF_SIZE = 0.4  # smallest half size of the faces of boxes that are tested, m
+_TESTED = (
+    40  # number of tested boxes, those that appear largest first, since others hide nothing more in a house
+)
+_MARGIN = 0.01  # tolerance, far above rounding errors in single precision, m
 
 
 class BoxOccluders:
-    """The large boxes of a model, which may hide other geoms, among those `shown` (ngeom,)."""
+    """The large boxes of a model that may hide other geoms. `shown` is a mask of drawn geoms, (ngeom,)."""
 
     def __init__(self, model: Any, bounds: Bounds, shown: NDArray[np.bool_]) -> None:
         size = model.geom_size
@@ -41,7 +40,7 @@ class BoxOccluders:
         rotations: NDArray[np.float64],
         seen: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
-        """Which geoms (ngeom,) of those seen are wholly beside a perspective view, or behind one of the boxes."""
+        """Mask of the geoms in `seen` that are wholly outside a perspective view or behind a box, (ngeom,)."""
         result = np.zeros(len(seen), dtype=bool)
         if view.orthographic:
             return result
@@ -56,9 +55,9 @@ class BoxOccluders:
     def _shadows(
         self, view: ViewVolume, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Inward normals (k, 5, 3) and distances from the eye, m, (k, 5), of the planes around each box's shadow.
+        """Return inward normals (k, 5, 3) of the planes around the boxes' shadows, and their distances (k, 5), m.
 
-        Four planes run from the eye through the edges of the rectangle; the fifth is the rectangle's own.
+        Four planes go through the eye and the edges of the rectangle. The fifth is the rectangle's own.
         """
         ids, rows = self._ids, np.arange(len(self._ids))
         axes = rotations.transpose(0, 2, 1)  # rows are the box's axes
@@ -67,7 +66,7 @@ class BoxOccluders:
         centre, normal = positions - view.position, axes[rows, self._thin]
         across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
-        # Nearer than this, the near plane could cut a hole into the box.
+        # If it is nearer, the near plane could cut a hole into the box.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)
@@ -85,7 +84,7 @@ class BoxOccluders:
 def _side_planes(
     centre: NDArray[np.float64], across: NDArray[np.float64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles, seen from it."""
+    """Return inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles."""
     one, other = centre + across, centre - across
     corners = np.stack([one + along, other + along, other - along, one - along], axis=1)
     sides = np.cross(corners, np.roll(corners, -1, axis=1))
@@ -94,7 +93,7 @@ def _side_planes(
 
 
 def _pyramid(view: ViewVolume, aspect: float) -> NDArray[np.float64]:
-    """Inward unit normals (4, 3) of the sides of what a perspective view sees; all pass through the eye."""
+    """Return inward unit normals (4, 3) of the side planes of a perspective view."""
     right, up, backward = view.rotation.T
     horizontal, vertical = -view.half_height * aspect * backward, -view.half_height * backward
     sides = np.stack([horizontal - right, horizontal + right, vertical - up, vertical + up])
@@ -110,9 +109,9 @@ def _outside_or_covered(
     rotations: NDArray[np.float64],
     boxes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Which boxes (c,) lie outside one side of the view, or inside all planes of one shadow.
+    """Mask of the boxes (c,) that are outside one side of the view, or inside all planes of one shadow.
 
-    Takes inward normals of the view (4, 3) and of the shadows (k, 5, 3), offsets of these, m, and frames and boxes.
+    Takes inward normals of the view (4, 3) and the shadows (k, 5, 3), offsets of the latter, m, and frames and boxes.
     """
     result = np.zeros(len(away), np.bool_)
     for c in range(len(away)):
@@ -139,7 +138,7 @@ def _extent(
     rotation: NDArray[np.float64],
     box: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Middle and half the extent of a box along a direction, m."""
+    """Return the middle and half the extent of a box along a direction, m."""
     middle = reach = 0.0
     for axis in range(3):
         along = normal[0] * rotation[0, axis] + normal[1] * rotation[1, axis] + normal[2] * rotation[2, axis]
@@ -157,7 +156,7 @@ def _opaque(model: Any, ids: NDArray[np.int_]) -> NDArray[np.bool_]:
 
 
 def _see_through_texture(model: Any) -> NDArray[np.bool_]:
-    """Geoms whose material has a texture with an alpha channel, shape (ngeom,)."""
+    """Mask of the geoms whose texture has an alpha channel, (ngeom,)."""
     if not model.nmat or not model.ntex:
         return np.zeros(model.ngeom, dtype=bool)
     textures = model.mat_texid.reshape(model.nmat, -1)

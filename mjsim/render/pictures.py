@@ -1,4 +1,4 @@
-"""Small pictures of objects and receptacles, and pictures of the house from straight above with an exact scale."""
+"""Pictures of single objects and receptacles, and pictures of houses from above with an exact scale."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -16,38 +16,38 @@ from mjsim.house.scene import avatar
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.context import current_context
 from mjsim.render.profiles import MAX_SIDE, RenderProfile
-from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS, Rasteriser
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS, Rasteriser, reduced
 from mjsim.render.scene_settings import DirectionalLight
 from mjsim.values.errors import AssetError, RenderError
 
 SUPERSAMPLING = 3
-# Share of the picture's side that its subject fills.
-FILL = 0.92
-# Seen from the front right, where the near side of a receptacle faces -y; flat objects from higher up.
+FILL = 0.92  # share of the picture's side that its subject fills
+# The camera is at the front right, where the near side of a receptacle faces -y. It is higher for flat objects.
 _AZIMUTH = np.deg2rad(28.0)
 _ELEVATION = np.deg2rad(32.0)
 _ELEVATION_FLAT = np.deg2rad(52.0)
-_FLAT = 0.3
-# From the upper left of the picture, and weaker ones that keep the shaded sides apart.
+_FLAT = 0.3  # largest height of flat objects, as a share of their width
+# From the upper left of the picture, and a weaker light so that shaded sides differ
 _LIGHTS = (
     DirectionalLight((0.75, 0.35, -0.75), diffuse=0.62, ambient=0.42),
     DirectionalLight((-0.7, 0.6, -0.2), diffuse=0.28),
 )
 _DISTANCE = 5.0
 _PROFILE = RenderProfile("picture", skybox=False)
-_PAPER = 244  # grey level where there is no house
-# Above any house of one storey.
-_HEIGHT = 10.0
+_PAPER = 244  # grey level of the background
+_HEIGHT = 10.0  # height of the camera, above any house of one storey, m
 _PLAN_LIGHTS = (DirectionalLight((0.25, -0.35, -1.0), diffuse=0.55, ambient=0.5),)
 _PLAN_PROFILE = RenderProfile("floorplan", supersampling=2.0, skybox=False)
 
 
 def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[np.uint8]]:
-    """RGBA pictures (size, size, 4), straight alpha, by `object:<key>` and `receptacle:<key>`.
+    """Draw all objects and receptacles of a catalogue as RGBA (size, size, 4) with straight alpha.
+
+    The keys are `object:<key>` and `receptacle:<key>`.
 
     Raises:
         AssetError: A model file does not compile.
-        RenderError: No OpenGL context can be made, the size is unusable, or a model shows nothing.
+        RenderError: No OpenGL context can be created, the size is invalid, or a model shows nothing.
     """
     files = {f"object:{key}": entry.path for key, entry in catalogue.objects.items()}
     files |= {f"receptacle:{key}": entry.path for key, entry in catalogue.receptacles.items()}
@@ -55,7 +55,7 @@ def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[n
 
 
 def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
-    """Draw one MJCF file: RGBA (size, size, 4), straight alpha, rows from the top; raises as `render_pictures`."""
+    """Draw an MJCF file as RGBA (size, size, 4) with straight alpha. Raises errors like `render_pictures`."""
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
@@ -64,7 +64,7 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
 
 
 def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
-    """Draw a compiled model: RGBA (size, size, 4), straight alpha, rows from the top; errors call it `name`."""
+    """Draw a compiled model as RGBA (size, size, 4) with straight alpha. `name` is used in errors."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if not 1 <= size <= 1024:
@@ -78,7 +78,7 @@ def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
 
 
 def _first_view(model: Any, data: Any) -> ViewVolume:
-    """Orthographic view that is sure to hold the whole model."""
+    """Return an orthographic view that contains the whole model."""
     low, high = _bounds(model, data)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     flat = (high - low)[2] < _FLAT * max((high - low)[:2])
@@ -96,7 +96,7 @@ def _first_view(model: Any, data: Any) -> ViewVolume:
 
 
 def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of the box around the shown geoms, m, shape (3,) each."""
+    """Return the corners of the box around the drawn geoms, m, (3,) each."""
     shown = np.isin(model.geom_group, FIRST_PERSON_GROUPS)
     if not shown.any():
         raise RenderError("a model without geoms in the groups 0 to 2 has no picture; add visual geoms")
@@ -108,7 +108,7 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
-    """The view shifted and scaled so that what is seen fills the picture; twice, the second time finely."""
+    """Shift and scale the view twice so that the subject fills the picture, the second time finely."""
     for _ in range(2):
         mask = rasteriser.geometry(view)[0] >= 0
         if not mask.any():
@@ -130,7 +130,7 @@ def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
 
 
 def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> NDArray[np.uint8]:
-    """Average blocks of pixels, weighting colours by coverage so that no background bleeds into the edges."""
+    """Average blocks of pixels, weighting colours by coverage so that the background does not bleed into edges."""
     weight = mask.astype(np.float32)
     covered = cv2.resize(weight, (size, size), interpolation=cv2.INTER_AREA)
     summed = cv2.resize(colour * weight[..., None], (size, size), interpolation=cv2.INTER_AREA)
@@ -141,14 +141,14 @@ def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> ND
 
 @dataclass(frozen=True, eq=False)
 class FloorPlanPicture:
-    """An orthographic picture; north (+y) is up."""
+    """An orthographic picture from above. North (+y) is up."""
 
-    rgb: NDArray[np.uint8]  # picture, uint8, shape (height, width, 3), rows from the top
+    rgb: NDArray[np.uint8]  # uint8, (height, width, 3), rows from the top
     bounds: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax, m
     pixels_per_metre: float
 
     def to_pixels(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Points in the house (k, 2), m, as columns and rows (k, 2); centres of pixels are half a pixel in."""
+        """Convert points in the house (k, 2), m, to columns and rows (k, 2). Pixel centres are at half-integers."""
         points = np.asarray(xy, dtype=np.float64)
         corner = np.array([self.bounds[0], self.bounds[3]])
         return np.asarray((points - corner) * [self.pixels_per_metre, -self.pixels_per_metre])
@@ -160,13 +160,13 @@ def render_floorplan(
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
 ) -> FloorPlanPicture:
-    """Draw the house from above, without ceilings (geom group 1) and person, within (xmin, ymin, xmax, ymax), m."""
+    """Draw a house from above, without ceilings (geom group 1) and person, within (xmin, ymin, xmax, ymax), m."""
     xmin, ymin, xmax, ymax = bounds
     if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax and pixels_per_metre > 0):
         raise RenderError(
             f"a floor plan needs bounds with min < max and a positive scale, got {bounds} m at {pixels_per_metre}/m"
         )
-    # Rounding first keeps 12.8 m at 60/m at 768 pixels despite binary fractions.
+    # Rounding first makes 12.8 m at 60/m 768 pixels despite binary fractions.
     width, height = (int(np.ceil(round(s * pixels_per_metre, 6))) for s in (xmax - xmin, ymax - ymin))
     if max(width, height) * _PLAN_PROFILE.supersampling > MAX_SIDE:
         raise RenderError(
@@ -185,19 +185,18 @@ def render_floorplan(
     with rasteriser, current_context():
         rasteriser.update(data)
         drawn = rasteriser.layer(view, hidden=_of_person(model), lowest=True)
-        rgb = rasteriser.reduced(drawn.colour)
+        rgb = reduced(drawn.colour, rasteriser.size)
         rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
     return FloorPlanPicture(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
 
 
 def _of_person(model: Any) -> NDArray[np.bool_]:
-    """Geoms of the person, shape (ngeom,); a model without a person has none."""
     base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
     return np.asarray((model.body_rootid[model.geom_bodyid] == base) & (base >= 0))
 
 
 def largest_scale(bounds: tuple[float, float, float, float]) -> float:
-    """The largest scale at which bounds (xmin, ymin, xmax, ymax, m) can be drawn, pixels per metre."""
+    """Return the largest scale for drawing bounds (xmin, ymin, xmax, ymax, m), in pixels per metre."""
     xmin, ymin, xmax, ymax = bounds
     return (MAX_SIDE / _PLAN_PROFILE.supersampling - 1) / max(xmax - xmin, ymax - ymin)
 
@@ -205,7 +204,7 @@ def largest_scale(bounds: tuple[float, float, float, float]) -> float:
 def render_house_map(
     catalogue: Catalogue, bounds: tuple[float, float, float, float], pixels_per_metre: float = 40.0
 ) -> NDArray[np.uint8]:
-    """The tidy house from above within (xmin, ymin, xmax, ymax), m, as RGBA, uint8, (height, width, 4).
+    """Draw a tidy house from above within (xmin, ymin, xmax, ymax), m, as RGBA, uint8, (height, width, 4).
 
     Raises:
         AssetError: The house does not compile.

@@ -1,10 +1,10 @@
-"""How much a frame may cost and how good it looks."""
+"""Render profiles: quality and cost of frames."""
 
 from dataclasses import dataclass
 
 from mjsim.values.errors import RenderError
 
-MAX_SIDE = 8192  # px, of a frame
+MAX_SIDE = 8192  # largest side of a frame, in pixels
 
 
 @dataclass(frozen=True)
@@ -12,15 +12,14 @@ class RenderProfile:
     """Settings of the rasteriser.
 
     Attributes:
-        name: Name under which records and error messages know the profile.
-        supersampling: Colour is drawn at this multiple of the frame's size and area-reduced, 1 to 4.
+        name: Name in records and error messages.
+        supersampling: Factor of 1 to 4 by which frames are drawn larger and then reduced.
         samples: Multisamples per pixel, 0 for none.
         shadow_size: Side of a shadow map in texels, 0 for no shadows.
-        reflections: Whether reflective materials mirror the scene.
-        skybox: Whether the model's skybox shows where nothing else does.
-        textures: Whether materials show their textures.
-        contact_shadows: Whether free objects near the floor get a dark spot under them; for profiles without
-            shadow maps.
+        reflections: True if reflective materials mirror the scene.
+        skybox: True if the model's skybox is the background.
+        textures: True if materials show their textures.
+        contact_shadows: True for dark spots under free objects near the floor, for profiles without shadow maps.
     """
 
     name: str
@@ -46,10 +45,10 @@ class RenderProfile:
 
 DRAFT = RenderProfile("draft", skybox=False, textures=False)
 """Flat colours."""
-# Drawn at 800 x 600 for a frame of 640 x 480: smooth edges for 8 ms more on a CPU, where multisampling costs 40.
+# Drawn at 800 x 600 for a frame of 640 x 480. It takes 8 ms more on a CPU, where multisampling takes 40 ms.
 FAST = RenderProfile("fast", supersampling=1.25, contact_shadows=True)
 """Smooth edges and contact shadows, at little cost on a CPU."""
-# Smaller shadow maps speckle the floors of a house of this size.
+# Smaller shadow maps make floors speckled in a house of this size.
 QUALITY = RenderProfile("quality", supersampling=1.5, samples=4, shadow_size=4096, reflections=True)
 """Multisampling, fine shadows and reflections."""
 
@@ -58,7 +57,7 @@ PROFILES = {profile.name: profile for profile in (DRAFT, FAST, QUALITY)}
 
 
 def resolve_profile(profile: str | RenderProfile) -> RenderProfile:
-    """The profile itself, or the one of that name: `draft`, `fast` or `quality`; `RenderError` for another name."""
+    """Return a profile itself, or find it by name. Raise a RenderError for an unknown name."""
     if isinstance(profile, RenderProfile):
         return profile
     if profile not in PROFILES:

@@ -1,4 +1,4 @@
-"""The rasteriser: a model's GL resources, its scene, and the two kinds of pass drawn from it."""
+"""The rasteriser: a model's GL resources, its scene, and passes for colour and for geometry."""
 
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, Self
@@ -29,20 +29,20 @@ TOP_DOWN_GROUPS = (0, 2)
 
 _Flag = mujoco.mjtRndFlag
 _BACKGROUND = -1
-_FAR_UP = 1e4  # m; nothing up there throws a spot on the floor
+_FAR_UP = 1e4  # height at which an object has no contact shadow, m
 
 
 class Layer(NamedTuple):
-    """Part of a scene as it was drawn, rows from the bottom, before it is reduced to the size of a frame."""
+    """A part of a scene before it is reduced to the size of a frame, rows from the bottom."""
 
     colour: NDArray[np.uint8]  # uint8, (h, w, 3)
-    depth: NDArray[np.float32]  # reversed depth, 1 at the near plane, 0 where nothing was drawn, (h, w)
+    depth: NDArray[np.float32]  # reversed depth, 1 at the near plane, 0 for the background, (h, w)
 
 
 class Rasteriser:
-    """GL resources of one model. Update and draw under one `current_context` where threads share it.
+    """GL resources of one model. Threads that share it update and draw under one `current_context`.
 
-    Sizes are those of the frames, px; `groups` are the geom groups that are shown; `lights` replace the model's lights.
+    Width and height are those of frames, in pixels. `groups` are the drawn geom groups. `lights` replace the model's.
     """
 
     def __init__(
@@ -84,16 +84,14 @@ class Rasteriser:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the frames, pixels."""
         return self._size
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called."""
         return self._key is None
 
     def close(self) -> None:
-        """Free the GL resources; again does nothing."""
+        """Free the GL resources. Repeated calls have no effect."""
         if self._key is not None:
             context.release(self._key)
             self._key = None
@@ -105,7 +103,7 @@ class Rasteriser:
         self.close()
 
     def update(self, data: Any) -> None:
-        """Take the geoms' poses and colours from `data`; `RenderError` if it belongs to another model."""
+        """Copy poses and colours of geoms from `data`. Raise a RenderError if it belongs to another model."""
         if self.closed:
             raise RenderError("the renderer is closed; make a new one")
         if len(data.geom_xpos) != self._model.ngeom or len(data.qpos) != self._model.nq:
@@ -120,7 +118,7 @@ class Rasteriser:
             set_lights(self._scene, self._lights)
 
     def colour(self, view: ViewVolume, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Frame (height, width, 3) of the scene as last updated, rows from the top."""
+        """Draw a frame (height, width, 3) of the last update, rows from the top."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         view.aim(scene)
@@ -139,7 +137,7 @@ class Rasteriser:
     def geometry(
         self, view: ViewVolume, markers: Sequence[MarkerLike] = ()
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Geom ids (height, width), -1 for background and markers, and raw reversed depth of one pass."""
+        """Draw geom ids (height, width), -1 for background and markers, and reversed depth, in one pass."""
         scene, model_geoms = self._scene, self._scene.ngeom
         scene.flags[:] = 0
         for flag in (_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE):
@@ -149,7 +147,7 @@ class Rasteriser:
             add_markers(scene, markers)
             geoms = scene.geoms[: scene.ngeom]
             for index in range(model_geoms, scene.ngeom):
-                # Ids are drawn as colours, and what has none is not drawn at all.
+                # Ids are drawn as colours, and geoms without an id are not drawn at all.
                 geoms[index].segid = index
             kind = mujoco.mjtObj.mjOBJ_GEOM
             owners = [_BACKGROUND] + [g.objid if g.objtype == kind else _BACKGROUND for g in geoms]
@@ -170,7 +168,7 @@ class Rasteriser:
         hidden: NDArray[np.bool_],
         lowest: bool = False,
     ) -> Layer:
-        """The scene as last updated without `hidden` geoms (ngeom,); the `lowest` layer has sky and contact spots."""
+        """Draw the scene without the mask `hidden` (ngeom,). The `lowest` layer has sky and contact shadows."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         scene.flags[_Flag.mjRND_SKYBOX] &= lowest
@@ -187,17 +185,13 @@ class Rasteriser:
             scene.ngeom = model_geoms
         return layer
 
-    def reduced(self, drawn: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """A drawing (h, w, 3) with rows from the bottom as a frame (height, width, 3) with rows from the top."""
-        return reduced(drawn, self._size)
-
     @property
     def _aspect(self) -> float:
-        """Width over height, of the drawing or the frame: rounding makes them differ."""
+        # Rounding may make the aspect ratios of the drawing and the frame differ.
         return max(width / height for width, height in (self._size, self._drawn))
 
     def _unseen(self, view: ViewVolume, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
-        """Geoms (ngeom,) that can leave no trace in this view."""
+        """Mask of the geoms that do not affect this view, (ngeom,)."""
         if profile is not None and (profile.shadow_size or profile.reflections):
             return np.zeros(self._model.ngeom, dtype=bool)
         aspect = self._aspect
@@ -211,14 +205,13 @@ class Rasteriser:
         colour: NDArray[np.uint8] | None,
         depth: NDArray[np.float32] | None,
     ) -> None:
-        """Draw a scene at a size and read colour (h, w, 3) and depth (h, w) from the bottom row up."""
+        """Draw a scene and read colour (h, w, 3) and depth (h, w), rows from the bottom."""
         rectangle = mujoco.MjrRect(0, 0, *size)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._gl)
         mujoco.mjr_render(rectangle, scene, self._gl)
         mujoco.mjr_readPixels(colour, depth, rectangle, self._gl)
 
     def _add_x_ray(self, view: ViewVolume, markers: Sequence[MarkerLike]) -> None:
-        """Blend the hidden parts of x-ray markers into the colour buffer, after the scene was drawn."""
         if not markers:
             return
         scene_depth, marker_depth = np.empty((2, *self._colour.shape[:2]), np.float32)
@@ -233,10 +226,10 @@ class Rasteriser:
 
 
 def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """A drawing with rows from the bottom as a frame of `size` (width, height) with rows from the top."""
+    """Convert a drawing, rows from the bottom, to a frame of `size` (width, height), rows from the top."""
     if drawn.shape[1::-1] == size:
         return np.asarray(cv2.flip(drawn, 0), dtype=np.uint8)
-    # For a slight reduction, interpolation costs a third of averaging over areas and comes within 0.3 dB of it.
+    # For a slight reduction, interpolation takes a third of the time of averaging areas, within 0.3 dB.
     slight = drawn.shape[1] < 1.5 * size[0]
     method = cv2.INTER_LINEAR_EXACT if slight else cv2.INTER_AREA
     return np.asarray(cv2.flip(cv2.resize(drawn, size, interpolation=method), 0), dtype=np.uint8)

@@ -1,7 +1,4 @@
-"""Frames of a model: in the first person, with depth and segmentation, and from outside.
-
-While a camera outside rests, everything at rest is drawn once.
-"""
+"""Renderers: first-person frames with depth and segmentation, and fast frames from cameras that rest."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,34 +12,34 @@ from mjsim.render import context
 from mjsim.render.cameras import CameraPose, ViewVolume, camera_pose
 from mjsim.render.markers import MarkerLike, blend_hidden
 from mjsim.render.profiles import RenderProfile, resolve_profile
-from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser
+from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser, reduced
 
-REST = 25  # frames without movement after which something counts as standing still again
+REST = 25  # number of frames without movement after which a geom counts as resting
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Images of one moment from one camera, rows from the top; None where not asked for."""
+    """Images of one moment from one camera, rows from the top. Channels that were not requested are None."""
 
-    camera: CameraPose  # where it was seen from
-    rgb: NDArray[np.uint8] | None  # colour, uint8, shape (height, width, 3)
-    # distance along the optical axis, m, inf where nothing is, float32, shape (height, width)
+    camera: CameraPose
+    rgb: NDArray[np.uint8] | None  # colour, uint8, (height, width, 3)
+    # distance along the optical axis, m, inf for the background, float32, (height, width)
     depth: NDArray[np.float32] | None
-    segmentation: NDArray[np.int32] | None  # geom ids, -1 where nothing is, int32, shape (height, width)
+    segmentation: NDArray[np.int32] | None  # geom ids, -1 for the background, int32, (height, width)
 
 
 class OffScreenRenderer:
-    """Owns the rasteriser of one model. Close it, or use it as a context manager.
+    """Owner of the rasteriser of one model. Close it, or use it as a context manager.
 
     Args:
         model: Compiled model.
-        width: Of the frames, pixels.
-        height: Of the frames, pixels.
+        width: Width of frames, pixels.
+        height: Height of frames, pixels.
         profile: `draft`, `fast`, `quality` or a custom profile.
-        groups: Geom groups that are shown (docs/models.md).
+        groups: Geom groups to draw (docs/models.md).
 
     Raises:
-        RenderError: No OpenGL context can be made, or the size or profile is unusable.
+        RenderError: No OpenGL context can be created, or the size or profile is invalid.
     """
 
     def __init__(
@@ -59,7 +56,7 @@ class OffScreenRenderer:
         self._rasteriser = Rasteriser(model, width, height, self._profile, groups)
 
     def close(self) -> None:
-        """Free the GL resources; again does nothing."""
+        """Free the GL resources. Repeated calls have no effect."""
         self._rasteriser.close()
 
     def __enter__(self) -> Self:
@@ -72,37 +69,35 @@ class OffScreenRenderer:
 class Renderer(OffScreenRenderer):
     """Draws a model off screen.
 
-    Any thread may call it; calls take turns. Frames are bit-identical over calls and processes on one OpenGL
-    driver (see `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data.
+    Any thread may call it, one at a time. Frames are bit-identical across calls and processes on one OpenGL driver (see
+    `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data.
     """
 
     @property
     def width(self) -> int:
-        """Of the frames, pixels."""
         return self._rasteriser.size[0]
 
     @property
     def height(self) -> int:
-        """Of the frames, pixels."""
         return self._rasteriser.size[1]
 
     @property
     def profile(self) -> RenderProfile:
-        """Settings in use."""
         return self._profile
 
     def rgb(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.uint8]:
-        """Colour image (height, width, 3), contiguous, rows from the top.
+        """Draw a colour image (height, width, 3), contiguous, rows from the top.
 
         Args:
             data: State of the renderer's model.
-            camera: A camera of the model, or a pose.
-            markers: World-locked objects to draw; the scene hides them as it hides real ones, except for `x_ray` ones.
+            camera: Name of a camera of the model, or a pose.
+            markers: Markers to draw. The scene hides them, except those with `x_ray`.
 
         Raises:
-            RenderError: Unknown camera, unusable marker, foreign data, or the renderer is closed.
+            RenderError: The camera is unknown, a marker is invalid, the data belong to another model, or the renderer
+                is closed.
         """
         with context.current_context():
             view = self._look(data, camera)
@@ -111,9 +106,9 @@ class Renderer(OffScreenRenderer):
     def depth(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.float32]:
-        """Distance along the optical axis in m, (height, width), inf where nothing is.
+        """Draw distances along the optical axis, m, (height, width), inf for the background.
 
-        Glass and markers (only those given here) count as solid.
+        Glass counts as solid, and so do markers, if given.
 
         Raises:
             RenderError: As for `rgb`.
@@ -123,7 +118,7 @@ class Renderer(OffScreenRenderer):
             return view.metres(self._rasteriser.geometry(view, markers)[1])
 
     def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
-        """Geom id per pixel, (height, width), -1 where nothing is; glass counts as solid.
+        """Draw geom ids, (height, width), -1 for the background. Glass counts as solid.
 
         Raises:
             RenderError: As for `rgb`.
@@ -141,9 +136,9 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> Frame:
-        """Several images of the same moment: one scene update, one pass for depth and segmentation together.
+        """Draw several images of the same moment, with depth and segmentation in one pass.
 
-        Markers are drawn into the colour image only.
+        Markers are drawn only into the colour image.
 
         Raises:
             RenderError: As for `rgb`.
@@ -161,7 +156,7 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> tuple[Frame, ...]:
-        """The same moment from any number of cameras, with one scene update for all.
+        """Draw the same moment from several cameras, with one update of the scene.
 
         Raises:
             RenderError: As for `rgb`.
@@ -181,11 +176,7 @@ class Renderer(OffScreenRenderer):
         return Frame(pose, colour, metres, ids if segmentation else None)
 
     def camera_pose(self, data: Any, camera: str | CameraPose = EYE) -> CameraPose:
-        """Where a camera of the model is and how wide it sees.
-
-        Raises:
-            RenderError: Unknown camera.
-        """
+        """Return the pose of a camera. Raise a RenderError if it is unknown."""
         return camera_pose(self._model, data, camera, self.width / self.height)
 
     def _look(self, data: Any, camera: str | CameraPose) -> ViewVolume:
@@ -196,10 +187,10 @@ class Renderer(OffScreenRenderer):
 class LayeredRenderer(OffScreenRenderer):
     """Draws a model off screen, several times as fast as a `Renderer` while the camera rests.
 
-    What moves, and the markers, are drawn over a picture of the rest by their depth; what comes to rest joins the rest.
-    Profiles with shadow maps, mirrors or multisampling are drawn in full, as everything changes everything there; so
-    are moving things that one can see through, as they have no depth. What moves behind something shows faintly,
-    as x-ray markers do.
+    Moving things and markers are drawn over a picture of resting things, according to their depth. Moving things behind
+    others show faintly, as x-ray markers do. Everything is drawn in one pass with profiles that have shadow maps,
+    reflections or multisampling, because there a moving thing changes everything, and if a moving thing is translucent,
+    because it has no depth.
     """
 
     def __init__(self, model: Any, **options: Any) -> None:
@@ -208,13 +199,13 @@ class LayeredRenderer(OffScreenRenderer):
         self._layered = not (profile.shadow_size or profile.reflections or profile.samples)
         self._camera: CameraPose | None = None
         self._translucent = _translucent(model)
-        self._still = np.full(model.ngeom, REST)  # frames since each geom moved
+        self._still = np.full(model.ngeom, REST)  # number of frames since each geom moved
         self._poses = np.full((model.ngeom, 12), np.nan)
         self._moving: NDArray[np.bool_] | None = None
         self._rest: Layer | None = None
 
     def rgb(self, data: Any, camera: CameraPose, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Colour image (height, width, 3), rows from the top; the camera rests while it is the same object."""
+        """Draw a colour image (height, width, 3), rows from the top. The camera rests if it is the same object."""
         with context.current_context():
             self._rasteriser.update(data)
             view, still = ViewVolume.of(camera), camera is self._camera
@@ -230,7 +221,7 @@ class LayeredRenderer(OffScreenRenderer):
             frame[nearer] = front.colour[nearer]
             blend_hidden(frame, front.colour, rest.depth, front.depth)
             self._blend_translucent(frame, np.maximum(rest.depth, front.depth), view, markers)
-            return self._rasteriser.reduced(frame)
+            return reduced(frame, self._rasteriser.size)
 
     def _blend_translucent(
         self,
@@ -239,7 +230,7 @@ class LayeredRenderer(OffScreenRenderer):
         view: ViewVolume,
         markers: Sequence[MarkerLike],
     ) -> None:
-        """Blend markers that one can see through into a drawing in place; drawn as they are they leave no depth."""
+        """Blend translucent markers into a drawing in place. Opaque copies of them provide the depth."""
         for opacity in sorted({marker.rgba[3] for marker in markers if marker.rgba[3] < 1.0}):
             solid = [_Solid(marker) for marker in markers if marker.rgba[3] == opacity]
             layer = self._rasteriser.layer(view, solid, hidden=np.ones_like(self._translucent))
@@ -252,7 +243,6 @@ class LayeredRenderer(OffScreenRenderer):
         return self._still < REST
 
     def _note_movement(self, data: Any) -> NDArray[np.bool_]:
-        """Which geoms move, or moved a moment ago, shape (ngeom,)."""
         poses = np.hstack([data.geom_xpos, data.geom_xmat])
         moved = np.any(poses != self._poses, axis=1) & ~np.isnan(self._poses[:, 0])
         self._still = np.where(moved, 0, np.minimum(self._still + 1, REST))
@@ -260,7 +250,6 @@ class LayeredRenderer(OffScreenRenderer):
         return self._moves
 
     def _background(self, view: ViewVolume) -> Layer:
-        """Everything at rest; drawn again when something starts or stops moving."""
         moving = self._moves
         if self._rest is None or self._moving is None or np.any(moving != self._moving):
             self._moving = moving
@@ -269,8 +258,6 @@ class LayeredRenderer(OffScreenRenderer):
 
 
 class _Solid:
-    """An opaque copy of a marker."""
-
     def __init__(self, marker: MarkerLike) -> None:
         self.shape, self.position, self.size = marker.shape, marker.position, marker.size
         self.rgba = (*marker.rgba[:3], 1.0)
@@ -278,7 +265,7 @@ class _Solid:
 
 
 def _translucent(model: Any) -> NDArray[np.bool_]:
-    """Which geoms one can see through, shape (ngeom,); they leave no depth."""
+    """Mask of the translucent geoms, (ngeom,)."""
     material = model.geom_matid
     opacity = (
         np.where(material >= 0, model.mat_rgba[material, 3], 1.0) if model.nmat else np.ones(model.ngeom)

@@ -1,4 +1,4 @@
-"""Settings of MuJoCo's renderer: geoms, lights, effects and buffer sizes."""
+"""Settings of MuJoCo's renderer: drawn geoms, lights, effects and buffer sizes."""
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,22 +16,21 @@ _Flag = mujoco.mjtRndFlag
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity that replaces the model's lights."""
+    """A light at infinity, to replace the model's lights."""
 
-    direction: tuple[float, float, float]  # where its rays travel, any length
-    diffuse: float  # strength where it falls upright
+    direction: tuple[float, float, float]  # direction of its rays, of any length
+    diffuse: float  # strength on a perpendicular surface
     ambient: float = 0.0  # strength everywhere
 
 
 def checked_size(pixels: int) -> int:
-    """The number itself; `RenderError` where it is no integer from 1 to `MAX_SIDE`."""
+    """Return a valid side of a frame. Raise a RenderError if it is not an integer from 1 to `MAX_SIDE`."""
     if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
         raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
     return int(pixels)
 
 
 def visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
-    """Which geoms are drawn, and how."""
     option = mujoco.MjvOption()
     option.flags[:] = 0
     option.flags[mujoco.mjtVisFlag.mjVIS_STATIC] = 1
@@ -44,7 +43,7 @@ def visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
 
 @contextmanager
 def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
-    """Lend the model other buffer sizes, px, which a MuJoCo context only reads from its model."""
+    """Temporarily set the buffer sizes of a model, pixels, which a new MuJoCo context reads from there."""
     general, quality = model.vis.global_, model.vis.quality
     kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
     general.offwidth, general.offheight = size
@@ -56,7 +55,6 @@ def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size
 
 
 def set_flags(scene: Any, profile: RenderProfile) -> None:
-    """Set what of a profile is drawn, on a MuJoCo scene."""
     scene.flags[:] = 0
     scene.flags[_Flag.mjRND_CULL_FACE] = 1
     scene.flags[_Flag.mjRND_SHADOW] = profile.shadow_size > 0
@@ -65,7 +63,6 @@ def set_flags(scene: Any, profile: RenderProfile) -> None:
 
 
 def set_lights(scene: Any, lights: Sequence[DirectionalLight]) -> None:
-    """Replace the lights of a MuJoCo scene."""
     scene.nlight = len(lights)
     for target, light in zip(scene.lights, lights, strict=False):
         direction = np.array(light.direction, dtype=np.float64)

@@ -1,7 +1,7 @@
-"""Contact shadows: dark soft spots under free objects near the floor, where shadow maps would cost too much.
+"""Contact shadows: soft dark spots under free objects near the floor, where shadow maps would be too slow.
 
-They are flat boxes with a soft round texture, added to the scene for one frame as markers are. A spot is as wide as the
-object above it and fades as the object is lifted; it takes part in neither depth nor segmentation.
+A spot is a flat box with a soft round texture, added to the scene for one frame. It is as wide as the object above it,
+and fades as the object is lifted. It affects neither depth nor segmentation.
 """
 
 from typing import Any
@@ -13,20 +13,18 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import ViewVolume, outside
 from mjsim.render.markers import add_decorative_geom
 
-# Material of the house with a round texture whose alpha fades outwards; without it there are no spots.
+# Material of the house with a round texture whose alpha fades outwards. Without it there are no spots.
 MATERIAL = "shadow_round"
-# How far a spot reaches beyond the object, m: its texture is faint at the edge.
-BORDER = 0.05
-# Above the lowest point of the object, m: above the house's rugs and drawn shadows (at most 5 mm, docs/models.md) and
-# below the bottom of a plate (7 mm), which would look grey under it.
+BORDER = 0.05  # width of a spot beyond the object, since the texture is faint at the edge, m
+# Height of a spot above the object's lowest point, m. It is above rugs and drawn shadows (at most 5 mm, docs/models.md)
+# and below the bottom of a plate (7 mm), which would look grey under it.
 LIFT = 0.006
 _THICKNESS = 1e-4
-# Objects higher than this above the floor throw no spot, m.
-REACH = 0.3
+REACH = 0.3  # height of an object above which it has no spot, m
 
 
 class ContactShadows:
-    """The free bodies of a model with its floor at z = 0, and the spots under those `shown` (ngeom,)."""
+    """Contact shadows of the free bodies of a model. `shown` is a mask of drawn geoms, (ngeom,)."""
 
     def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
@@ -41,7 +39,7 @@ class ContactShadows:
 
     @property
     def count(self) -> int:
-        """How many geoms `add` appends at most."""
+        """Largest number of geoms that `add` appends."""
         return len(self._starts)
 
     def add(
@@ -52,12 +50,12 @@ class ContactShadows:
         positions: NDArray[np.float64],
         rotations: NDArray[np.float64],
     ) -> None:
-        """Append the spots that are in view to a scene with room for `count` more geoms."""
+        """Append the spots in view to a scene with space for `count` more geoms."""
         if not len(self._starts) or self._material < 0:
             return
         low, high = self._boxes(positions[self._geoms], rotations[self._geoms])
         middle, half = (low + high) / 2, (high - low) / 2
-        height = np.maximum(low[:, 2], 0.0)  # boxes of tilted meshes reach into the floor
+        height = np.maximum(low[:, 2], 0.0)  # boxes of tilted meshes extend into the floor
         strength = np.clip(1.0 - height / REACH, 0.0, 1.0)
         centres = np.column_stack((middle[:, :2], height + LIFT))
         radii = np.hypot(half[:, 0], half[:, 1]) + 2 * BORDER
@@ -69,7 +67,7 @@ class ContactShadows:
         self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float
     ) -> None:
         rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
-        # A box, because the rasteriser draws translucent planes (rugs, drawn shadows) before everything translucent.
+        # A box, because the rasteriser draws translucent planes, such as rugs, before everything translucent.
         box = mujoco.mjtGeom.mjGEOM_BOX
         geom = add_decorative_geom(scene, box, np.array([*half, _THICKNESS]), centre, rgba)
         geom.matid, geom.texcoord = self._material, 0
@@ -77,7 +75,7 @@ class ContactShadows:
     def _boxes(
         self, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lower and upper corners (n, 3) of the bodies' axis-aligned boxes."""
+        """Return the lower and upper corners (n, 3) of the bodies' axis-aligned boxes."""
         middle = positions + np.einsum("cij,cj->ci", rotations, self._bounds[:, :3])
         reach = np.einsum("cij,cj->ci", np.abs(rotations), self._bounds[:, 3:])
         lower = np.minimum.reduceat(middle - reach, self._starts, axis=0)

@@ -1,4 +1,4 @@
-"""Sensors: the named arrays that make up an observation."""
+"""Sensors: the named arrays of an observation."""
 
 from collections.abc import Sequence
 
@@ -32,9 +32,10 @@ BUNDLES = {"state": _VECTORS}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
-    """Sensors by name, by the name of a bundle, or given as they are; without repetition, in order.
+    """Resolve names of sensors and bundles, without repetition, in order.
 
-    `EnvironmentConfigError` where a name is unknown, none is given, or two different sensors share a name.
+    Raises:
+        EnvironmentConfigError: A name is unknown, there is no sensor, or different sensors have the same name.
     """
     if isinstance(observations, str):
         observations = (observations,)

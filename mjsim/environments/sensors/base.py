@@ -1,4 +1,4 @@
-"""A sensor: the spec of an array, and the function that reads it."""
+"""The base of sensors: the spec of an array, and the function that reads it."""
 
 import math
 from collections.abc import Callable
@@ -26,10 +26,10 @@ class CameraOptions:
     """Images of the eye camera.
 
     Attributes:
-        width: Image width, px.
-        height: Image height, px.
+        width: Image width, pixels.
+        height: Image height, pixels.
         profile: Render profile: `draft`, `fast` or `quality`.
-        far: Larger depths are clipped to this, m.
+        far: Distance to which depths are clipped, m.
 
     Raises:
         EnvironmentConfigError: A size or `far` is not positive.
@@ -53,17 +53,17 @@ class CameraOptions:
 class ObservationLayout:
     """Sizes and scales of an environment's observation arrays."""
 
-    slots: int  # rows of the arrays with a row per object; object i of the episode is in row i
+    slots: int  # number of rows of arrays with a row per object; object i of the episode is in row i
     categories: tuple[str, ...]  # category keys, in the catalogue's order
     receptacles: tuple[str, ...]  # receptacle keys, in the catalogue's order
     floor: Footprint  # obstacles and bounds of the floor
-    camera: CameraOptions  # images of the eye camera
-    max_speed: float  # velocities are given as a share of this, m/s
+    camera: CameraOptions
+    max_speed: float  # unit of velocities, m/s
     time_limit: float  # simulated time after which an episode is truncated, s
 
     @property
     def scale(self) -> float:
-        """Diagonal of the floor's bounds, m; offsets within the house are given as a share of it."""
+        """Unit of lengths: the diagonal of the floor's bounds, m."""
         x_min, y_min, x_max, y_max = self.floor.bounds
         return math.hypot(x_max - x_min, y_max - y_min)
 
@@ -76,19 +76,19 @@ class ObservationLayout:
         return np.vstack(outlines), np.vstack([np.roll(o, -1, axis=0) - o for o in outlines])
 
     def scaled(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Lengths, m, as shares of `scale`, clipped to [-1, 1]; any shape."""
+        """Convert lengths, m, of any shape to shares of `scale`, clipped to [-1, 1]."""
         return np.clip(lengths / self.scale, -1.0, 1.0).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class SensorInput:
-    """What sensors read: one control step of an episode.
+    """Input of sensors: one control step of an episode.
 
     Attributes:
         layout: Sizes and scales of the arrays.
         episode: The compiled episode.
-        state: The full state of the task.
-        images: Channels of `frame` that the sensors of the environment need.
+        state: The current state.
+        images: Channels of `frame` that the environment's sensors need.
     """
 
     layout: ObservationLayout
@@ -98,20 +98,20 @@ class SensorInput:
 
     @property
     def world(self) -> World:
-        """The simulation; treat it as read-only."""
+        """The simulation, which must not be changed."""
         return self.episode.world
 
     @property
     def start(self) -> StartPose:
-        """Pose of the person at the start of the episode."""
+        """Initial pose of the person."""
         return self.world.scene.episode.start
 
     @cached_property
     def frame(self) -> Frame:
-        """The first-person view, with all the channels in `images`; rendered on first use, once for all sensors.
+        """The first-person view with the channels in `images`, rendered at first use for all sensors.
 
         Raises:
-            RenderError: No OpenGL context could be made.
+            RenderError: No OpenGL context can be created.
         """
         camera = self.layout.camera
         renderer = self.episode.renderer(camera.width, camera.height, camera.profile)
@@ -119,12 +119,12 @@ class SensorInput:
         return renderer.frame(self.world.data, rgb=rgb, depth=depth, segmentation=segmentation)
 
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Floor points of the house in the body frame (forward, left), m, both of shape (k, 2)."""
+        """Transform floor points of the house (k, 2), m, to the body frame (forward, left), m, (k, 2)."""
         return rotated(points - self.state.position, -self.state.heading)
 
 
 def rotated(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Vectors of shape (..., 2) turned counter-clockwise by an angle, rad."""
+    """Rotate vectors (..., 2) counter-clockwise by an angle, rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(vectors @ np.array([[c, s], [-s, c]]))
 
@@ -135,9 +135,9 @@ class Sensor:
 
     Attributes:
         name: Key of the array in the observation.
-        declare: Layout -> spec of the array; the name of the spec is replaced.
-        read: Input -> a new array that conforms to the spec.
-        images: The channels of `SensorInput.frame` that it reads: `rgb`, `depth`, `segmentation`.
+        declare: Function from a layout to the spec of the array. The name of the spec is replaced.
+        read: Function from an input to a new array that conforms to the spec.
+        images: Channels of `SensorInput.frame` that it reads: `rgb`, `depth`, `segmentation`.
     """
 
     name: str
@@ -146,10 +146,10 @@ class Sensor:
     images: frozenset[str] = field(default_factory=frozenset)
 
     def spec(self, layout: ObservationLayout) -> specs.Array:
-        """Spec of the array in an environment with this layout."""
+        """Return the spec of the array for a layout."""
         return self.declare(layout).replace(name=self.name)
 
 
 def unit_spec(*shape: int, low: float = -1.0) -> specs.BoundedArray:
-    """Spec of a float32 array with values from `low` to 1."""
+    """Return the spec of a float32 array with values from `low` to 1."""
     return specs.BoundedArray(shape, np.float32, low, 1.0)

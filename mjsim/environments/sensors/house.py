@@ -1,4 +1,4 @@
-"""The house as the augmented-reality system knows it: map, distances to obstacles, receptacles."""
+"""Sensors of the house: map, distances to obstacles, receptacles."""
 
 import math
 
@@ -15,11 +15,11 @@ RANGE = 3.0  # m
 _SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
 
 
-def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uint8]:
-    """Grid (size, size) of 0 and 1, where obstacles are; row 0 is at the minimum y, column 0 at the minimum x."""
-    raster = np.zeros((size, size), np.uint8)
+def occupancy(layout: ObservationLayout) -> NDArray[np.uint8]:
+    """Return a grid (MAP_SIZE, MAP_SIZE) with 1 for obstacles. Row 0 is at the minimum y, column 0 at the minimum x."""
+    raster = np.zeros((MAP_SIZE, MAP_SIZE), np.uint8)
     x_min, y_min, x_max, y_max = layout.floor.bounds
-    cells = np.array([size / (x_max - x_min), size / (y_max - y_min)])
+    cells = np.array([MAP_SIZE / (x_max - x_min), MAP_SIZE / (y_max - y_min)])
     for outline in layout.floor.obstacles:
         # OpenCV puts the centre of the first pixel at 0.
         corners = (outline - (x_min, y_min)) * cells - 0.5
@@ -30,7 +30,7 @@ def occupancy(layout: ObservationLayout, size: int = MAP_SIZE) -> NDArray[np.uin
 def ray_distances(
     layout: ObservationLayout, position: NDArray[np.float64], heading: float
 ) -> NDArray[np.float64]:
-    """Distances (RAYS,), m, at most `RANGE`, from a floor point to obstacles, counter-clockwise from `heading`."""
+    """Return distances (RAYS,), m, up to `RANGE`, from a point to obstacles, counter-clockwise from `heading`."""
     start, edge = _edges_in_front(layout, position)
     angles = heading + 2 * math.pi * np.arange(RAYS) / RAYS
     ray = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -46,7 +46,7 @@ def ray_distances(
 def _edges_in_front(
     layout: ObservationLayout, position: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Edges within range that face `position`; outlines run counter-clockwise. Start points and vectors, m."""
+    """Return start points and vectors, m, of edges in range that face `position`. Outlines are counter-clockwise."""
     start, edge = layout.edges
     offset = start - position
     facing = edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0] > 0

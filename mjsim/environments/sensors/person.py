@@ -1,4 +1,4 @@
-"""The person's own state: pose, velocity, and the objects in the hands."""
+"""Sensors of the person: pose, velocity, and the objects in the hands."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The objects and what is left to do; one row per slot, zeros in slots without an object."""
+"""Sensors of the objects and of the remaining task, with one row per slot and zeros in unused slots."""
 
 from collections.abc import Sequence
 
@@ -53,9 +53,9 @@ def _categories(inputs: SensorInput) -> Array:
 
 
 def goals(inputs: SensorInput) -> NDArray[np.float64]:
-    """Where the next pick or place of each object happens: at the object while it is loose, else at its receptacle.
+    """Return the floor point, m, of the next pick or place of each object, shape (objects, 2).
 
-    Floor points, m, shape (objects, 2).
+    It is the object while it is loose, and otherwise its receptacle.
     """
     state, scene = inputs.state, inputs.world.scene
     bins = np.array([scene.receptacles[scene.episode.targets[n]].center[:2] for n in state.object_names])

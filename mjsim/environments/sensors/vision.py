@@ -1,4 +1,4 @@
-"""What the person sees: images from the eye, and the objects in view."""
+"""Sensors of the person's view: images from the eye, and the objects in view."""
 
 from typing import Any
 
@@ -10,18 +10,18 @@ from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInp
 from mjsim.house.sight.sight import visible_objects
 from mjsim.values.errors import EnvironmentConfigError
 
-# Numbers of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot.
+# Labels of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot
 MIN_LABEL = -1
 FIRST_RECEPTACLE = 2
 
 
 def first_object(layout: ObservationLayout) -> int:
-    """Label of the object in slot 0 in a segmentation, the same in every episode."""
+    """Return the label of the object in slot 0, which is the same in every episode."""
     return FIRST_RECEPTACLE + len(layout.receptacles)
 
 
 def visible_pixels(inputs: SensorInput) -> dict[str, int]:
-    """Object name -> number of its pixels in view, in the episode's order; objects without any are left out."""
+    """Count the pixels of each visible object, in the episode's order."""
     counts = inputs.episode.labels.pixel_counts(_rendered(inputs.frame.segmentation, "segmentation"))
     return {name: counts[name] for name in inputs.state.object_names if name in counts}
 
