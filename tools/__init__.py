@@ -1,4 +1,1 @@
-"""Tools of the checkout: the data of `models/`, the pictures of the documentation, generated pages and types.
-
-Serves maintainers; it is not part of the wheel.
-"""
+"""Maintainers' tools: models, pictures and generated pages of the documentation. Not part of the wheel."""

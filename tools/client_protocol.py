@@ -1,4 +1,4 @@
-"""The protocol of `mjsim play` for its client, made from the types of the server: `make client-protocol`."""
+"""Generator of the client's protocol module from the server's types: `make client-protocol`."""
 
 import enum
 import sys
@@ -32,7 +32,7 @@ _HEAD = """\
 
 
 def client_protocol() -> str:
-    """The whole module, JavaScript with JSDoc types."""
+    """Generate the module, JavaScript with JSDoc types."""
     lines = [_HEAD]
     lines += [f"/** @typedef {{{_literals(alias)}}} {name} */" for name, alias in ALIASES.items()]
     found: dict[str, str] = {}
@@ -65,7 +65,7 @@ def _literals(alias: Any) -> str:
 
 
 def _collect(info: inspect.Type, found: dict[str, str]) -> str:
-    """TypeScript for a type; the object types in it are added to `found` by name, as typedefs."""
+    """Convert a type to TypeScript, and add its object types to `found` as typedefs."""
     match info:
         case inspect.StructType(cls=cls, fields=fields, tag=tag):
             return _object(cls, fields, [] if tag is None else [f'type: "{tag}"'], found)
@@ -92,7 +92,7 @@ def _collect(info: inspect.Type, found: dict[str, str]) -> str:
 def _object(cls: type, fields: tuple[inspect.Field, ...], extra: list[str], found: dict[str, str]) -> str:
     name = "HudMessage" if cls.__module__ == "hud.state" and cls.__name__ == "Message" else cls.__name__
     if name not in found:
-        found[name] = ""  # it may contain itself
+        found[name] = ""  # the type may refer to itself
         sent = issubclass(cls, msgspec.Struct) and cls not in (
             *protocol.ToBrowser.__args__,
             protocol.FrameMessage,

@@ -1,4 +1,4 @@
-"""The data dictionary docs/data.md, made from the types that are written: `python -m tools.data_dictionary`."""
+"""Generator of the data dictionary docs/data.md from the recorded types: `python -m tools.data_dictionary`."""
 
 import inspect
 import sys
@@ -49,7 +49,7 @@ One JSON object per line, in order of time. Every line has
 
 
 def data_dictionary() -> str:
-    """The whole page, Markdown."""
+    """Generate the page in Markdown."""
     lines = [
         _HEAD,
         "| field | type | what |",
@@ -88,7 +88,6 @@ def _summary(kind: type[Any]) -> str:
 
 
 def main() -> None:
-    """Print the page."""
     sys.stdout.write(data_dictionary())
 
 

@@ -1,6 +1,6 @@
-"""Pairs of pictures: the same moment drawn by mjsim and by the client in a browser, and how far they are apart.
+"""Pairs of pictures of the same moment, drawn by mjsim and by the browser client, and their difference.
 
-`python -m tools.drawn_pairs docs/pictures/browser.webp` draws 21 of them and makes a contact sheet.
+`python -m tools.drawn_pairs docs/pictures/browser.webp` draws 21 pairs and makes a contact sheet.
 """
 
 import argparse
@@ -32,9 +32,9 @@ from mjsim.render import Renderer
 
 Image = NDArray[np.uint8]
 
-SIZE = (640, 480)  # of the pictures, px
+SIZE = (640, 480)  # width and height of pictures, pixels
 POSES_PER_ROOM = 3
-FREE = 1.0  # m that a person may walk straight ahead, so that few pictures show a bare wall
+FREE = 1.0  # free distance straight ahead of the person, so that few pictures show a bare wall, m
 PITCHES = (-0.5, 0.1)  # rad
 SITE = Path(__file__).parents[1] / "experiments" / "web" / "client" / "static"
 CHROMIUM = "/usr/bin/chromium"
@@ -64,20 +64,20 @@ const picture = (person, eye, markers) => {
 Object.assign(window, { world, start, picture, ready: true });
 """
 TYPES = {"": "text/html", ".js": "text/javascript", ".json": "application/json", ".webp": "image/webp"}
-CELL = (240, 180)  # of a picture on the contact sheet, px
+CELL = (240, 180)  # size of a picture on the contact sheet, pixels
 
 
 @dataclass(frozen=True)
 class View:
-    """A person in a house, and what the person sees.
+    """A person's pose in a house, and the markers in view.
 
     Attributes:
         room: Label of the room.
-        x: Of the person, m.
-        y: Of the person, m.
-        heading: From +x to +y, rad.
-        pitch: Of the head, up, rad.
-        markers: Markers that are shown.
+        x: Position of the person, m.
+        y: Position of the person, m.
+        heading: Yaw from +x to +y, rad.
+        pitch: Pitch of the head, positive upwards, rad.
+        markers: Displayed markers.
     """
 
     room: str
@@ -90,18 +90,17 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A view, drawn twice."""
+    """A view that was drawn twice."""
 
     view: View
     mjsim: Image  # (h, w, 3)
     browser: Image  # (h, w, 3)
     calls: int
     triangles: int
-    milliseconds: float  # of the main thread: the least of five frames, as others want the processor, too
+    milliseconds: float  # shortest time on the main thread of five frames, since other processes interfere
 
     @functools.cached_property
     def similarity(self) -> float:
-        """SSIM of the two."""
         return ssim(self.mjsim, self.browser)
 
 
@@ -119,15 +118,15 @@ def ssim(a: Image, b: Image) -> float:
     return float(np.mean(quality))
 
 
-def sampled_scene(objects: int = 24, seed: int = 0) -> Scene:
-    """An episode of the apartment with its visuals."""
+def sampled_scene() -> Scene:
+    """Compose an episode of the apartment with visual geoms."""
     catalogue = Catalogue.load("apartment")
-    return compose(sample_episode(catalogue, objects=objects, seed=seed), catalogue)
+    return compose(sample_episode(catalogue, objects=24, seed=0), catalogue)
 
 
-def views(scene: Scene, seed: int = 0) -> tuple[View, ...]:
-    """Places where one can walk, three a room; one of the three has markers."""
-    rng = np.random.default_rng(seed)
+def views(scene: Scene) -> tuple[View, ...]:
+    """Choose three walkable poses per room, one of them with markers."""
+    rng = np.random.default_rng(0)
     floor = navigable_floor(scene.catalogue)
     rooms = compiled_house(scene.catalogue).rooms
     chosen: dict[str, list[View]] = {key: [] for key in rooms.labels}
@@ -145,7 +144,7 @@ def views(scene: Scene, seed: int = 0) -> tuple[View, ...]:
 
 
 def _markers(scene: Scene, position: tuple[float, float], heading: float) -> tuple[Marker, ...]:
-    """A path straight ahead to a goal, and flagpoles over all objects, one of three of them through walls."""
+    """Make a path straight ahead to a goal, and flagpoles over all objects, every third of them seen through walls."""
     ahead = np.array([np.cos(heading), np.sin(heading)])
     path = np.array([np.array(position) + k * ahead for k in (0.0, 3.0)])
     crumbs = breadcrumbs(path, scene.person.eye_height, 0.6)
@@ -158,20 +157,20 @@ def _markers(scene: Scene, position: tuple[float, float], heading: float) -> tup
 
 
 class Moments:
-    """States of a scene, one a view."""
+    """States of a scene for views."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.data = mujoco.MjData(scene.model)
 
     def place(self, view: View) -> None:
-        """Put the person there."""
+        """Set the person's pose."""
         for joint, value in (("x", view.x), ("y", view.y), ("yaw", view.heading), ("pitch", view.pitch)):
             self.data.joint(PREFIX + joint).qpos[0] = value
         mujoco.mj_forward(self.scene.model, self.data)
 
     def things(self) -> dict[str, Any]:
-        """The objects as the client takes them."""
+        """Return the objects in the client's format."""
         found = {}
         for placed in self.scene.episode.objects:
             body = self.data.body(f"{placed.name}/object")
@@ -180,20 +179,20 @@ class Moments:
         return found
 
     def person(self, view: View) -> dict[str, Any]:
-        """The person as the client takes it."""
+        """Return the person in the client's format."""
         body = self.data.body(BODY)
         turn = body.xmat.reshape(3, 3)
         hands = [turn.T @ (self.data.body(f"{PREFIX}{hand}_hand").xpos - body.xpos) for hand in HANDS]
         return {"x": view.x, "y": view.y, "heading": view.heading, "hands": [h.tolist() for h in hands]}
 
     def eye(self, view: View) -> dict[str, Any]:
-        """The eye as the client takes it."""
+        """Return the eye in the client's format."""
         position = self.data.cam_xpos[self.scene.model.camera(EYE).id].tolist()
         return {"position": position, "heading": view.heading, "pitch": view.pitch}
 
 
 def draw_pairs(browser: Any, scene: Scene, chosen: Sequence[View]) -> list[Pair]:
-    """Draw views by mjsim and by a browser (of Playwright) that reads the files of a scene export."""
+    """Draw views with mjsim and with a Playwright browser that reads the files of a scene export."""
     moments = Moments(scene)
     files = export_scene(scene.catalogue)
     width, height = SIZE
@@ -219,14 +218,14 @@ def draw_pairs(browser: Any, scene: Scene, chosen: Sequence[View]) -> list[Pair]
 
 
 def decoded(png: bytes) -> Image:
-    """Pixels (h, w, 3) of an encoded picture."""
+    """Decode a picture to pixels (h, w, 3)."""
     pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
     return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
 @contextmanager
 def served(files: Mapping[str, bytes]) -> Iterator[str]:
-    """A page with a `World3D` and files by their paths; yields its address."""
+    """Serve a page with a `World3D`, and files by their paths. Yield its URL."""
 
     class Handler(http.server.SimpleHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -252,7 +251,7 @@ def served(files: Mapping[str, bytes]) -> Iterator[str]:
 
 
 def contact_sheet(pairs: Sequence[Pair]) -> Image:
-    """All pairs, a row a room: mjsim, browser, and their difference four times as strong around grey."""
+    """Arrange all pairs, one row per room: mjsim, browser, and their difference, amplified by four around grey."""
     rows = []
     for room, grouped in itertools.groupby(pairs, lambda pair: pair.view.room):
         group = list(grouped)
@@ -272,7 +271,6 @@ def _cells(pair: Pair) -> tuple[Image, Image, Image]:
 
 
 def main() -> None:
-    """Draw the pairs and write the contact sheet."""
     from playwright.sync_api import sync_playwright
 
     parser = argparse.ArgumentParser(description=__doc__)

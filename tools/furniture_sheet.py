@@ -28,18 +28,18 @@ from mjsim.house.catalogue.model_files import read_model
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose
 
-CELL = (112, 84)  # of a picture, px
+CELL = (112, 84)  # size of a picture, pixels
 COLUMNS = 18
-APART = 12.0  # m, between pieces
+APART = 12.0  # distance between pieces, m
 FOVY = math.radians(38)
+PIECES = 3  # per kind
 Image = NDArray[np.uint8]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the sheet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="image file to write")
-    parser.add_argument("--kinds", nargs="*", default=list(KINDS), help="only these")
+    parser.add_argument("--kinds", nargs="*", default=list(KINDS), help="kinds to draw (default: all)")
     options = parser.parse_args(arguments)
     cells = [cell for kind in options.kinds for cell in pictures(kind)]
     while len(cells) % COLUMNS:
@@ -48,14 +48,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cv2.imwrite(str(options.out), np.vstack(rows)[..., ::-1], [cv2.IMWRITE_WEBP_QUALITY, 75])
 
 
-def pictures(kind: str, count: int = 3) -> Iterator[Image]:
-    """Pieces of a kind, each in the colours of another home, (height, width, 3), RGB."""
-    room = Room("living_room", "living_room", kind, Rectangle(0.0, 0.0, APART * count, 9.0))
+def pictures(kind: str) -> Iterator[Image]:
+    """Draw three pieces of a kind of furniture, (height, width, 3), RGB."""
+    room = Room("living_room", "living_room", kind, Rectangle(0.0, 0.0, APART * PIECES, 9.0))
     pieces: list[tuple[Piece, Place]] = []
     placements: list[Placement] = []
-    seed = sum(map(ord, kind))  # all pieces of a sheet share its materials: one home
+    seed = sum(map(ord, kind))  # the pieces of a kind have the materials of one home
     look = draw_look(draw_palette(seed), stream(seed, "look"))
-    for i in range(count):
+    for i in range(PIECES):
         piece = KINDS[kind].make(stream(seed, "sheet", kind, str(i)), look)
         x = APART * (i + 0.5)
         place = Place(x, 0.0 if piece.stands != "ceiling" else 1.0, 0, "south", x)
@@ -82,7 +82,7 @@ def pictures(kind: str, count: int = 3) -> Iterator[Image]:
 
 
 def _camera(piece: Piece, place: Place) -> CameraPose:
-    """From above its right side."""
+    """Look from above the right side of a piece."""
     w, d, h = piece.size
     low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling", "recess") else 0.0
     middle = np.array([place.x, place.y + (d / 2 if piece.stands != "ceiling" else 0.0), (low + h) / 2])

@@ -1,4 +1,4 @@
-"""The pictures of the documentation: what a person sees under each condition, taken from real trials."""
+"""Pictures of the documentation: a person's view under each assistance condition, taken from real trials."""
 
 import contextlib
 import math
@@ -35,12 +35,12 @@ from mjsim.world.world import World
 
 Image = NDArray[np.uint8]
 
-# Distances to an object, m: nearer ones are below the view of a person looking straight ahead.
+# Distances to an object, m. Nearer objects are below the view of a person who looks straight ahead.
 APPROACHING = (2.3, 3.3)
 AT_A_BIN = (0.0, 2.2)  # distances to the middle of a bin, m
-MIN_WALK = 1.0  # s; before that, objects near the start have not been approached
+MIN_WALK = 1.0  # time after which objects near the start have been approached, s
 FACING = math.radians(20.0)
-MAX_TIME = 240.0  # simulated time within which every picture must have been taken, s
+MAX_TIME = 240.0  # simulated time within which every picture must be taken, s
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +48,9 @@ class Snapshot:
     """A moment of a trial.
 
     Attributes:
-        world: The physics.
-        observation: What there is.
-        targets: Object name -> middle of its bin, m, shape (3,).
+        world: The world.
+        observation: The state.
+        targets: Object name -> middle of its bin, m, (3,).
     """
 
     world: World
@@ -58,17 +58,16 @@ class Snapshot:
     targets: Mapping[str, NDArray[np.float64]]
 
     def ahead(self, place: NDArray[np.float64], distance: tuple[float, float]) -> bool:
-        """Whether the person faces a place, m, shape (2,) or (3,), within a range of distances, m."""
+        """Return True if the person faces a place (2,) or (3,), m, at a distance within a range, m."""
         offset = place[:2] - self.observation.position
         turn = math.remainder(math.atan2(offset[1], offset[0]) - self.observation.heading, math.tau)
         return distance[0] < float(np.hypot(*offset)) < distance[1] and abs(turn) < FACING
 
     def walking(self) -> bool:
-        """Whether the person walks."""
         return float(np.linalg.norm(self.observation.velocity)) > 0.5
 
     def visible(self) -> tuple[str, ...]:
-        """Objects in view."""
+        """Return the objects in view."""
         seen = self.observation
         return visible_objects(self.world.scene, self.world.data, seen.eye, seen.heading, seen.pitch)
 
@@ -78,13 +77,7 @@ Trigger = Callable[[Snapshot], bool]
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture of a trial, taken at the first snapshot that triggers it.
-
-    Attributes:
-        name: Of the picture.
-        trial: The trial.
-        trigger: Whether to take it at a snapshot.
-    """
+    """A picture of a trial, taken at the first snapshot for which `trigger` is true."""
 
     name: str
     trial: TrialConfig
@@ -92,11 +85,11 @@ class Shot:
 
 
 class _Done(LeaveSession):
-    """All pictures are taken."""
+    """Raised when all pictures are taken."""
 
 
 class _ShotTaker:
-    """A viewer that takes pictures when they are due."""
+    """Viewer that takes pictures when their triggers are true."""
 
     def __init__(
         self, renderer: FirstPersonRenderer, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
@@ -107,11 +100,9 @@ class _ShotTaker:
         self.taken: dict[str, Image] = {}
 
     def camera(self, world: World) -> CameraView:
-        """The eye camera."""
         return self._renderer.camera_view(world.data)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Take the pictures that are due."""
         snapshot = Snapshot(world, observation, self._targets)
         due = [shot for shot in self._open if shot.trigger(snapshot)]
         if due:
@@ -123,12 +114,12 @@ class _ShotTaker:
 
 
 def after(seconds: float) -> Trigger:
-    """The first moment from a simulated time on, s."""
+    """Trigger from a simulated time on, s."""
     return lambda snapshot: snapshot.observation.time >= seconds
 
 
 def approaching(snapshot: Snapshot) -> bool:
-    """Hands not full, and an object in view ahead."""
+    """Trigger if a hand is free, and an object in view is ahead."""
     seen = snapshot.observation
     if len(seen.carried) > 1 or seen.busy or seen.time < MIN_WALK:
         return False
@@ -138,12 +129,12 @@ def approaching(snapshot: Snapshot) -> bool:
 
 
 def carrying_two(snapshot: Snapshot) -> bool:
-    """Both hands full, walking."""
+    """Trigger if the person walks with both hands full."""
     return len(snapshot.observation.carried) == 2 and not snapshot.observation.busy and snapshot.walking()
 
 
 def at_a_bin(snapshot: Snapshot) -> bool:
-    """The bin of something carried is close ahead."""
+    """Trigger if the bin of a carried object is close ahead."""
     return any(snapshot.ahead(snapshot.targets[name], AT_A_BIN) for name in snapshot.observation.carried)
 
 
@@ -156,13 +147,13 @@ SITUATIONS: Mapping[str, tuple[str, Trigger]] = {
 
 
 def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
-    """Run the trials of `shots` as far as needed.
+    """Run trials until all pictures are taken.
 
     Returns:
-        Frames by the names of the shots, uint8 RGB, shape (height, width, 3).
+        Frames by the names of the shots, uint8 RGB, (height, width, 3).
 
     Raises:
-        RecordError: A picture was not due within four simulated minutes.
+        RecordError: A picture could not be taken within four simulated minutes.
         ExperimentError, MjsimError: A trial cannot be run, or nothing can be rendered.
     """
     taken: dict[str, Image] = {}
@@ -179,9 +170,7 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
                 session.run()
         missing = [shot.name for shot in mine if shot.name not in taker.taken]
         if missing:
-            raise RecordError(
-                f"no moment for the pictures {missing} came within {MAX_TIME:g} s; take another seed"
-            )
+            raise RecordError(f"no moment for the pictures {missing} within {MAX_TIME:g} s; use another seed")
         taken |= taker.taken
     return taken
 
@@ -189,15 +178,12 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
 def contact_sheet(
     conditions: Sequence[str], frames: Mapping[tuple[str, str], Image], width: int = 480
 ) -> Image:
-    """Conditions below each other, situations side by side, with captions.
+    """Arrange frames by condition (rows) and situation (columns), with captions, as RGB, uint8, (height, width, 3).
 
     Args:
-        conditions: Names, from the top.
-        frames: Frame by condition and situation.
-        width: Of one picture on the sheet, px.
-
-    Returns:
-        RGB, uint8, shape (height, width, 3).
+        conditions: Names of the conditions, from top to bottom.
+        frames: Frames by condition and situation.
+        width: Width of a picture on the sheet, pixels.
     """
     margin, caption = width // 40, width // 12
     height = round(width * 3 / 4)
@@ -220,13 +206,13 @@ def contact_sheet(
 
 
 def save_png(path: Path, rgb: Image) -> None:
-    """Write an RGB image of shape (height, width, 3), whole or not at all."""
+    """Write an RGB image (height, width, 3) atomically."""
     with replacing(path) as temporary:
         cv2.imwrite(str(temporary), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 def _write(image: Image, text: str, x: int, y: int, size: int) -> None:
-    """Dark text with its middle at column `x`, row `y`."""
+    """Draw dark text centred at column `x` and row `y`."""
     face = cv2.FontFace("sans")
     left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), face, size, 600)
     cv2.putText(image, text, (x - (left + width) // 2, y + size // 3), (30, 34, 40), face, size, 600)
@@ -241,23 +227,23 @@ SHOTS = (
     Shot("none", TrialConfig(objects=12, assistance="none", seed=0), after(6.0)),
 )
 SHEET = "contact_sheet.png"
-WALK = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity="event")  # of the floor plan
+WALK = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity="event")  # trial of the floor plan
 
 
 def make_gallery(
     out: Path, film: FilmConfig, *, replace: bool, sheet_only: bool, frames: bool
 ) -> Iterator[Path]:
-    """Write the pictures of the documentation; yields the path of each.
+    """Write the pictures of the documentation, and yield their paths.
 
     Args:
         out: Folder of the pictures.
         film: Size and profile of the pictures of the conditions.
-        replace: Whether pictures that exist are replaced.
-        sheet_only: Make only the contact sheet.
-        frames: Also write the frames of the contact sheet, in full size.
+        replace: True to replace existing pictures.
+        sheet_only: True to make only the contact sheet.
+        frames: True to also write the frames of the contact sheet, in full size.
 
     Raises:
-        RecordError: A picture exists already, or is not due within four simulated minutes.
+        RecordError: A picture exists already, or could not be taken within four simulated minutes.
         RenderError: Nothing can be drawn.
     """
     shots = () if sheet_only else SHOTS
@@ -288,5 +274,5 @@ def make_gallery(
 
 
 def _fail(warning: str) -> None:
-    """The floor plan is the only thing that the gallery needs of its trial."""
+    # A warning is an error, because the gallery needs the floor plan of the trial.
     raise RenderError(warning)

@@ -15,7 +15,6 @@ from above with 6, 12, 18 and 24 objects, and the shortest way to tidy it in the
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "gallery", run, description=DESCRIPTION)
     parser.add_argument(
         "what", nargs="?", choices=("pictures", "levels"), default="pictures", help="what to draw"
@@ -35,7 +34,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Take the pictures."""
     from experiments.cli.terminal import error_console
     from tools.gallery import make_gallery
     from tools.levels import make_levels

@@ -18,7 +18,6 @@ FIRST_SEED = 7
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write the sheet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path, help="image file to write")
     out = parser.parse_args(arguments).out

@@ -1,4 +1,4 @@
-"""The paper's figure of its four levels of difficulty."""
+"""Figure of the paper's four levels of difficulty."""
 
 import contextlib
 from pathlib import Path
@@ -16,7 +16,7 @@ LEVELS, LEVEL_OBJECTS = "levels.png", (6, 12, 18, 24)
 
 
 def make_levels(out: Path, seed: int, *, replace: bool) -> Path:
-    """Draw the paper's four levels of one house, with the shortest way in the first; returns the path of the picture.
+    """Draw the four levels of a house, with the shortest route in the first. Return the path of the picture.
 
     Raises:
         RecordError: The picture exists already.

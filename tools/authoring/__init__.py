@@ -1,1 +1,1 @@
-"""Scripts that author the data under ``models/``; nothing here runs with the simulator."""
+"""Scripts that generate the textures and meshes of `models/`. The simulator does not use them."""

@@ -1,4 +1,4 @@
-"""Regenerate the procedural textures and object meshes: ``python -m authoring [models folder]``."""
+"""Generator of the procedural textures and the meshes of objects: `python -m tools.authoring [models folder]`."""
 
 import argparse
 import sys
@@ -10,8 +10,8 @@ from tools.authoring.textures import build_textures
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write all generated assets and report how many there are; return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m authoring", description=__doc__)
+    """Write all generated files and report their number. Return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m tools.authoring", description=__doc__)
     default = Path(__file__).resolve().parents[2] / "models"
     parser.add_argument("models", nargs="?", type=Path, default=default, help="models folder (%(default)s)")
     models: Path = parser.parse_args(arguments).models

@@ -1,6 +1,6 @@
-"""Pictures in the apartment, all procedural: the view outside, framed art, screens and book spines.
+"""Procedural pictures of the apartment: the view outside, framed art, screens and book spines.
 
-Each painter takes a generator and returns an RGB image, floats in [0, 1].
+Each painter takes a random generator and returns an RGB image of floats in [0, 1].
 """
 
 import cv2
@@ -10,7 +10,7 @@ from tools.authoring.patterns import Floats, blend, disc, flat, grid, noise, pol
 
 
 def garden(rng: np.random.Generator) -> Floats:
-    """The view from a window: sky with clouds, trees, a hedge and a lawn. Periodic along x."""
+    """View from a window: sky with clouds, trees, a hedge and a lawn. Periodic along x."""
     shape = (256, 512)
     _, y = grid(shape)
     image = ramp(y, [(0.0, "7fb6e6"), (0.5, "d8ecf7"), (1.0, "e8f3f8")])
@@ -103,7 +103,7 @@ def poster_rocket(rng: np.random.Generator) -> Floats:
 
 
 def _panel(image: Floats, box: tuple[float, float, float, float], code: str) -> Floats:
-    """Fill the rectangle (left, top, right, bottom), in fractions of the image."""
+    """Fill a rectangle (left, top, right, bottom), in fractions of the image."""
     left, top, right, bottom = box
     corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
     return polygon(image, code, corners)
@@ -200,7 +200,7 @@ def clock_face(rng: np.random.Generator) -> Floats:  # noqa: ARG001
 
 
 def mirror(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """A pale gradient with two slanted highlights, which reads as a mirror without reflecting."""
+    """A pale gradient with two slanted highlights, which looks like a mirror without reflections."""
     shape = (128, 128)
     x, y = grid(shape)
     image = ramp((x + y) / 2, [(0.0, "cfdde3"), (0.5, "aebfc8"), (1.0, "c7d3d8")])
@@ -211,7 +211,7 @@ def mirror(rng: np.random.Generator) -> Floats:  # noqa: ARG001
 
 
 def pinboard(rng: np.random.Generator) -> Floats:
-    """Cork with notes, a photograph and a calendar."""
+    """A cork board with notes, a photograph and a calendar."""
     shape = (192, 288)
     image = flat(shape, "b98a58") * (1 + 0.05 * noise(rng, shape, roll_off=0.3))[..., None]
     notes = (

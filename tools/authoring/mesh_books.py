@@ -1,4 +1,4 @@
-"""Meshes of the books and magazines."""
+"""Meshes of books and magazines."""
 
 import math
 
@@ -9,7 +9,7 @@ from tools.authoring.mesh_tools import Floats, LabelledMesh, arc, from_above, jo
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface; spines run along y."""
+    """Return the surfaces by mesh name, with spines along y."""
     return {
         "hardback_cover": slab(0.15, 0.2, 0.0035).moved((0, 0, 0.0365)),
         "hardback_spine": _spine(0.04, 0.2, 0.012).moved((-0.066, 0, 0.02)),
@@ -22,14 +22,14 @@ def meshes() -> dict[str, LabelledMesh]:
 
 
 def _spine(height: float, length: float, bulge: float) -> LabelledMesh:
-    """A rounded back: half an ellipse extruded along y, flat side towards +x."""
+    """A rounded spine: half an ellipse extruded along y, with the flat side towards +x."""
     curve = arc(height / 2, 0.5 * math.pi, 1.5 * math.pi, 9)
     outline = Polygon(np.column_stack([curve[:, 0] * bulge / (height / 2), curve[:, 1]]))
     return ridge(outline, length)
 
 
 def _curled() -> LabelledMesh:
-    """A thin magazine whose free edge lifts a little."""
+    """A thin magazine with a slightly lifted free edge."""
     x, y = np.meshgrid(np.linspace(-0.075, 0.075, 9), np.array([-0.105, 0.105]), indexing="ij")
     lift = 0.007 * np.clip((x + 0.02) / 0.095, 0, 1) ** 2
     top = np.stack([x, y, 0.011 + lift], axis=-1)
@@ -38,7 +38,7 @@ def _curled() -> LabelledMesh:
 
 
 def _open_pages() -> LabelledMesh:
-    """Two arched halves; the gutter runs along x, the halves lie to either side in y."""
+    """Two arched halves on either side of a gutter along x."""
     y = np.concatenate([np.linspace(-0.12, -0.004, 9), [0.0], np.linspace(0.004, 0.12, 9)])
     arch = 0.012 + 0.02 * np.sqrt(np.clip(np.abs(y) / 0.03, 0, 1)) * (1.0 - 0.55 * np.abs(y) / 0.12)
     x = np.array([-0.072, 0.072])
@@ -49,7 +49,7 @@ def _open_pages() -> LabelledMesh:
 
 
 def _closed(top: Floats, bottom: Floats) -> LabelledMesh:
-    """Close two grids (rows, columns, 3) into a solid; the texture lies on the upper one."""
+    """Close two grids (rows, columns, 3) into a solid with the texture on the upper one."""
     upper, lower = from_above(sheet(top)), sheet(bottom)
     lower = LabelledMesh(lower.vertices, lower.faces[:, ::-1])
 

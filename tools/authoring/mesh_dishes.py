@@ -1,4 +1,4 @@
-"""Meshes of the dishes."""
+"""Meshes of dishes."""
 
 import math
 
@@ -8,7 +8,6 @@ from tools.authoring.mesh_tools import LabelledMesh, arc, join, lathe, mm, tube
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface."""
     return {**_mug(), **_bowl(), **_plate(), **_pot(), **_teapot()}
 
 
@@ -17,7 +16,7 @@ def _mug() -> dict[str, LabelledMesh]:
     lining = lathe(mm("41 100, 40 20, 34 10, 0 10"))
     bow = arc(0.03, -0.62 * math.pi, 0.62 * math.pi, 11)
     handle = tube(np.column_stack([0.052 + bow[:, 0], np.zeros(len(bow)), 0.052 + bow[:, 1]]), 0.0075)
-    shift = (-0.018, 0, 0)  # the footprint's centre lies between cup and handle
+    shift = (-0.018, 0, 0)  # moves the centre of the footprint, between cup and handle, to the origin
     return {"mug_wall": join([wall, handle]).moved(shift), "mug_lining": lining.moved(shift)}
 
 

@@ -1,4 +1,4 @@
-"""Small drawn textures for the object and receptacle meshes: covers, labels, keys, weave. RGB, row 0 on top."""
+"""Small textures for the meshes of objects and receptacles: covers, labels, keys, weave. RGB, top row first."""
 
 import functools
 from collections.abc import Callable
@@ -14,13 +14,13 @@ WHITE, INK = (250, 250, 245), (25, 25, 30)
 
 
 def object_textures() -> dict[str, Picture]:
-    """Texture name -> RGB picture, shape (128, 128, 3)."""
+    """Return RGB pictures (128, 128, 3) by texture name."""
     covers = (_hardback, _paperback, _magazine, _pages, _comic, _towel, _denim, _calculator, _notebook)
     return _painted(*covers, _can, _carton, _newspaper, _jar)
 
 
 def receptacle_textures() -> dict[str, Picture]:
-    """Texture name -> RGB picture, shape (128, 128, 3), or (64, 128, 3) for signs twice as wide as high."""
+    """Return RGB pictures (128, 128, 3) by texture name, and (64, 128, 3) for wide signs."""
     return _painted(_wicker, _toys_sign, _office_sign)
 
 
@@ -31,7 +31,7 @@ def _painted(*painters: Callable[[], Picture]) -> dict[str, Picture]:
 def _on(
     colour: Colour, rows: slice | None = None
 ) -> Callable[[Callable[[Picture], None]], Callable[[], Picture]]:
-    """Let a painter begin with a blank of this colour; keep only some rows, at half the height."""
+    """Decorate a painter so that it starts with a uniform colour. With `rows`, keep only these at half the height."""
 
     def decorate(paint: Callable[[Picture], None]) -> Callable[[], Picture]:
         @functools.wraps(paint)
@@ -50,7 +50,7 @@ def _on(
 def _write(
     picture: Picture, text: str, x: int, y: int, scale: float, colour: Colour, weight: int = 2
 ) -> None:
-    """Text centred at column `x` with its base at row `y`."""
+    """Draw text centred at column `x` with its base line at row `y`."""
     (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, weight)
     at = (x - width // 2, y)
     cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, weight, cv2.LINE_AA)
@@ -60,8 +60,8 @@ def _box(picture: Picture, x0: int, y0: int, x1: int, y1: int, colour: Colour, w
     cv2.rectangle(picture, (x0, y0), (x1, y1), colour, weight)
 
 
-def _disc(picture: Picture, x: int, y: int, radius: int, colour: Colour, weight: int = -1) -> None:
-    cv2.circle(picture, (x, y), radius, colour, weight, cv2.LINE_AA)
+def _disc(picture: Picture, x: int, y: int, radius: int, colour: Colour) -> None:
+    cv2.circle(picture, (x, y), radius, colour, -1, cv2.LINE_AA)
 
 
 @_on((150, 18, 28))
@@ -196,7 +196,7 @@ def _jar(p: Picture) -> None:
 
 
 def _wicker() -> Picture:
-    """A basket weave that tiles: strands over and under, shaded towards their ends."""
+    """A basket weave that tiles, with strands shaded towards their ends."""
     t = np.arange(SIDE)
     cell = 32
     across = (np.add.outer(t // cell, t // cell) % 2).astype(bool)

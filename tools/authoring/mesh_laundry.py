@@ -1,4 +1,4 @@
-"""Meshes of the laundry."""
+"""Meshes of laundry."""
 
 import math
 
@@ -21,12 +21,11 @@ from tools.authoring.mesh_tools import (
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface."""
     return {**_socks(), **_t_shirt(), "towel": _towel(), "jeans": _jeans(), **_cap()}
 
 
 def _socks() -> dict[str, LabelledMesh]:
-    """Two socks side by side, one half on the other; legs along y."""
+    """Two overlapping socks side by side, legs along y."""
     leg = Polygon(mm("-28 -20, -28 110, 28 110, 28 -50, 0 -85"))
     foot = Polygon(mm("-28 -20, 0 -85, 28 -50, -30 0, -100 -30, -100 -85"))
     sock = leg.union(foot.buffer(0.002)).union(Point(-0.085, -0.058).buffer(0.03, quad_segs=4))
@@ -52,7 +51,7 @@ def _socks() -> dict[str, LabelledMesh]:
 
 
 def _t_shirt() -> dict[str, LabelledMesh]:
-    """A small T-shirt spread out flat, collar at +y."""
+    """A small T-shirt, spread out flat, collar at +y."""
     half = mm("40 125, 85 112, 152 35, 112 0, 68 52, 74 -130")
     outline = Polygon([*half, *((-x, y) for x, y in reversed(half))])
     shirt = outline.difference(affinity.scale(Point(0, 0.122).buffer(0.036, quad_segs=4), 1.0, 0.7))
@@ -75,7 +74,7 @@ def _t_shirt() -> dict[str, LabelledMesh]:
 
 
 def _rumpled(surface: LabelledMesh, depth: float) -> LabelledMesh:
-    """Soft waves in the upper side."""
+    """Add soft waves to the upper side."""
 
     def rule(v: Floats) -> Floats:
         wave = np.sin(31 * v[:, 0] + 17 * v[:, 1]) + np.sin(43 * v[:, 1] - 13 * v[:, 0] + 1)
@@ -87,9 +86,9 @@ def _rumpled(surface: LabelledMesh, depth: float) -> LabelledMesh:
 
 
 def _towel() -> LabelledMesh:
-    """A dropped towel: a heap with radial folds; the texture runs along the cloth."""
+    """A dropped towel: a heap with radial folds. The texture follows the cloth."""
     u, v = np.meshgrid(np.linspace(-1, 1, 23), np.linspace(-1, 1, 23), indexing="ij")
-    # Square cloth to round heap, drawn in unevenly so that the hem meanders.
+    # Map the square cloth to a round heap, irregularly so that the hem meanders.
     radius = np.maximum(np.abs(u), np.abs(v))
     angle = np.arctan2(v, u)
     reach = 0.125 * (1 + 0.1 * np.sin(3 * angle + 1) + 0.07 * np.sin(5 * angle))
@@ -106,7 +105,7 @@ def _towel() -> LabelledMesh:
 
 
 def _jeans() -> LabelledMesh:
-    """Jeans spread out flat, waist at +y."""
+    """Jeans, spread out flat, waist at +y."""
     half = mm("80 125, 95 50, 140 -105, 50 -125")
     outline = Polygon([*half, (0.0, 0.02), *((-x, y) for x, y in reversed(half))])
     return _rumpled(cushion(outline, 0.026, 0.006), 0.003)

@@ -1,4 +1,4 @@
-"""Meshes of the receptacles: wires, handles, the symbol on the recycling bin, and books that furnish a shelf."""
+"""Meshes of receptacles: wires, handles, the recycling symbol, and books on a shelf."""
 
 import math
 
@@ -14,7 +14,6 @@ WIRE = 0.0035  # radius of the dish rack's wires, m
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface."""
     books = {f"shelf_books_{k}": books for k, books in enumerate(_shelf_books())}
     return {
         "dish_rack": _dish_rack(0.472, 0.464, 0.06, 0.196),
@@ -27,7 +26,7 @@ def meshes() -> dict[str, LabelledMesh]:
 
 
 def _dish_rack(width: float, depth: float, low: float, high: float) -> LabelledMesh:
-    """Upright wires around a rectangle between the heights `low` and `high`, with two rails."""
+    """Upright wires around a rectangle between two heights, with two rails."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
     bars = []
@@ -42,7 +41,7 @@ def _dish_rack(width: float, depth: float, low: float, high: float) -> LabelledM
 
 
 def _recycling_symbol(size: float) -> LabelledMesh:
-    """Three chasing arrows of about `size` in height around the origin, extruded 4 mm."""
+    """Three chasing arrows of a total height `size` around the origin, extruded by 4 mm."""
     path = np.array([[0.16, -0.3], [-0.32, -0.3], [-0.45, -0.1], [-0.3, 0.13]])
     band = LineString(path).buffer(0.085, cap_style="flat", join_style="bevel")
     ahead = (path[-1] - path[-2]) / math.hypot(*(path[-1] - path[-2]))
@@ -51,19 +50,19 @@ def _recycling_symbol(size: float) -> LabelledMesh:
     arrow = unary_union([band, head])
     arrows = [affinity.rotate(arrow, 120 * k, origin=(0, 0)) for k in range(3)]
     gaps = [affinity.rotate(head.buffer(0.035), 120 * k, origin=(0, 0)) for k in range(3)]
-    # Each arrow stops short of the head that points at its tail.
+    # Each arrow ends before the head of the arrow behind it.
     drawing = [a.difference(gaps[(k + 1) % 3]).difference(gaps[(k + 2) % 3]) for k, a in enumerate(arrows)]
     return join([extrude(affinity.scale(a, size, size, origin=(0, 0)), 0.004) for a in drawing])
 
 
 def _handle() -> LabelledMesh:
-    """A bow handle in the x-z plane, ends pointing up at z = 0."""
+    """A bow handle in the x-z plane, with its ends at z = 0."""
     bow = arc(0.06, math.pi, 2 * math.pi, 9, 0.8)
     return tube(np.column_stack([bow[:, 0], np.zeros(9), bow[:, 1]]), 0.009, 6)
 
 
 def _shelf_books() -> list[LabelledMesh]:
-    """Standing books on two shelves of the bookcase, in four colours; spines face -y."""
+    """Upright books on two shelves of the bookcase, in four colours, spines towards -y."""
     widths = [0.032, 0.024, 0.04, 0.028, 0.036, 0.022, 0.045, 0.03]
     heights = [0.2, 0.215, 0.18, 0.205, 0.19, 0.222]
     colours: list[list[LabelledMesh]] = [[], [], [], []]

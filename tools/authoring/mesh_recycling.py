@@ -1,4 +1,4 @@
-"""Meshes of the recycling."""
+"""Meshes of recycling."""
 
 import math
 
@@ -10,7 +10,6 @@ from tools.authoring.mesh_tools import LabelledMesh, extrude, join, lathe, mm, r
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface."""
     return {**_bottle(), **_can(), **_carton(), **_jar(), "newspaper": _newspaper()}
 
 
@@ -32,7 +31,7 @@ def _can() -> dict[str, LabelledMesh]:
 
 
 def _carton() -> dict[str, LabelledMesh]:
-    """A gable-topped carton, ridge along y; each side carries the whole label."""
+    """A gable-topped carton, ridge along y. Each side has the whole label."""
     w, shoulder, top, fin = 0.046, 0.155, 0.2, 0.222
     sides = []
     for k in range(4):
@@ -60,7 +59,7 @@ def _jar() -> dict[str, LabelledMesh]:
 
 
 def _newspaper() -> LabelledMesh:
-    """Folded once: two layers and a round fold at -y."""
+    """A newspaper, folded once: two layers and a round fold at -y."""
     sheets = [
         slab(0.17, 0.21, 0.011).moved((0.003, 0.004, 0)),
         slab(0.17, 0.21, 0.0105).moved((0, 0, 0.0115)),

@@ -1,4 +1,4 @@
-"""Building blocks of the authored meshes: lathe, tube, extrusion, cushion, slab, and a compact OBJ writer."""
+"""Mesh primitives: lathe, tube, extrusion, cushion, slab, and a compact OBJ writer."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,17 +15,17 @@ from mjsim.support.files import write_text_atomically
 from mjsim.values.errors import AssetError
 
 Floats = NDArray[np.float64]
-CREASE = math.radians(40.0)  # faces that meet at a sharper angle get separate normals
+CREASE = math.radians(40.0)  # faces that meet at a sharper angle have separate normals
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledMesh:
-    """A triangle mesh, in m.
+    """A triangle mesh.
 
     Attributes:
-        vertices: Shape (n, 3).
-        faces: Vertex indices, counter-clockwise seen from outside, shape (m, 3).
-        uv: Texture coordinates per vertex, shape (n, 2), or None.
+        vertices: m, (n, 3).
+        faces: Vertex indices, counter-clockwise from outside, (m, 3).
+        uv: Texture coordinates of each vertex, (n, 2), or None.
     """
 
     vertices: Floats
@@ -33,32 +33,32 @@ class LabelledMesh:
     uv: Floats | None = None
 
     def moved(self, offset: ArrayLike) -> "LabelledMesh":
-        """The same surface, shifted by `offset` (m, shape (3,))."""
+        """Shift the surface by an offset (3,), m."""
         return LabelledMesh(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
 
     def turned(self, angle: float) -> "LabelledMesh":
-        """The same surface, turned about z by `angle` rad."""
+        """Rotate the surface about z by an angle, rad."""
         c, s = math.cos(angle), math.sin(angle)
         return LabelledMesh(
             self.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), self.faces, self.uv
         )
 
     def lengthwise(self) -> "LabelledMesh":
-        """Axes x, y, z become y, z, x: an extruded drawing then stands up, its thickness across."""
+        """Permute axes x, y, z to y, z, x. An extruded drawing then stands upright, with its thickness along x."""
         return LabelledMesh(self.vertices[:, [2, 0, 1]], self.faces, self.uv)
 
     def bent(self, rule: Callable[[Floats], Floats]) -> "LabelledMesh":
-        """The same surface with its vertices (n, 3) mapped by `rule`."""
+        """Map the vertices (n, 3) with a function."""
         return LabelledMesh(rule(self.vertices), self.faces, self.uv)
 
 
 def mm(points: str) -> Floats:
-    """Points given in mm as `x y, x y, ...`; in m, shape (n, 2)."""
+    """Parse points in mm, `x y, x y, ...`, to an array in m, (n, 2)."""
     return np.array([[float(value) / 1000 for value in point.split()] for point in points.split(",")])
 
 
 def join(surfaces: Sequence[LabelledMesh]) -> LabelledMesh:
-    """One surface out of several, without UV unless all have it."""
+    """Join surfaces. The result has UV coordinates only if all surfaces have them."""
     offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
     uvs = [s.uv for s in surfaces if s.uv is not None]
     return LabelledMesh(
@@ -69,7 +69,7 @@ def join(surfaces: Sequence[LabelledMesh]) -> LabelledMesh:
 
 
 def sheet(points: Floats) -> LabelledMesh:
-    """LabelledMesh over a grid of points, shape (rows, columns, 3); the outside is rows x columns (right-handed)."""
+    """Make a surface over a grid of points (rows, columns, 3). Its outside is in the direction rows x columns."""
     rows, columns = points.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
@@ -83,7 +83,7 @@ def sheet(points: Floats) -> LabelledMesh:
 def lathe(
     profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: float = 2 * math.pi
 ) -> LabelledMesh:
-    """Turn a profile of (radius, height) points about z; the outside is to the right of its direction."""
+    """Rotate a profile of (radius, height) points about z. The outside is to the right of its direction."""
     line = np.asarray(profile, dtype=float)
     angles = np.linspace(start, stop, sections + 1)
     points = np.empty((sections + 1, len(line), 3))
@@ -94,16 +94,16 @@ def lathe(
 
 
 def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> LabelledMesh:
-    """A round bar along a path, shape (k, 3), with closed ends; `radius` may change along it."""
+    """Make a round bar with closed ends along a path (k, 3). The radius may vary along it."""
     line = np.asarray(path, dtype=float)
     radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(line),))
     tangents = np.gradient(line, axis=0)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
-    angles = np.linspace(0.0, -2 * math.pi, sides + 1)  # clockwise, so that the outside faces out
+    angles = np.linspace(0.0, -2 * math.pi, sides + 1)  # clockwise, so that the outside is out
     rings = []
     for point, tangent, r in zip(line, tangents, radii, strict=True):
-        normal = normal - tangent * (normal @ tangent)  # carried along without twist
+        normal = normal - tangent * (normal @ tangent)  # transported without twist
         normal /= np.linalg.norm(normal)
         side = np.cross(tangent, normal)
         rings.append(point + r * (np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * side))
@@ -112,13 +112,13 @@ def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> La
 
 
 def arc(radius: float, start: float, stop: float, points: int, squash: float = 1.0) -> Floats:
-    """Points (points, 2) on a circle around the origin from angle `start` to `stop`, y scaled by `squash`."""
+    """Return points (points, 2) on a circle around the origin between two angles, with y scaled by `squash`."""
     t = np.linspace(start, stop, points)
     return np.column_stack([radius * np.cos(t), squash * radius * np.sin(t)])
 
 
 def extrude(polygon: Polygon | MultiPolygon, height: float) -> LabelledMesh:
-    """A prism over one or more polygons in the x-y plane, from z = 0 to `height`."""
+    """Make a prism over polygons in the x-y plane, from z = 0 to `height`."""
     if isinstance(polygon, MultiPolygon):
         return join([extrude(part, height) for part in polygon.geoms])
     mesh = trimesh.creation.extrude_polygon(orient(polygon), height, engine="manifold")
@@ -126,26 +126,26 @@ def extrude(polygon: Polygon | MultiPolygon, height: float) -> LabelledMesh:
 
 
 def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -> LabelledMesh:
-    """A body drawn from the side in the y-z plane, `width` across x, its corners rounded by `rounding` (m)."""
+    """Extrude a drawing in the y-z plane to `width` along x, with corners rounded by `rounding`, m."""
     if rounding:
         drawing = drawing.buffer(-rounding, quad_segs=3).buffer(rounding, quad_segs=3)
     return extrude(drawing, width).moved((0, 0, -width / 2)).lengthwise()
 
 
 def ridge(drawing: Polygon, length: float) -> LabelledMesh:
-    """A prism along y over a drawing in the x-z plane."""
+    """Extrude a drawing in the x-z plane along y."""
     prism = extrude(drawing, length).moved((0, 0, -length / 2))
-    # Lay the extrusion direction along y: (x, y, z) -> (x, -z, y) is a rotation about x.
+    # Rotate the extrusion about x: (x, y, z) -> (x, -z, y).
     return LabelledMesh(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
 
 
 def cushion(polygon: Polygon, height: float, edge: float) -> LabelledMesh:
-    """A flat pillow over a polygon: a prism with its upper and lower edges rounded by `edge`, UV from above.
+    """Make a pillow over a polygon: a prism with upper and lower edges rounded by `edge`, with UV from above.
 
     Raises:
         AssetError: `edge` is wider than the outline's rounded corners allow.
     """
-    # Corners rounder than the edge is wide keep the inset outlines free of crossings.
+    # Corners with a larger radius than the edge prevent crossings of the inset outlines.
     solid = orient(polygon.buffer(-1.3 * edge, quad_segs=2).buffer(1.3 * edge, quad_segs=2).simplify(0.0005))
     levels = [
         (edge, 0.0),
@@ -176,13 +176,13 @@ def cushion(polygon: Polygon, height: float, edge: float) -> LabelledMesh:
 
 
 def from_above(surface: LabelledMesh) -> LabelledMesh:
-    """Texture coordinates by looking straight down: u along x, v along y, over the bounding box."""
+    """Set UV coordinates by projection from above: u along x, v along y, over the bounding box."""
     low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
     return LabelledMesh(surface.vertices, surface.faces, (surface.vertices[:, :2] - low) / (high - low))
 
 
 def slab(width: float, depth: float, height: float) -> LabelledMesh:
-    """A box with its base at z = 0 whose top carries the texture; its sides take the texture's corner colour."""
+    """Make a box on z = 0 with the texture on its top. Its sides have the colour of the texture's corner."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
     top = LabelledMesh(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
@@ -196,7 +196,7 @@ def slab(width: float, depth: float, height: float) -> LabelledMesh:
 
 
 def rounded_box(width: float, depth: float, height: float, radius: float) -> LabelledMesh:
-    """A box with its base at z = 0 and edges rounded by `radius`."""
+    """Make a box on z = 0 with edges rounded by `radius`."""
     ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
     reach = np.array([width, depth, height]) / 2 - radius
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
@@ -207,7 +207,7 @@ def rounded_box(width: float, depth: float, height: float, radius: float) -> Lab
 
 
 def write_obj(path: Path, surface: LabelledMesh) -> None:
-    """Write a surface with creased normals as OBJ text, rounded to 0.01 mm."""
+    """Write a surface with creased normals as OBJ, rounded to 0.01 mm."""
     normals, normal_of = np.unique(np.round(_corner_normals(surface), 3) + 0.0, axis=0, return_inverse=True)
     corner = normal_of.reshape(-1, 3)
     lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in np.round(surface.vertices, 5) + 0.0]
@@ -221,7 +221,7 @@ def write_obj(path: Path, surface: LabelledMesh) -> None:
 
 
 def _corner_normals(surface: LabelledMesh) -> Floats:
-    """Normal at every corner of every face, shape (3 m, 3): mean of the faces there that bend less than CREASE."""
+    """Return a normal for each corner of each face, (3 m, 3): the mean of adjacent faces within `CREASE`."""
     _, place = np.unique(np.round(surface.vertices, 6), axis=0, return_inverse=True)
     triangles = surface.vertices[surface.faces]
     weighted = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -247,7 +247,7 @@ def _without_slivers(vertices: Floats, faces: NDArray[np.int64]) -> NDArray[np.i
 
 
 def _inward(outline: Floats) -> Floats:
-    """Unit normals at the vertices of a counter-clockwise outline, pointing inside, shape (n, 2)."""
+    """Return unit normals at the vertices of a counter-clockwise outline, pointing inwards, (n, 2)."""
     ahead = np.roll(outline, -1, axis=0) - outline
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     along = ahead + np.roll(ahead, 1, axis=0)

@@ -1,4 +1,4 @@
-"""Meshes of the toys."""
+"""Meshes of toys."""
 
 import math
 
@@ -9,12 +9,11 @@ from tools.authoring.mesh_tools import LabelledMesh, lathe, mm, side
 
 
 def meshes() -> dict[str, LabelledMesh]:
-    """Mesh name -> surface."""
     return {**_car(), **_ball(), **_rings(), **_duck()}
 
 
 def _car() -> dict[str, LabelledMesh]:
-    """Drawn from the side: nose at +, tail at -."""
+    """A car, drawn from the side, with its nose at + and its tail at -."""
     hull = Polygon(mm("-110 22, 110 22, 112 45, 100 56, 55 62, -105 64, -112 50"))
     cabin = Polygon(mm("-85 60, 60 60, 25 97, 15 100, -55 100, -65 97"))
     panes = Polygon(mm("-72 64, 46 64, 18 91, -58 91")).difference(box(-0.016, 0.06, -0.006, 0.1))
@@ -28,7 +27,7 @@ def _car() -> dict[str, LabelledMesh]:
 
 
 def _ball() -> dict[str, LabelledMesh]:
-    """One gore of six; the model turns it. Poles are level, so that the stripes show from above."""
+    """The six gores of a ball, tilted so that its stripes show from above."""
     t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 11)
     line = np.column_stack([0.08 * np.cos(t), 0.08 * np.sin(t)])
     sixth = math.pi / 3
@@ -55,7 +54,7 @@ def _duck() -> dict[str, LabelledMesh]:
     body = lathe(mm("0 -52, 40 -50, 58 -20, 60 5, 45 35, 20 47, 0 50"), 22)
 
     def stretch(v: np.ndarray) -> np.ndarray:
-        """Long body whose tail (-y) lifts."""
+        # a long body with a lifted tail (-y)
         y = v[:, 1] * 1.35
         lift = 0.03 * np.clip(-y / 0.08, 0, None) ** 2
         return np.column_stack(

@@ -1,4 +1,4 @@
-"""Generates the meshes and label textures that the object and receptacle models use."""
+"""Writer of the meshes and label textures of object and receptacle models."""
 
 from pathlib import Path
 
@@ -20,18 +20,18 @@ from tools.authoring.mesh_tools import LabelledMesh, write_obj
 
 
 def object_meshes() -> dict[str, LabelledMesh]:
-    """Every mesh of the object models by name; the same on every call."""
+    """Return every mesh of the object models by name."""
     modules = (mesh_dishes, mesh_toys, mesh_books, mesh_laundry, mesh_office, mesh_recycling)
     return {name: surface for module in modules for name, surface in module.meshes().items()}
 
 
 def receptacle_meshes() -> dict[str, LabelledMesh]:
-    """Every mesh of the receptacle models by name; the same on every call."""
+    """Return every mesh of the receptacle models by name."""
     return mesh_receptacles.meshes()
 
 
 def build_meshes(models_root: Path) -> list[Path]:
-    """Write meshes and label textures below `models_root`; the files written, in a fixed order.
+    """Write meshes and label textures below `models_root`, and return their paths in a fixed order.
 
     Raises:
         AssetError: A texture cannot be encoded.

@@ -1,6 +1,6 @@
-"""Building blocks of the procedural textures: periodic noise, colour ramps, tilings and painted shapes.
+"""Primitives of procedural textures: periodic noise, colour ramps, tilings and painted shapes.
 
-Images are floats in [0, 1], shape (height, width) or (height, width, 3) in RGB order, unless said otherwise.
+Images are floats in [0, 1], (height, width) or (height, width, 3) RGB.
 """
 
 from collections.abc import Sequence
@@ -13,16 +13,16 @@ Floats = NDArray[np.float64]
 
 
 def rgb(code: str) -> Floats:
-    """Return the colour of a hexadecimal code such as ``"c8a06e"`` as three floats in [0, 1]."""
+    """Convert a hexadecimal code such as `c8a06e` to three floats in [0, 1]."""
     return np.array([int(code[i : i + 2], 16) / 255.0 for i in (0, 2, 4)])
 
 
 def noise(
     rng: np.random.Generator, shape: tuple[int, int], *, roll_off: float = 1.0, stretch: float = 1.0
 ) -> Floats:
-    """Periodic noise (height, width) of zero mean and unit deviation, with amplitudes falling as 1 / f**`roll_off`.
+    """Make periodic noise (height, width) of mean 0 and deviation 1, whose amplitudes fall as 1 / f**`roll_off`.
 
-    Features are `stretch` times longer horizontally than vertically.
+    Features are `stretch` times as long horizontally as vertically.
     """
     spectrum = np.fft.fft2(rng.standard_normal(shape))
     vertical = np.fft.fftfreq(shape[0])[:, None]
@@ -34,13 +34,13 @@ def noise(
 
 
 def grid(shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    """Return x (rightwards) and y (downwards) of the pixel centres, each (height, width), in [0, 1]."""
+    """Return x (to the right) and y (down) of the pixel centres, each (height, width), in [0, 1]."""
     y, x = np.mgrid[0 : shape[0], 0 : shape[1]]
     return (x + 0.5) / shape[1], (y + 0.5) / shape[0]
 
 
 def smooth_step(value: Floats, low: float, high: float) -> Floats:
-    """Go smoothly from 0 at `low` to 1 at `high`."""
+    """Interpolate smoothly from 0 at `low` to 1 at `high`."""
     t = np.clip((value - low) / (high - low), 0.0, 1.0)
     return np.asarray(t * t * (3.0 - 2.0 * t), dtype=np.float64)
 
@@ -53,7 +53,6 @@ def ramp(value: Floats, stops: Sequence[tuple[float, str]]) -> Floats:
 
 
 def flat(shape: tuple[int, int], code: str) -> Floats:
-    """Return an image of a single colour."""
     return np.broadcast_to(rgb(code), (*shape, 3)).copy()
 
 
@@ -64,7 +63,7 @@ def blend(image: Floats, code: str, mask: Floats) -> Floats:
 
 
 def polygon(image: Floats, code: str, outline: Sequence[tuple[float, float]], opacity: float = 1.0) -> Floats:
-    """Paint an antialiased polygon, given in fractions of the image's width and height, over an RGB `image`."""
+    """Paint an antialiased polygon, given in fractions of width and height, over an RGB image."""
     shape = image.shape[:2]
     scale = np.array([shape[1], shape[0]]) * 16.0
     points = np.round(np.asarray(outline) * scale).astype(np.int32)
@@ -76,7 +75,7 @@ def polygon(image: Floats, code: str, outline: Sequence[tuple[float, float]], op
 def disc(
     image: Floats, code: str, centre: tuple[float, float], radius: float, opacity: float = 1.0
 ) -> Floats:
-    """Paint an antialiased disc over an RGB `image`; centre in fractions of its size, radius of its height."""
+    """Paint an antialiased disc over an RGB image. The centre is in fractions of its size, the radius of its height."""
     shape = image.shape[:2]
     x, y = grid(shape)
     distance = np.hypot((x - centre[0]) * shape[1] / shape[0], y - centre[1])
@@ -85,7 +84,7 @@ def disc(
 
 
 def joints(shape: tuple[int, int], rows: int, columns: int, width: float, offset: float = 0.0) -> Floats:
-    """Mask (height, width), 1 in the joints of a tiling; every second row is shifted by `offset` tiles."""
+    """Return a mask (height, width) of the joints of a tiling, whose odd rows are shifted by `offset` tiles."""
     x, y = grid(shape)
     row = np.floor(y * rows)
     u = (x * columns + offset * (row % 2)) % 1.0
@@ -98,7 +97,7 @@ def joints(shape: tuple[int, int], rows: int, columns: int, width: float, offset
 def tile_tones(
     rng: np.random.Generator, shape: tuple[int, int], rows: int, columns: int, offset: float = 0.0
 ) -> Floats:
-    """Return one random value in [-1, 1] per tile of the tiling of :func:`joints`, as (height, width)."""
+    """Return a random value in [-1, 1] for each tile of the tiling of `joints`, as (height, width)."""
     tones = rng.uniform(-1.0, 1.0, (rows, columns))
     x, y = grid(shape)
     row = np.floor(y * rows).astype(int)
@@ -107,5 +106,5 @@ def tile_tones(
 
 
 def to_bytes(image: Floats) -> NDArray[np.uint8]:
-    """Round an image in [0, 1] to 8 bits."""
+    """Convert an image from [0, 1] to 8 bits."""
     return np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)

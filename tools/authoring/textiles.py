@@ -1,4 +1,4 @@
-"""Textiles of the apartment: carpet, cloth, bed linen and rugs. See :mod:`authoring.textures`."""
+"""Textiles of the apartment: carpet, cloth, bed linen and rugs (see `tools.authoring.textures`)."""
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def quilt(rng: np.random.Generator) -> Floats:
 
 
 def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, str]]) -> Floats:
-    """Put borders around `field`; each band begins at its distance from the edge, in image heights."""
+    """Put borders around `field`. Each band starts at its distance from the edge, in image heights."""
     x, y = grid(shape)
     edge = np.minimum(np.minimum(x, 1 - x) * shape[1] / shape[0], np.minimum(y, 1 - y))
     image = field
@@ -78,7 +78,7 @@ def rug_living(rng: np.random.Generator) -> Floats:
 
 
 def rug_round(rng: np.random.Generator) -> Floats:
-    """RGBA: a round rug of concentric rings; the corners are clear."""
+    """RGBA: a round rug of concentric rings, with transparent corners."""
     shape = (256, 256)
     x, y = grid(shape)
     radius = np.hypot(x - 0.5, y - 0.5) * 2

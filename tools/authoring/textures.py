@@ -1,9 +1,9 @@
-"""The apartment's textures, all procedural: surfaces that repeat and decals.
+"""Procedural textures of the apartment: repeating surfaces and decals.
 
-Every texture has its own generator, seeded by its name, so that adding one leaves the others as they are.
-Grey textures are meant to be tinted by a material's colour. Coloured ones marked "tinted" are divided by the colour
-that their material multiplies them with, so that the material looks right without its texture too. Cloth and rugs are
-in :mod:`authoring.textiles`, pictures (views, art, screens) in :mod:`authoring.artwork`.
+Each texture has a random generator seeded by its name, so that adding one does not change the others. "Grey" textures
+are tinted by a material's colour. Those marked "tinted" are divided by the colour of their material, so that the
+material has the right colour without its texture, too. Textiles are in `tools.authoring.textiles`, pictures (views,
+art, screens) in `tools.authoring.artwork`.
 """
 
 import zlib
@@ -36,7 +36,7 @@ Painter = Callable[[np.random.Generator], Floats]
 
 
 def _planks(rng: np.random.Generator, light: str, dark: str) -> Floats:
-    """Floor boards along x: 16 rows of two boards; 512 px stand for 2 m."""
+    """Floor boards along x: 16 rows of two boards. 512 pixels are 2 m."""
     size, rows = 512, 16
     height = size // rows
     grain = 0.5 * noise(rng, (size, size), roll_off=1.1, stretch=14.0)
@@ -161,12 +161,12 @@ def damask(rng: np.random.Generator) -> Floats:
 
 
 def _black_with_alpha(alpha: Floats) -> Floats:
-    """RGBA image that darkens what lies under it by `alpha`."""
+    """Return an RGBA image that darkens what is below it by `alpha`."""
     return np.concatenate([np.zeros((*alpha.shape, 3)), alpha[..., None]], axis=-1)
 
 
 def shadow_box(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painters take a generator)
-    """RGBA: contact shadow of a box; the box covers the middle 80 % of the image."""
+    """RGBA: contact shadow of a box that covers the middle 80 % of the image."""
     x, y = grid((128, 128))
     inside = smooth_step(np.minimum(x, 1 - x), 0.0, 0.2) * smooth_step(np.minimum(y, 1 - y), 0.0, 0.2)
     return _black_with_alpha(0.38 * inside)
@@ -182,7 +182,7 @@ def shadow_edge(rng: np.random.Generator) -> Floats:  # noqa: ARG001
     """RGBA: darkening towards a corner of the room, strongest at the lower edge of the image."""
     x, y = grid((64, 64))
     ends = smooth_step(np.minimum(x, 1 - x), 0.0, 0.1)
-    # The last rows lie under the skirting; they are clear because a texture wraps round to its other edge.
+    # The last rows are under the skirting. They are transparent because textures wrap to the opposite edge.
     return _black_with_alpha(np.where(y < 0.95, 0.3 * ends * y**2, 0.0))
 
 

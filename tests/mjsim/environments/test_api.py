@@ -310,7 +310,7 @@ def test_failed_physics_ends_the_episode(easy, monkeypatch):
 
 
 def test_a_navigable_floor_that_is_none_is_named():
-    with pytest.raises(EnvironmentConfigError, match="navigable answered 5"):
+    with pytest.raises(EnvironmentConfigError, match="navigable returned 5"):
         gymnasium.make(ID, navigable=lambda *_: 5)
 
 

@@ -80,7 +80,7 @@ BROKEN = {
     "no volume": ("tray.xml", 'name="volume"', 'name="space"', "sites", "'volume'"),
     "no approach": ("tray.xml", 'name="approach"', 'name="spot"', "sites", "'approach'"),
     "a round volume": ("tray.xml", 'name="volume" type="box"', 'name="volume" type="sphere"', "sites",
-        "no box"),
+        "not a box"),
     "a bin with a joint": ("tray.xml", '<body name="receptacle">',
         '<body name="receptacle"><joint name="lid"/>', "joints", "'lid'"),
     "a bin without a floor": ("tray.xml", BOTTOM, "", "container", "no floor"),
