@@ -32,7 +32,6 @@ _HEAD = """\
 
 
 def client_protocol() -> str:
-    """Generate the module, JavaScript with JSDoc types."""
     lines = [_HEAD]
     lines += [f"/** @typedef {{{_literals(alias)}}} {name} */" for name, alias in ALIASES.items()]
     found: dict[str, str] = {}

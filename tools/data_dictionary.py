@@ -49,7 +49,6 @@ One JSON object per line, in order of time. Every line has
 
 
 def data_dictionary() -> str:
-    """Generate the page in Markdown."""
     lines = [
         _HEAD,
         "| field | type | what |",

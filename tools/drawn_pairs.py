@@ -164,13 +164,11 @@ class Moments:
         self.data = mujoco.MjData(scene.model)
 
     def place(self, view: View) -> None:
-        """Set the person's pose."""
         for joint, value in (("x", view.x), ("y", view.y), ("yaw", view.heading), ("pitch", view.pitch)):
             self.data.joint(PREFIX + joint).qpos[0] = value
         mujoco.mj_forward(self.scene.model, self.data)
 
     def things(self) -> dict[str, Any]:
-        """Return the objects in the client's format."""
         found = {}
         for placed in self.scene.episode.objects:
             body = self.data.body(f"{placed.name}/object")
@@ -179,14 +177,12 @@ class Moments:
         return found
 
     def person(self, view: View) -> dict[str, Any]:
-        """Return the person in the client's format."""
         body = self.data.body(BODY)
         turn = body.xmat.reshape(3, 3)
         hands = [turn.T @ (self.data.body(f"{PREFIX}{hand}_hand").xpos - body.xpos) for hand in HANDS]
         return {"x": view.x, "y": view.y, "heading": view.heading, "hands": [h.tolist() for h in hands]}
 
     def eye(self, view: View) -> dict[str, Any]:
-        """Return the eye in the client's format."""
         position = self.data.cam_xpos[self.scene.model.camera(EYE).id].tolist()
         return {"position": position, "heading": view.heading, "pitch": view.pitch}
 
@@ -218,7 +214,6 @@ def draw_pairs(browser: Any, scene: Scene, chosen: Sequence[View]) -> list[Pair]
 
 
 def decoded(png: bytes) -> Image:
-    """Decode a picture to pixels (h, w, 3)."""
     pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
     return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), dtype=np.uint8)
 

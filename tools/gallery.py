@@ -67,7 +67,6 @@ class Snapshot:
         return float(np.linalg.norm(self.observation.velocity)) > 0.5
 
     def visible(self) -> tuple[str, ...]:
-        """Return the objects in view."""
         seen = self.observation
         return visible_objects(self.world.scene, self.world.data, seen.eye, seen.heading, seen.pitch)
 
@@ -206,7 +205,6 @@ def contact_sheet(
 
 
 def save_png(path: Path, rgb: Image) -> None:
-    """Write an RGB image (height, width, 3) atomically."""
     with replacing(path) as temporary:
         cv2.imwrite(str(temporary), cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 

@@ -23,9 +23,7 @@ Steps = Generator[Action, StepResult, None]
 class Control(Protocol):
     """Turns actions of the agent into actions of the world."""
 
-    def spec(self) -> specs.BoundedArray:
-        """Spec of an action of the agent."""
-        ...
+    def spec(self) -> specs.BoundedArray: ...
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
         """Yield the actions of the world for one action of the agent, at least one.

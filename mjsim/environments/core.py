@@ -90,7 +90,6 @@ class Rearrangement:
 
     @property
     def observation_spec(self) -> dict[str, specs.Array]:
-        """Sensor name -> spec of its array."""
         return {s.name: s.spec(self.layout) for s in self.sensors}
 
     @property

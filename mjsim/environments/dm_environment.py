@@ -61,7 +61,6 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         return self.core.episode.physics
 
     def reset(self) -> dm_env.TimeStep:
-        """Start the next episode."""
         seed, self._next_seed = self._next_seed, None
         observation, _ = self.core.reset_random(self._rng) if seed is None else self.core.reset(seed)
         self._is_running = True
@@ -86,7 +85,6 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         return dm_env.transition(taken.reward, taken.observation)
 
     def observation_spec(self) -> dict[str, specs.Array]:
-        """Sensor name -> spec of its array."""
         return self.core.observation_spec
 
     def action_spec(self) -> specs.BoundedArray:

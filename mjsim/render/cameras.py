@@ -85,7 +85,6 @@ class ViewVolume:
         return depth.astype(np.float32)
 
     def aim(self, scene: Any) -> None:
-        """Set the cameras and the headlight of a scene to this view."""
         top = self.half_height if self.orthographic else self.half_height * self.near
         forward = -self.rotation[:, 2]
         for camera in scene.camera:  # a stereo pair, of which a mono image uses the mean

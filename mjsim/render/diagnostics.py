@@ -67,7 +67,6 @@ class EnvironmentReport:
         return self.gl is not None and not (missing or self.broken or self.hidden)
 
     def lines(self) -> tuple[str, ...]:
-        """Format the report as lines of text, with advice last."""
         rows = [f"python {self.python} on {self.platform}"]
         for name, version in self.versions.items():
             fault = f", cannot be imported ({self.broken[name]})" if name in self.broken else ""
@@ -136,7 +135,6 @@ def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
 def advise(
     versions: Mapping[str, str | None], vendors: tuple[str, ...], gl: "GlInfo | None"
 ) -> tuple[str, ...]:
-    """Advise on missing distributions, missing OpenGL, or an unused GPU."""
     steps = [_how_to_install(name) for name, version in versions.items() if version is None]
     if gl is None and chosen_gl() not in (*BACKENDS, *DISABLED):
         steps.append(f"no frame can be drawn: unset {VARIABLE}, or set it to {' or '.join(BACKENDS)}")

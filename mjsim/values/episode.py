@@ -108,7 +108,6 @@ class Episode:
             raise EpisodeError(f"episode is not JSON: {error}") from error
 
     def save(self, path: Path) -> None:
-        """Write the JSON to `path` atomically."""
         write_text_atomically(path, self.to_json())
 
     @classmethod

@@ -75,7 +75,6 @@ class StepStates(NamedTuple):
 
     @classmethod
     def empty(cls, steps: int, objects: int) -> "StepStates":
-        """Allocate uninitialized arrays."""
         return cls(
             time=np.empty(steps),
             position=np.empty((steps, 2)),

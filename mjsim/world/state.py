@@ -71,11 +71,9 @@ class WorldState:
 
     @property
     def hash(self) -> int:
-        """A 64-bit hash of the complete state."""
         return checkpoint_hash(self.physics, self.details_json())
 
     def details_json(self) -> str:
-        """Return the details as JSON with full precision."""
         return json.dumps(msgspec.to_builtins(self.details, enc_hook=np.ndarray.tolist))
 
     @classmethod
@@ -89,7 +87,6 @@ class WorldState:
 
 
 def checkpoint_hash(physics: NDArray[np.float64], details: str) -> int:
-    """Hash `WorldState.physics` and the text of `WorldState.details_json`."""
     return hash64(physics.tobytes() + details.encode())
 
 

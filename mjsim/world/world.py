@@ -250,7 +250,6 @@ class World:
         return self._tier.answer(action)
 
     def observation(self) -> Observation:
-        """Return the current state of the episode."""
         return self._tier.observation()
 
 

@@ -129,7 +129,6 @@ def screen_desktop(rng: np.random.Generator) -> Floats:
 
 
 def keyboard(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painters take a generator)
-    """Keys of a keyboard seen from above."""
     image = flat((96, 256), "2b2d30")
     for row in range(5):
         for column in range(15):

@@ -14,7 +14,6 @@ WHITE, INK = (250, 250, 245), (25, 25, 30)
 
 
 def object_textures() -> dict[str, Picture]:
-    """Return RGB pictures (128, 128, 3) by texture name."""
     covers = (_hardback, _paperback, _magazine, _pages, _comic, _towel, _denim, _calculator, _notebook)
     return _painted(*covers, _can, _carton, _newspaper, _jar)
 

@@ -37,7 +37,6 @@ class LabelledMesh:
         return LabelledMesh(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
 
     def turned(self, angle: float) -> "LabelledMesh":
-        """Rotate the surface about z by an angle, rad."""
         c, s = math.cos(angle), math.sin(angle)
         return LabelledMesh(
             self.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), self.faces, self.uv
@@ -133,7 +132,6 @@ def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -
 
 
 def ridge(drawing: Polygon, length: float) -> LabelledMesh:
-    """Extrude a drawing in the x-z plane along y."""
     prism = extrude(drawing, length).moved((0, 0, -length / 2))
     # Rotate the extrusion about x: (x, y, z) -> (x, -z, y).
     return LabelledMesh(prism.vertices[:, [0, 2, 1]] * [1, -1, 1], prism.faces)
@@ -196,7 +194,6 @@ def slab(width: float, depth: float, height: float) -> LabelledMesh:
 
 
 def rounded_box(width: float, depth: float, height: float, radius: float) -> LabelledMesh:
-    """Make a box on z = 0 with edges rounded by `radius`."""
     ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
     reach = np.array([width, depth, height]) / 2 - radius
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])

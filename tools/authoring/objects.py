@@ -7,26 +7,22 @@ import cv2
 from mjsim.support.files import replacing
 from mjsim.values.errors import AssetError
 from tools.authoring import (
-    mesh_books,
-    mesh_dishes,
     mesh_labels,
     mesh_laundry,
     mesh_office,
     mesh_receptacles,
-    mesh_recycling,
-    mesh_toys,
+    mesh_small_objects,
 )
 from tools.authoring.mesh_tools import LabelledMesh, write_obj
 
 
 def object_meshes() -> dict[str, LabelledMesh]:
-    """Return every mesh of the object models by name."""
-    modules = (mesh_dishes, mesh_toys, mesh_books, mesh_laundry, mesh_office, mesh_recycling)
-    return {name: surface for module in modules for name, surface in module.meshes().items()}
+    small = mesh_small_objects
+    groups = (small.dishes, small.toys, small.books, mesh_laundry.meshes, mesh_office.meshes, small.recycling)
+    return {name: surface for group in groups for name, surface in group().items()}
 
 
 def receptacle_meshes() -> dict[str, LabelledMesh]:
-    """Return every mesh of the receptacle models by name."""
     return mesh_receptacles.meshes()
 
 

@@ -106,5 +106,4 @@ def tile_tones(
 
 
 def to_bytes(image: Floats) -> NDArray[np.uint8]:
-    """Convert an image from [0, 1] to 8 bits."""
     return np.round(np.clip(image, 0.0, 1.0) * 255.0).astype(np.uint8)

@@ -109,7 +109,6 @@ def bricks(rng: np.random.Generator) -> Floats:
 
 
 def marble(rng: np.random.Generator) -> Floats:
-    """Pale marble with grey veins."""
     shape = (256, 256)
     warp = noise(rng, shape, roll_off=1.6)
     veins = np.exp(-np.abs(noise(rng, shape, roll_off=1.7) + 0.25 * warp) * 9.0)
@@ -207,7 +206,6 @@ def paint(name: str) -> NDArray[np.uint8]:
 
 
 def build_textures(folder: Path) -> list[Path]:
-    """Write every texture to `folder` as ``<name>.png`` and return the paths."""
     paths = []
     for name in TEXTURES:
         image = paint(name)

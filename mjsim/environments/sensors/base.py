@@ -103,7 +103,6 @@ class SensorInput:
 
     @property
     def start(self) -> StartPose:
-        """Initial pose of the person."""
         return self.world.scene.episode.start
 
     @cached_property
@@ -146,7 +145,6 @@ class Sensor:
     images: frozenset[str] = field(default_factory=frozenset)
 
     def spec(self, layout: ObservationLayout) -> specs.Array:
-        """Return the spec of the array for a layout."""
         return self.declare(layout).replace(name=self.name)
 
 

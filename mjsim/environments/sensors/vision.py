@@ -21,7 +21,6 @@ def first_object(layout: ObservationLayout) -> int:
 
 
 def visible_pixels(inputs: SensorInput) -> dict[str, int]:
-    """Count the pixels of each visible object, in the episode's order."""
     counts = inputs.episode.labels.pixel_counts(_rendered(inputs.frame.segmentation, "segmentation"))
     return {name: counts[name] for name in inputs.state.object_names if name in counts}
 

@@ -30,7 +30,6 @@ class HouseRef:
 
     @property
     def is_path(self) -> bool:
-        """True if `name` is a path."""
         return self.kind in ("folder", "recipe")
 
 

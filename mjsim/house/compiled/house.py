@@ -152,7 +152,6 @@ class CompiledHouse:
 
     @cached_property
     def data(self) -> mujoco.MjData:
-        """The state of the house, in which nothing moves."""
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
         return data
@@ -179,7 +178,6 @@ class CompiledHouse:
         return (self._fused if visuals else self._collision).copy()
 
     def object_spec(self, path: Path, *, visuals: bool = True) -> mujoco.MjSpec:
-        """Return an object model for attaching, with or without visual geoms."""
         if visuals:
             return self.once((path, True), lambda: separate_visuals(read_model(path, body="object")))
         whole = self.object_spec(path)

@@ -51,7 +51,6 @@ class Disorder:
         return cls(counts, tuple(found.distances))
 
     def tables(self) -> dict[str, list[dict[str, int]] | list[float]]:
-        """Return the content of a file for `load`."""
         counts = sorted(Counter(self.misplaced).items())
         return {
             "misplaced": [{"objects": n, "episodes": k} for n, k in counts],

@@ -25,7 +25,6 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def check_bins(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check all receptacles of a house at their mounts."""
     for receptacle in floor.receptacles.values():
         for rule in (_bin_height, _bin_surroundings, _bin_use):
             yield from rule(floor, receptacle)

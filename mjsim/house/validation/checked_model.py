@@ -70,12 +70,10 @@ class Compiled:
         return np.array([points.min(axis=0), points.max(axis=0)])
 
     def geom_name(self, geom: int) -> str:
-        """Return a geom's name, or its id and body if it has no name."""
         body = self.model.body(int(self.model.geom_bodyid[geom])).name
         return repr(self.model.geom(geom).name or f"#{geom} of body {body}")
 
     def site(self, name: str) -> int | None:
-        """Return the id of a site, or None if it is missing."""
         found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, name)
         return None if found < 0 else int(found)
 
@@ -84,7 +82,6 @@ class Compiled:
         return Finding(rule, self.subject, message, remedy, "error", self.path.name, _place(place))
 
     def warning(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
-        """Make a warning about this model. `place` is (x, y, z), m."""
         return Finding(rule, self.subject, message, remedy, "warning", self.path.name, _place(place))
 
 

@@ -27,7 +27,6 @@ class Finding:
 
 
 def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Select the findings of severity `error`."""
     return tuple(f for f in findings if f.severity == "error")
 
 

@@ -81,7 +81,6 @@ def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: floa
 
 
 def check_house_file(catalogue: Catalogue) -> list[Finding]:
-    """Check a house's file, without its receptacles."""
     compiled = compile_model("house", catalogue.house_path)
     if not isinstance(compiled, Compiled):
         return compiled

@@ -102,7 +102,6 @@ class Carrying:
         self._strained = np.zeros(2, np.int64)
 
     def reset(self) -> None:
-        """Clear the effects of contacts."""
         self._compliance[:] = 0.0
         self._strained[:] = 0
 

@@ -18,7 +18,6 @@ _CHEST = 0.75  # height of the chest as a share of the eye height
 def resolve_pick(
     person: Person, action: Pick, inventory: Inventory, status: Sequence[ObjectStatus], *, busy: bool
 ) -> ActionResult:
-    """Answer a pick without changing the state."""
     names = person.scene.index.names
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)
@@ -55,7 +54,6 @@ def _pick_nearest(
 
 
 def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: bool) -> ActionResult:
-    """Answer a place without changing the state."""
     scene = person.scene
     if busy:
         return ActionResult(action, Refusal.BUSY, action.object)

@@ -53,7 +53,6 @@ class Grips:
         return np.array(self._data.site_xpos[self._grip_sites[item, grip]])
 
     def gap(self, hand: int, item: int, grip: int) -> float:
-        """Return the distance between a hand and a grip site, m."""
         return site_gap(self._data.site_xpos, self._hand_sites[hand], self._grip_sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
@@ -63,7 +62,6 @@ class Grips:
         self._update()
 
     def open(self, hand: int) -> None:
-        """Release the object in a hand, if any."""
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
@@ -87,7 +85,6 @@ class Grips:
         self._update()
 
     def reset(self) -> None:
-        """Clear the bookkeeping. The welds are reset with the physics."""
         self._held = [None, None]
         self._update()
 

@@ -162,7 +162,6 @@ def _descend(
 
 
 def overlap(person: Person, item: int) -> float:
-    """Return the deepest overlap of an object with anything but the person, m."""
     data = person.data
     if not data.ncon:
         return 0.0

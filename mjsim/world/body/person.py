@@ -66,7 +66,6 @@ class Person:
 
     @property
     def dt(self) -> float:
-        """Duration of a control step, s."""
         return self.options.control_timestep
 
     def steps(self, seconds: float) -> int:
@@ -85,7 +84,6 @@ class Person:
         return self.steps(self.motion.start_time + height / self.motion.descent_speed)
 
     def carried_bodies(self) -> frozenset[int]:
-        """Return the body ids of the objects in the hands."""
         return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
 
     def move_hand_to_rest(self, hand: int) -> None:
@@ -98,7 +96,6 @@ class Person:
         return np.array(self.data.xipos[self.scene.index.bodies[item]])
 
     def speed(self, item: int) -> float:
-        """Return an object's linear speed, m/s."""
         dof = self.scene.index.dofs[item]
         return float(np.linalg.norm(self.data.qvel[dof : dof + 3]))
 

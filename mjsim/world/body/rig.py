@@ -87,12 +87,10 @@ class Rig:
 
     @property
     def turn(self) -> float:
-        """Commanded yaw rate, rad/s."""
         return float(self.motion[2])
 
     @property
     def pitch_target(self) -> float:
-        """Commanded pitch of the head, rad."""
         return float(self.motion[3])
 
     @property
@@ -111,7 +109,6 @@ class Rig:
 
     @property
     def speed(self) -> float:
-        """Walking speed, m/s."""
         return math.hypot(self.rates[0], self.rates[1])
 
     @property

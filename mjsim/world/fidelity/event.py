@@ -145,7 +145,6 @@ class Event(Tier):
         self._motion, self._in_step = None, False
 
     def _begin(self, action: StepAction) -> ActionResult | None:
-        """Answer a pick or place, and plan it if it is feasible."""
         _ = self.data  # updates the physics data, which `Full.resolve` reads
         result = self._full.resolve(action, busy=self.busy)
         if result is not None and result.applied:

@@ -96,7 +96,6 @@ def _enter(full: Full, kinematic: KinematicWorld) -> None:
 
 
 def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -> None:
-    """Set the velocity of a held object to that of its hand."""
     data, body, dof = full.data, kinematic.body, int(full.scene.index.dofs[item])
     c, s = np.cos(body[HEADING]), np.sin(body[HEADING])
     first = HAND_SPEEDS + 3 * hand

@@ -205,7 +205,6 @@ class Full(Tier):
         self.carrying.set_state(commands.carrying)
 
     def dislodged(self) -> list[int]:
-        """Find delivered objects that have left their receptacles."""
         if self.is_settled:
             return []
         return [

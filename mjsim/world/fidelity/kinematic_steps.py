@@ -141,7 +141,6 @@ def held_in(vector: Floats, hand: int) -> int:
 
 @kernel
 def carry(state: KinematicState, model: KinematicModel) -> None:
-    """Move held objects to their hands."""
     vector = state.vector
     heading = vector[BODY + HEADING]
     half = 0.5 * heading
@@ -166,7 +165,6 @@ def carry(state: KinematicState, model: KinematicModel) -> None:
 
 @kernel
 def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
-    """Write the current state into a row."""
     vector = state.vector
     rows.time[row] = vector[TIME]
     rows.position[row, 0], rows.position[row, 1] = vector[BODY + X], vector[BODY + Y]
@@ -183,7 +181,6 @@ def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
 
 @kernel
 def state_hash(state: KinematicState) -> np.uint64:
-    """Return a 64-bit hash of the state."""
     digest = np.uint64(0)
     for word in state.vector.view(np.uint64):
         digest = (digest ^ word) * _PRIME

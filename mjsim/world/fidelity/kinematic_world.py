@@ -95,7 +95,6 @@ class KinematicWorld:
 
     @property
     def grasps(self) -> list[tuple[int, int] | None]:
-        """Object and grip in each hand."""
         return [None if grasp < 0 else divmod(int(grasp), 2) for grasp in self.state.vector[GRASPS:]]
 
     def grasp(self, hand: int, item: int, grip: int) -> None:
@@ -167,7 +166,6 @@ class KinematicWorld:
         return int(state_hash(self.state))
 
     def pack(self) -> NDArray[np.float64]:
-        """Return the whole state, (STATE_SIZE + 7 n + trees,)."""
         return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
 
     def unpack(self, values: NDArray[np.float64]) -> None:

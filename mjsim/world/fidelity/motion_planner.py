@@ -41,7 +41,6 @@ class PlannedMotion:
 
     @property
     def length(self) -> int:
-        """Number of control steps."""
         return int(self.trajectory.length[0])
 
 
@@ -57,7 +56,6 @@ class MotionPlanner:
         self._corners: dict[tuple[int, int], Vector] = {}
 
     def plan(self, result: ActionResult, hand: int, item: int) -> PlannedMotion:
-        """Compute a whole pick or place."""
         state = self._kinematic.state
         before = state.vector.copy(), state.poses.copy()
         self._hand, self._trajectory = hand, MotionTrajectory.empty(_INITIAL_STEPS, len(state.poses))
@@ -204,5 +202,4 @@ def _over(slot: Slot, height: float) -> Vector:
 
 
 def _towards(pitch: float) -> Vector:
-    """Return the `HandMovement.gaze` for a pitch, rad."""
     return np.array([math.nan, math.nan, pitch])

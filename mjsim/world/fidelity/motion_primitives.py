@@ -87,7 +87,6 @@ def _append(trajectory: MotionTrajectory, state: KinematicState) -> None:
 def play_rows(
     trajectory: MotionTrajectory, start: int, end: int, state: KinematicState, rows: StepStates
 ) -> None:
-    """Play the control steps `start` to `end` of a trajectory."""
     for row in range(start, end):
         state.vector[:] = trajectory.vectors[row]
         state.poses[:] = trajectory.poses[row]
@@ -157,7 +156,6 @@ def move_hand(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand, which is at rest, to a goal."""
     vector, goal = state.vector, movement.goal
     body, first = vector[BODY:HANDS], HANDS + 3 * movement.hand
     start_f, start_l, start_u = vector[first], vector[first + 1], vector[first + 2]

@@ -39,7 +39,6 @@ class EpisodeState:
         self.reset()
 
     def reset(self) -> None:
-        """Empty the hands and mark all objects as loose."""
         self._set(Inventory(capacity=self._capacity))
         self.status = [ObjectStatus.LOOSE] * len(self._index.names)
         self.events: list[WorldEvent] = []
@@ -48,26 +47,22 @@ class EpisodeState:
         self.events.append(WorldEvent(time, kind, self._index.names[item], receptacle))
 
     def picked(self, time: float, hand: int, item: int, success: bool) -> None:
-        """Record the end of a pick."""
         if success:
             self._set(self.inventory.take(hand, self._index.names[item]))
             self.status[item] = ObjectStatus.CARRIED
         self.report(time, EventKind.PICKED if success else EventKind.PICK_FAILED, item)
 
     def placed(self, time: float, item: int, receptacle: str | None, success: bool) -> None:
-        """Record the end of a place."""
         self._let_go(item)
         self.status[item] = ObjectStatus.DELIVERED if success else ObjectStatus.LOOSE
         self.report(time, EventKind.PLACED if success else EventKind.PLACE_FAILED, item, receptacle)
 
     def lost(self, time: float, item: int) -> None:
-        """Record that an object has slipped out of a hand."""
         self._let_go(item)
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.GRIP_LOST, item)
 
     def dislodged(self, time: float, item: int) -> None:
-        """Record that a delivered object has left its receptacle."""
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.DISLODGED, item, self._targets[self._index.names[item]])
 

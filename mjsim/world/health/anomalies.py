@@ -43,7 +43,6 @@ class AnomalyDetector:
         self.anchors = np.zeros((len(self._bodies), 3))
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Start from the current state, with counts of 0."""
         self.move_anchors(data)
         self._ejected: set[int] = set()
         self.ejections = self.tunnellings = 0

@@ -134,7 +134,6 @@ class HealthMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Clear all results, in the initial state of the episode."""
         self._extremes[:] = 0.0
         self._settle_times: list[float] = []
         self.sample = QUIET
@@ -180,7 +179,6 @@ class HealthMonitor:
         self._settling.set_state(state.settling)
 
     def snapshot(self) -> Health:
-        """Return extremes and counts since the last reset."""
         deepest, deepest_trunk, stretched, twisted = self._extremes.tolist()
         return Health(
             max_penetration_m=deepest,

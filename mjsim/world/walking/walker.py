@@ -36,7 +36,6 @@ class Walker:
         self.reset()
 
     def reset(self) -> None:
-        """Clear the progress."""
         self._visit: Pick | Place | None = None
         self._back_off_until = -math.inf
         self.progress = np.array([np.inf, 0.0])
