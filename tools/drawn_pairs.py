@@ -69,22 +69,13 @@ CELL = (240, 180)  # size of a picture on the contact sheet, pixels
 
 @dataclass(frozen=True)
 class View:
-    """A person's pose in a house, and the markers in view.
+    """A person's pose in a house, and the markers in view."""
 
-    Attributes:
-        room: Label of the room.
-        x: Position of the person, m.
-        y: Position of the person, m.
-        heading: Yaw from +x to +y, rad.
-        pitch: Pitch of the head, positive upwards, rad.
-        markers: Displayed markers.
-    """
-
-    room: str
-    x: float
+    room: str  # label of the room
+    x: float  # m
     y: float
-    heading: float
-    pitch: float
+    heading: float  # from +x to +y, rad
+    pitch: float  # pitch of the head, positive upwards, rad
     markers: tuple[Marker, ...] = ()
 
 

@@ -45,17 +45,11 @@ MAX_TIME = 240.0  # simulated time within which every picture must be taken, s
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A moment of a trial.
-
-    Attributes:
-        world: The world.
-        observation: The state.
-        targets: Object name -> middle of its bin, m, (3,).
-    """
+    """A moment of a trial."""
 
     world: World
     observation: Observation
-    targets: Mapping[str, NDArray[np.float64]]
+    targets: Mapping[str, NDArray[np.float64]]  # object name -> middle of its bin, m, (3,)
 
     def ahead(self, place: NDArray[np.float64], distance: tuple[float, float]) -> bool:
         """Return True if the person faces a place (2,) or (3,), m, at a distance within a range, m."""

@@ -36,10 +36,6 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
     The last step has discount 0 if all objects are delivered, and 1 if the time limit truncates the episode, so that a
     critic still bootstraps.
-
-    Args:
-        core: The task.
-        seed: As in `make`.
     """
 
     def __init__(self, core: Rearrangement, *, seed: int | None = None) -> None:

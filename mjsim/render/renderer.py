@@ -71,6 +71,10 @@ class Renderer(OffScreenRenderer):
 
     Any thread may call it, one at a time. Frames are bit-identical across calls and processes on one OpenGL driver (see
     `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data.
+
+    Raises:
+        RenderError: In all methods that draw, for an unknown camera, an invalid marker, data of another model, or a
+            closed renderer.
     """
 
     @property
@@ -94,10 +98,6 @@ class Renderer(OffScreenRenderer):
             data: State of the renderer's model.
             camera: Name of a camera of the model, or a pose.
             markers: Markers to draw. The scene hides them, except those with `x_ray`.
-
-        Raises:
-            RenderError: The camera is unknown, a marker is invalid, the data belong to another model, or the renderer
-                is closed.
         """
         with context.current_context():
             view = self._look(data, camera)
@@ -108,21 +108,13 @@ class Renderer(OffScreenRenderer):
     ) -> NDArray[np.float32]:
         """Draw distances along the optical axis, m, (height, width), inf for the background.
 
-        Glass counts as solid, and so do markers, if given.
-
-        Raises:
-            RenderError: As for `rgb`.
-        """
+        Glass counts as solid, and so do markers, if given."""
         with context.current_context():
             view = self._look(data, camera)
             return view.metres(self._rasteriser.geometry(view, markers)[1])
 
     def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
-        """Draw geom ids, (height, width), -1 for the background. Glass counts as solid.
-
-        Raises:
-            RenderError: As for `rgb`.
-        """
+        """Draw geom ids, (height, width), -1 for the background. Glass counts as solid."""
         with context.current_context():
             return self._rasteriser.geometry(self._look(data, camera))[0]
 
@@ -138,11 +130,7 @@ class Renderer(OffScreenRenderer):
     ) -> Frame:
         """Draw several images of the same moment, with depth and segmentation in one pass.
 
-        Markers are drawn only into the colour image.
-
-        Raises:
-            RenderError: As for `rgb`.
-        """
+        Markers are drawn only into the colour image."""
         (frame,) = self.frames(data, (camera,), markers, rgb=rgb, depth=depth, segmentation=segmentation)
         return frame
 
@@ -156,11 +144,7 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> tuple[Frame, ...]:
-        """Draw the same moment from several cameras, with one update of the scene.
-
-        Raises:
-            RenderError: As for `rgb`.
-        """
+        """Draw the same moment from several cameras, with one update of the scene."""
         poses = [camera_pose(self._model, data, camera, self.width / self.height) for camera in cameras]
         with context.current_context():
             self._rasteriser.update(data)

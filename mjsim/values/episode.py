@@ -45,8 +45,6 @@ class Episode:
     Attributes:
         house: Name of the house, or the path of its catalogue.
         house: Name of the house, or the path of its catalogue.
-        seed: Seed of the sampling.
-        start: Start pose of the person.
         objects: Misplaced objects. An episode with N objects has the first N sampled points.
         receptacles: Receptacle keys of the house.
         targets: Object instance name -> receptacle key.

@@ -26,8 +26,6 @@ class CameraOptions:
     """Images of the eye camera.
 
     Attributes:
-        width: Image width, pixels.
-        height: Image height, pixels.
         profile: Render profile: `draft`, `fast` or `quality`.
         far: Distance to which depths are clipped, m.
 
@@ -82,19 +80,12 @@ class ObservationLayout:
 
 @dataclass(frozen=True, eq=False)
 class SensorInput:
-    """Input of sensors: one control step of an episode.
-
-    Attributes:
-        layout: Sizes and scales of the arrays.
-        episode: The compiled episode.
-        state: The current state.
-        images: Channels of `frame` that the environment's sensors need.
-    """
+    """Input of sensors: one control step of an episode."""
 
     layout: ObservationLayout
     episode: CompiledEpisode
     state: Observation
-    images: frozenset[str]
+    images: frozenset[str]  # channels of `frame` that the environment's sensors need
 
     @property
     def world(self) -> World:

@@ -16,15 +16,10 @@ from mjsim.values.errors import AssetError
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """An MJCF file that was read with all files that it includes or refers to.
-
-    Attributes:
-        path: Path of the file.
-        elements: Its XML elements and those of included files. Included files that are not XML have none.
-    """
+    """An MJCF file that was read with all files that it includes or refers to."""
 
     path: Path
-    elements: tuple[ET.Element, ...]
+    elements: tuple[ET.Element, ...]  # XML elements of the file and of included files, if they are XML
 
     @classmethod
     def read(cls, path: Path) -> "ModelFile":

@@ -82,13 +82,8 @@ class Scene:
 
     Attributes:
         model: The compiled model. Its `qpos0` has the poses of the episode.
-        episode: The composed episode.
-        catalogue: Catalogue of the house.
         index: Addresses of the objects in the state.
-        rooms: Rooms of the house.
-        receptacles: Receptacle key -> geometry.
         spec: Editable description, for export.
-        person: Parameters of the person.
         visuals: True if the model has geoms that are only drawn.
     """
 

@@ -60,10 +60,6 @@ class Health:
     """Extremes and counts since the last reset.
 
     Attributes:
-        max_penetration_m: Largest `HealthSample.penetration_m`.
-        max_trunk_penetration_m: Largest `HealthSample.trunk_penetration_m`.
-        max_weld_error_m: Largest `HealthSample.weld_error_m`, or 0 if nothing was carried.
-        max_weld_error_rad: Largest `HealthSample.weld_error_rad`, or 0 if nothing was carried.
         settle_times: Times from each release to rest, s, in order.
         ejections: Number of objects that flew off, left the house, or were faster than by falls and kicks.
         tunnellings: Number of objects that passed through something solid.
