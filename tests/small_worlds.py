@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 
 from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.scene.avatar import START_PITCH
 from mjsim.house.scene.scene import compose
 from mjsim.values.actions import WAIT, Move
 from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.options import WorldOptions
+from mjsim.world.body.rig import BODY_SIZE, HEADING, LOOK, PITCH, SERVO, X, Y
 from mjsim.world.world import World
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -98,3 +100,11 @@ def dropped(path, height):
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 750)
     return data
+
+
+def standing(x, y, heading, pitch=START_PITCH):
+    """A body state at rest, with commands that keep it there."""
+    body = np.zeros(BODY_SIZE)
+    body[[X, Y, HEADING, PITCH]] = x, y, heading, pitch
+    body[LOOK] = body[SERVO + 3] = pitch
+    return body

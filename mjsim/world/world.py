@@ -136,7 +136,7 @@ class World:
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """Copy of the person's body state, laid out as in `mjsim.world.fidelity.body_state`, shape (BODY_SIZE,)."""
+        """Copy of the person's body state, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
         return self._tier.body
 
     @property

@@ -15,6 +15,14 @@ from mjsim.values.errors import AssetError
 
 Vector = NDArray[np.float64]
 
+# Indices of a body state: pose, velocity in the house frame, commands in the body frame (the last one is the pitch of
+# the head), and from `SERVO` on the latest servo commands of x, y, yaw and pitch in the house frame; m and rad
+X, Y, HEADING, PITCH = 0, 1, 2, 3
+VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7
+FORWARD, LEFT, TURN, LOOK = 8, 9, 10, 11
+SERVO = 12
+BODY_SIZE = 16
+
 # A position servo with damping lags behind a moving target by kv / kp seconds, so commands are ahead by that time.
 _LEAD = avatar.HAND_KV / avatar.HAND_KP
 _SERVOS = 10
@@ -72,7 +80,7 @@ class Rig:
 
     @property
     def body_state(self) -> Vector:
-        """Poses, rates and commands, laid out as in `mjsim.world.fidelity.body_state`, (BODY_SIZE,)."""
+        """Poses, rates and commands, laid out as in `mjsim.world.body.rig`, (BODY_SIZE,)."""
         return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
 
     def get_state(self) -> RigState:

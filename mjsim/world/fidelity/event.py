@@ -11,7 +11,7 @@ from mjsim.house.scene.scene import Scene
 from mjsim.values.actions import IDLE, ActionResult, EventKind, Move, Pick, Place, Refusal, StepAction
 from mjsim.values.observation import Observation, Steps, StepStates
 from mjsim.values.options import WorldOptions
-from mjsim.world.fidelity.body_state import PITCH, VX, VY, X
+from mjsim.world.body.rig import PITCH, VX, VY, X
 from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import TIME
 from mjsim.world.fidelity.kinematic_world import MAX_ROWS, KinematicWorld

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.actions import EventKind
 from mjsim.values.options import REST_STEPS
-from mjsim.world.body.rig import RigState
-from mjsim.world.fidelity.body_state import FORWARD, HEADING, SERVO, TURN_RATE, VX, VY, X, Y
+from mjsim.world.body.rig import FORWARD, HEADING, SERVO, TURN_RATE, VX, VY, RigState, X, Y
 from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.world.fidelity.kinematic_world import KinematicWorld

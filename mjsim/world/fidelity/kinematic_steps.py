@@ -12,8 +12,8 @@ from mjsim.values.motion_parameters import CarryingParameters
 from mjsim.values.observation import StepStates
 from mjsim.world.body.load_room import BodyMotion
 from mjsim.world.body.postures import Contacts, Hands, Holding, update_hands
+from mjsim.world.body.rig import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.world.fidelity import kinematics
-from mjsim.world.fidelity.body_state import BODY_SIZE, FORWARD, HEADING, PITCH, X, Y
 from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, later_step, next_step
 
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 # Layout of `KinematicState.vector`
 TIME = 0  # s
-BODY = 1  # body state, see `mjsim.world.fidelity.body_state`
+BODY = 1  # body state, see `mjsim.world.body.rig`
 HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, m
 HAND_SPEEDS = HANDS + 6  # m/s
 GRASPS = HAND_SPEEDS + 6  # for each hand: 2 * object + grip, or -1

@@ -13,7 +13,7 @@ from mjsim.values.inventory import LEFT
 from mjsim.values.observation import StepStates
 from mjsim.values.options import WorldOptions
 from mjsim.world.body.grips import AWAKE
-from mjsim.world.fidelity.body_state import LOOK
+from mjsim.world.body.rig import LOOK
 from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import (
     BODY,

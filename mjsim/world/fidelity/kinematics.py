@@ -18,7 +18,7 @@ from mjsim.house.scene.scene import Scene
 from mjsim.support.kernels import kernel
 from mjsim.values.options import WorldOptions
 from mjsim.world.body import motion_profiles
-from mjsim.world.fidelity.body_state import (
+from mjsim.world.body.rig import (
     FORWARD,
     HEADING,
     LEFT,

@@ -15,9 +15,9 @@ from mjsim.values.actions import ActionResult, EventKind, Place
 from mjsim.world.body.hand_motions import hover_height, square_heading
 from mjsim.world.body.load_room import BodyMotion
 from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
+from mjsim.world.body.rig import FORWARD, HEADING, X, Y
 from mjsim.world.body.slots import LoadExtent, Slot, best_slot, object_corners
 from mjsim.world.fidelity import motion_primitives
-from mjsim.world.fidelity.body_state import FORWARD, HEADING, X, Y
 from mjsim.world.fidelity.fall import Fall, drop
 from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import HANDS

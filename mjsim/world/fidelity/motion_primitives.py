@@ -10,8 +10,7 @@ from mjsim.support.kernels import kernel
 from mjsim.values.motion_parameters import MotionParameters
 from mjsim.values.observation import StepStates
 from mjsim.world.body.motion_profiles import progress
-from mjsim.world.fidelity import kinematics
-from mjsim.world.fidelity.body_state import (
+from mjsim.world.body.rig import (
     FORWARD,
     HEADING,
     LEFT,
@@ -24,6 +23,7 @@ from mjsim.world.fidelity.body_state import (
     X,
     Y,
 )
+from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity.kinematic_steps import (
     ASIDE,
     BODY,

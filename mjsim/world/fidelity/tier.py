@@ -131,7 +131,7 @@ class Tier(ABC):
     @property
     @abstractmethod
     def body(self) -> NDArray[np.float64]:
-        """Copy of the body state, laid out as in `mjsim.world.fidelity.body_state`, (BODY_SIZE,)."""
+        """Copy of the body state, laid out as in `mjsim.world.body.rig`, (BODY_SIZE,)."""
 
     @property
     @abstractmethod

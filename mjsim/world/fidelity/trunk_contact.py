@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
-from mjsim.world.fidelity.body_state import VX, VY, X, Y
+from mjsim.world.body.rig import VX, VY, X, Y
 
 _MAX_STEP = 0.05  # longest step in which a disc of 0.20 m cannot jump over a wall, m
 _MAX_ROUNDS = 12

