@@ -44,11 +44,8 @@ class Sequence:
         first, *self._lines = [line.strip() for line in source.strip().splitlines() if line.strip()]
         if first != "sequenceDiagram":
             raise ValueError(f"cannot draw diagram '{first}': only sequenceDiagram is supported")
-        self._names = dict(
-            found.groups()
-            for line in self._lines
-            if (found := re.fullmatch(r"participant (\w+) as (\w+)", line))
-        )
+        participants = re.findall(r"^participant (\w+) as (\w+)$", "\n".join(self._lines), re.MULTILINE)
+        self._names: dict[str, str] = dict(participants)
         self._column = {key: MARGIN + COLUMN * (0.5 + n) for n, key in enumerate(self._names)}
         self._y = MARGIN + 46.0
         self._open: list[float] = []

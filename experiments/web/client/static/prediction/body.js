@@ -1,4 +1,4 @@
-// Layout of the 16 numbers of a body, as mjsim/world/fidelity/body_state.py has it.
+// Layout of the 16 numbers of a body, as mjsim/world/body/rig.py has it.
 
 export const [X, Y, HEADING, PITCH] = [0, 1, 2, 3]; // m, m, rad (unwrapped), rad
 export const [VX, VY, TURN_RATE, PITCH_RATE] = [4, 5, 6, 7]; // in the house frame, m/s, rad/s
