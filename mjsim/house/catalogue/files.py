@@ -64,9 +64,7 @@ def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[
         return tables, text
     name = tables.pop("extends")
     if not isinstance(name, str) or path in extended or len(extended) > MAX_EXTENDS:
-        raise AssetError(
-            f"{path}: extends = {name!r} leads to no catalogue that stands by itself; name a house"
-        )
+        raise AssetError(f"{path}: extends = {name!r} does not lead to a complete catalogue; name a house")
     base, base_text = read_tables(house.base or parse_house(name, path.parent), (*extended, path))
     for key, table in tables.items():
         mergeable = isinstance(table, dict) and isinstance(base.get(key), dict)

@@ -58,7 +58,7 @@ def test_a_recipe_of_another_version_is_refused(tmp_path: Path) -> None:
     recipe, _ = generate(11, 1)
     path = tmp_path / "house.json"
     path.write_bytes(recipe.encoded().replace(f'"version": {VERSION}'.encode(), b'"version": 99'))
-    with pytest.raises(HouseError, match=r"version 99 .* this is version"):
+    with pytest.raises(HouseError, match=r"version 99 .* this mjsim has version"):
         load_catalogue(str(path))
 
 

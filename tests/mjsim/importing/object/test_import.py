@@ -533,5 +533,5 @@ def test_a_catalogue_extends_one_that_extends_another(tmp_path):
 def test_catalogues_that_extend_each_other_are_refused(tmp_path):
     for name, other in (("a", "b"), ("b", "a")):
         (tmp_path / f"{name}.toml").write_text(f'extends = "{other}.toml"\n', encoding="utf-8")
-    with pytest.raises(AssetError, match=r"leads to no catalogue that stands by itself"):
+    with pytest.raises(AssetError, match=r"does not lead to a complete catalogue"):
         Catalogue.load(str(tmp_path / "a.toml"))
