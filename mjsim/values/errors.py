@@ -1,20 +1,4 @@
-"""Typed errors of the physics side.
-
-    MjsimError
-    ├── AssetError        a model, texture or catalogue entry is missing or malformed
-    ├── EpisodeError      an episode file does not describe a valid episode
-    ├── HouseError        no house can be generated from this seed or recipe
-    ├── SamplingError     no disorganized house satisfies the constraints
-    ├── ActionError       an action has invalid numbers (a refused action is not an error)
-    ├── PersonError       a parameter of a person is out of range
-    ├── PhysicsError      MuJoCo warned, or a state is not finite
-    ├── StateError        a saved state does not fit the world, or a motion is under way
-    ├── RenderError       no GL context, or a frame cannot be drawn
-    ├── EnvironmentConfigError, EnvironmentStateError   an option is invalid, or a call is not possible now
-    └── ViewerError       no window could be opened, or dm-control is not installed
-
-Every message names the invalid value and how to correct it.
-"""
+"""Errors of `mjsim`, all derived from `MjsimError`. Messages name the invalid value and how to correct it."""
 
 from typing import Any
 
@@ -40,7 +24,7 @@ class SamplingError(MjsimError):
 
 
 class ActionError(MjsimError):
-    """An action has invalid numbers."""
+    """An action has invalid numbers. A refused action is not an error."""
 
 
 class PersonError(MjsimError):
