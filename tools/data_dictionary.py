@@ -1,6 +1,7 @@
 """Generator of the data dictionary docs/data.md from the recorded types: `python -m tools.data_dictionary`."""
 
 import inspect
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -79,7 +80,8 @@ def _rows(columns: Mapping[str, tuple[str, str]]) -> Iterator[str]:
 
 
 def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("None", "null")
+    linked = re.sub(r"`?docs/([\w-]+)\.md`?", r"[\1](\1.md)", text)
+    return linked.replace("|", "\\|").replace("None", "null")
 
 
 def _summary(kind: type[Any]) -> str:

@@ -217,7 +217,7 @@ PUBLIC = os.environ.get("MJSIM_PUBLIC_HOUSES", "")
 
 @pytest.mark.skipif(not PUBLIC, reason="MJSIM_PUBLIC_HOUSES names no folder with houses of others")
 def test_public_houses_import_without_editing_or_are_refused_in_one_line(tmp_path):
-    """Every world and scene below the folder; docs/import.md names those that were tried."""
+    """Return every world and scene below the folder."""
     files = [
         p
         for end in ("*.world", "libero_*.xml", "*.scene_instance.json", "layout*.yaml")
