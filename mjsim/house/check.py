@@ -70,7 +70,7 @@ def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
     except AssetError as error:
         return CheckReport("house", name, (_unreadable("catalogue", error),))
     house = compiled_house(catalogue)
-    found = house.once("findings", lambda: check_house(house))
+    found = house.cached("findings", lambda: check_house(house))
     if errors(found):
         return CheckReport("house", name, tuple(found), views=_partial_view(catalogue))
     fits, more = _check_sampling(house)

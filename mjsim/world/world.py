@@ -220,7 +220,7 @@ class World:
         if action.until is not None:
             limit = self._steps_until(action.until, seen.time, limit)
         phase, steps = self._tier.follow(walk, self._walker.progress, 1 if seen.busy else limit)
-        self._walker.note(phase, seen.time)
+        self._walker.record(phase, seen.time)
         if steps is None:
             return self._single_step(action.then or IDLE, Stop.ARRIVED)
         return self._result(steps, _STOPS.get(phase, Stop.DUE))

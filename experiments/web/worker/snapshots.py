@@ -8,7 +8,7 @@ from experiments.web.protocol import View
 from experiments.web.state import GaitParameters, SceneMessage, Snapshot, Speeds
 from experiments.web.worker.houses import scene_files
 from experiments.web.worker.live_session import LiveSession
-from mjsim.house.sight.foresight import Foresight
+from mjsim.house.sight.potential_visibility import PotentialVisibility
 from mjsim.values.errors import AssetError
 from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics
@@ -55,7 +55,7 @@ class SnapshotStream:
 
     def __init__(self, live: LiveSession, view: View) -> None:
         self._live, self._aspect = live, view.width / view.height
-        self._foresight = Foresight(live.scene, HORIZON, field_of_view(live, view))
+        self._potential_visibility = PotentialVisibility(live.scene, HORIZON, field_of_view(live, view))
         self._until: dict[str, int] = {}  # control steps until which objects are sent
         self._models = {item.name: item.model for item in live.scene.episode.objects}
         self._looked = -LOOK_EVERY  # control step of the last update
@@ -97,7 +97,7 @@ class SnapshotStream:
     def _look(self, seen: Observation, step: int) -> None:
         """Update the objects that the client may know, and how long."""
         self._looked, self._hands = step, seen.hands
-        soon = self._foresight.may_see(seen, self._aspect)
+        soon = self._potential_visibility.may_see(seen, self._aspect)
         for i in np.flatnonzero(soon).tolist():
             self._until[seen.object_names[i]] = step + LINGERING
         for name in seen.carried:

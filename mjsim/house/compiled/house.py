@@ -179,11 +179,11 @@ class CompiledHouse:
 
     def object_spec(self, path: Path, *, visuals: bool = True) -> mujoco.MjSpec:
         if visuals:
-            return self.once((path, True), lambda: separate_visuals(read_model(path, body="object")))
+            return self.cached((path, True), lambda: separate_visuals(read_model(path, body="object")))
         whole = self.object_spec(path)
-        return self.once((path, False), lambda: remove_visuals(whole.copy()))
+        return self.cached((path, False), lambda: remove_visuals(whole.copy()))
 
-    def once(self, key: Any, compute: Callable[[], T]) -> T:
+    def cached(self, key: Any, compute: Callable[[], T]) -> T:
         """Call `compute` at the first call with `key`, and return its result in all later calls."""
         if key not in self._derived:
             self._derived[key] = compute()

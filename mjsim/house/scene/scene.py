@@ -98,7 +98,7 @@ class Scene:
     visuals: bool
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
-    def once(self, key: str, make: Callable[[], T]) -> T:
+    def cached(self, key: str, make: Callable[[], T]) -> T:
         """Call `make` at the first call with `key`, and return its result in all later calls."""
         if key not in self._derived:
             self._derived[key] = make()
@@ -108,7 +108,7 @@ class Scene:
         """Return the scene of the same episode with or without visual geoms. States fit both."""
         if visuals == self.visuals:
             return self
-        return self.once(
+        return self.cached(
             "counterpart", lambda: assemble(self.episode, self.catalogue, person=self.person, visuals=visuals)
         )
 

@@ -19,7 +19,7 @@ def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData
     """Return the scene with visual geoms, and its state, which is valid until the next call for the same scene."""
     if scene.visuals:
         return scene, data
-    drawn = scene.once("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
+    drawn = scene.cached("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
     drawn.place(data)
     return drawn.scene, drawn.data
 

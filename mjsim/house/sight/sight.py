@@ -179,7 +179,7 @@ def _met(
 
 
 def _sight(scene: Scene) -> _SightGeometry:
-    return scene.once("sight", lambda: _sight_geometry(scene))
+    return scene.cached("sight", lambda: _sight_geometry(scene))
 
 
 def _sight_geometry(scene: Scene) -> _SightGeometry:

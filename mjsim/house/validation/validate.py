@@ -36,7 +36,7 @@ def require_usable(house: CompiledHouse) -> None:
     verdict = _verdict(catalogue) if catalogue.ref.kind == "generated" else None
     if verdict is not None and verdict.is_file():
         return
-    if found := errors(house.once("findings", lambda: check_house(house))):
+    if found := errors(house.cached("findings", lambda: check_house(house))):
         raise AssetError(one_line(found, catalogue.name))
     if verdict is not None:
         with contextlib.suppress(OSError):  # such as a full disk: the next process checks again

@@ -81,7 +81,7 @@ class Carrying:
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
         self._person = person
-        self.clearance: ClearanceField = compiled_house(scene.catalogue).once(
+        self.clearance: ClearanceField = compiled_house(scene.catalogue).cached(
             "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
         )
         # horizontal radius of each object around its grip, and its extent below, m, (n, 2)

@@ -187,7 +187,7 @@ class KinematicWorld:
 def _floor(scene: Scene) -> Floor:
     radius = scene.person.body_radius
     house = compiled_house(scene.catalogue)
-    return house.once(("floor", radius), lambda: Floor.of(scene.model, radius))
+    return house.cached(("floor", radius), lambda: Floor.of(scene.model, radius))
 
 
 def _grip_poses(scene: Scene) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
 
 def static_boxes(scene: Scene) -> Floats:
     """Return the lowest and highest corner of a box around each colliding geom of the house, m, (k, 6)."""
-    return compiled_house(scene.catalogue).once(("static boxes",), lambda: _static_boxes(scene.model))
+    return compiled_house(scene.catalogue).cached(("static boxes",), lambda: _static_boxes(scene.model))
 
 
 def _static_boxes(model: mujoco.MjModel) -> Floats:

@@ -65,7 +65,7 @@ class Walker:
             obstacles,
         )
 
-    def note(self, phase: int, time: float) -> None:
+    def record(self, phase: int, time: float) -> None:
         """Record the phase after the first control step of a walk, which started at `time`, s."""
         self.blocked = phase == BLOCKED
         if self.blocked:
@@ -80,7 +80,7 @@ class Walker:
         phase, *velocities = step_from_python(
             plain(walk), seen.position, seen.heading, seen.time, self.progress, seen.object_positions, True
         )
-        self.note(phase, seen.time)
+        self.record(phase, seen.time)
         return action.then or IDLE if phase == ARRIVED else Move(*velocities)
 
     def _obstacles(self, seen: Observation) -> Obstacles:

@@ -74,7 +74,7 @@ def test_snapshots_have_the_body_and_what_changed(shown, monkeypatch):
     monkeypatch.setattr("experiments.web.worker.snapshots.LOOK_EVERY", 1)
     names, seen = shown.live.world.observation().object_names, []
     monkeypatch.setattr(
-        "experiments.web.worker.snapshots.Foresight",
+        "experiments.web.worker.snapshots.PotentialVisibility",
         lambda *_: SimpleNamespace(may_see=lambda *_: np.isin(names, seen)),
     )
     for now in (names[:2], names[:2], names[1:]):

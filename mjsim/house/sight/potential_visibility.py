@@ -40,7 +40,7 @@ class _VisibilityGrid(NamedTuple):
     seen: NDArray[np.int8]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, (rows, columns, n)
 
 
-class Foresight:
+class PotentialVisibility:
     """Predictor of the objects that a person may see within a time.
 
     Args:
@@ -51,7 +51,7 @@ class Foresight:
 
     def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:
         person = scene.person
-        self._walls = scene.once("opaque walls", lambda: _opaque_walls(scene))
+        self._walls = scene.cached("opaque walls", lambda: _opaque_walls(scene))
         self._offsets, self._radii = _balls(scene)
         self._stride = horizon * person.fastest_walk
         self._swing = horizon * math.hypot(person.turning_speed, person.looking_speed)
