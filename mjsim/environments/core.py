@@ -166,7 +166,7 @@ class Rearrangement:
         return Transition(
             # The state after a physics error cannot be observed, so repeat the last observation.
             observation=self._observe(inputs) if error is None else _copied(self._last_observation),
-            reward=self._rewarded(world, before, after),
+            reward=self._compute_reward(world, before, after),
             terminated=terminated,
             truncated=self._is_over and not terminated,
             info=self._info(inputs, steps, error),
@@ -220,7 +220,7 @@ class Rearrangement:
     def _sensor_input(self, state: Observation) -> SensorInput:
         return SensorInput(self.layout, self.episode, state, self._images)
 
-    def _rewarded(self, world: World, before: Observation, after: Observation) -> float:
+    def _compute_reward(self, world: World, before: Observation, after: Observation) -> float:
         given = self._reward(world.scene, before, after)
         try:
             reward = math.nan if isinstance(given, str) else float(given)

@@ -184,13 +184,13 @@ def render_floorplan(
     rasteriser = Rasteriser(model, width, height, _PLAN_PROFILE, TOP_DOWN_GROUPS, _PLAN_LIGHTS)
     with rasteriser, current_context():
         rasteriser.update(data)
-        drawn = rasteriser.layer(view, hidden=_of_person(model), lowest=True)
+        drawn = rasteriser.layer(view, hidden=_person_geoms(model), lowest=True)
         rgb = reduced(drawn.colour, rasteriser.size)
         rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
     return FloorPlanPicture(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
 
 
-def _of_person(model: Any) -> NDArray[np.bool_]:
+def _person_geoms(model: Any) -> NDArray[np.bool_]:
     base = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, avatar.BASE)
     return np.asarray((model.body_rootid[model.geom_bodyid] == base) & (base >= 0))
 

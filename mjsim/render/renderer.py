@@ -194,7 +194,7 @@ class LayeredRenderer(OffScreenRenderer):
             self._rasteriser.update(data)
             view, still = ViewVolume.of(camera), camera is self._camera
             self._camera = camera
-            if not (self._layered and still) or np.any(self._note_movement(data) & self._translucent):
+            if not (self._layered and still) or np.any(self._detect_movement(data) & self._translucent):
                 self._rest = None
                 return self._rasteriser.colour(view, markers)
             rest = self._background(view)
@@ -226,7 +226,7 @@ class LayeredRenderer(OffScreenRenderer):
     def _moves(self) -> NDArray[np.bool_]:
         return self._still < REST
 
-    def _note_movement(self, data: Any) -> NDArray[np.bool_]:
+    def _detect_movement(self, data: Any) -> NDArray[np.bool_]:
         poses = np.hstack([data.geom_xpos, data.geom_xmat])
         moved = np.any(poses != self._poses, axis=1) & ~np.isnan(self._poses[:, 0])
         self._still = np.where(moved, 0, np.minimum(self._still + 1, REST))

@@ -138,7 +138,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
     """Return a digest, 16 hex digits, of everything in a compiled model that affects the physics."""
     digest = hashlib.sha256()
     for part in (model, model.opt):
-        for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_looks(n)):
+        for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_visual(n)):
             value = getattr(part, name)
             if isinstance(value, np.ndarray):
                 digest.update(f"{name}{value.dtype}{value.shape}".encode())
@@ -151,7 +151,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
 def engine_versions() -> dict[str, str]:
     """Return the versions of everything that determines how states follow from each other."""
     return {
-        "mjsim": _own_version(),
+        "mjsim": _installed_version(),
         "physics_code": _code_fingerprint(),
         "mujoco": mujoco.__version__,
         "numpy": np.__version__,
@@ -159,12 +159,12 @@ def engine_versions() -> dict[str, str]:
     }
 
 
-def _is_looks(name: str) -> bool:
-    counts_looks = name.startswith(("ntex", "nmat", "nlight", "ncam", "nskin", "nname", "npath", "nbuffer"))
-    return counts_looks or name.startswith(_LOOKS) or any(part in name for part in _LOOKS_ANYWHERE)
+def _is_visual(name: str) -> bool:
+    counts_visuals = name.startswith(("ntex", "nmat", "nlight", "ncam", "nskin", "nname", "npath", "nbuffer"))
+    return counts_visuals or name.startswith(_LOOKS) or any(part in name for part in _LOOKS_ANYWHERE)
 
 
-def _own_version() -> str:
+def _installed_version() -> str:
     try:
         return version("mjsim")
     except PackageNotFoundError:

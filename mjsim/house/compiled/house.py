@@ -105,11 +105,11 @@ def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     apart = body.add_body(name=VISUAL_BODY)
     apart.fuse = 0
     for frame, geoms in groups:
-        _move(spec, geoms, _like(body, frame), apart)
+        _move(spec, geoms, _add_frame_like(body, frame), apart)
     return spec
 
 
-def _like(body: Any, frame: Any) -> Any:
+def _add_frame_like(body: Any, frame: Any) -> Any:
     new = body.add_frame()
     if frame is not None:
         new.pos, new.quat = frame.pos, frame.quat

@@ -108,7 +108,7 @@ def visible_objects(
     positive upwards. `field` is by default that of the scene's person. `among` are the names to look for.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
-    return tuple(scene.index.names[i] for i in sorted(set(_met(scene, data, gaze, among, once=True))))
+    return tuple(scene.index.names[i] for i in sorted(set(_object_hits(scene, data, gaze, among, once=True))))
 
 
 def visible_shares(
@@ -126,7 +126,7 @@ def visible_shares(
     The arguments are as for `visible_objects`.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
-    hits = list(_met(scene, data, gaze, among, once=False))
+    hits = list(_object_hits(scene, data, gaze, among, once=False))
     return {scene.index.names[i]: hits.count(i) / len(OFFSETS) for i in sorted(set(hits))}
 
 
@@ -158,7 +158,7 @@ def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaz
     return _Gaze(eye, axes, slopes, float(field.range))
 
 
-def _met(
+def _object_hits(
     scene: Scene, data: mujoco.MjData, gaze: _Gaze, among: Collection[str] | None, *, once: bool
 ) -> Iterator[int]:
     """Yield the object index of each ray that hits its object first, or only of the first such ray if `once`."""

@@ -31,7 +31,7 @@ def check_bins(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    subject = _about(floor, receptacle)
+    subject = _for_receptacle(floor, receptacle)
     bottom, top = receptacle.center[2] + receptacle.half_size[2] * np.array([-1.0, 1.0])
     if top > MAX_TOP:
         yield subject.error(
@@ -63,7 +63,7 @@ def _bin_height(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterato
 
 
 def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
-    compiled, subject = floor.compiled, _about(floor, receptacle)
+    compiled, subject = floor.compiled, _for_receptacle(floor, receptacle)
     model = compiled.model
     own = model.body(f"{receptacle.key}/receptacle").id
     half = receptacle.half_size
@@ -92,7 +92,7 @@ def _bin_surroundings(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> I
 
 def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[Finding]:
     compiled = floor.compiled
-    subject = _about(floor, receptacle)
+    subject = _for_receptacle(floor, receptacle)
     stand = floor.navigable.snap(receptacle.approach, math.inf)
     away, gap = float(np.hypot(*(stand - receptacle.approach))), receptacle.distance(stand)
     if away > SNAP or gap > DEFAULT.reach:
@@ -114,5 +114,5 @@ def _bin_use(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Iterator[F
         )
 
 
-def _about(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:
+def _for_receptacle(floor: WalkableFloor, receptacle: ReceptacleGeometry) -> Compiled:
     return replace(floor.compiled, subject=f"receptacle {receptacle.key}")

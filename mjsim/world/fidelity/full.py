@@ -167,7 +167,7 @@ class Full(Tier):
         self.person.rig.advance()
         for kind, item in self.monitor.check(self.person.held):
             self.episode_state.report(self.time, kind, item)
-        self._watch_grips()
+        self._release_slipped()
         for item in self.dislodged():
             self.episode_state.dislodged(self.time, item)
 
@@ -249,7 +249,7 @@ class Full(Tier):
             return avatar.CARRY
         return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE
 
-    def _watch_grips(self) -> None:
+    def _release_slipped(self) -> None:
         motion = self._motion
         for hand in self.carrying.slipped():
             item = self.person.held[hand]

@@ -53,12 +53,12 @@ class EpisodeState:
         self.report(time, EventKind.PICKED if success else EventKind.PICK_FAILED, item)
 
     def placed(self, time: float, item: int, receptacle: str | None, success: bool) -> None:
-        self._let_go(item)
+        self._release(item)
         self.status[item] = ObjectStatus.DELIVERED if success else ObjectStatus.LOOSE
         self.report(time, EventKind.PLACED if success else EventKind.PLACE_FAILED, item, receptacle)
 
     def lost(self, time: float, item: int) -> None:
-        self._let_go(item)
+        self._release(item)
         self.status[item] = ObjectStatus.LOOSE
         self.report(time, EventKind.GRIP_LOST, item)
 
@@ -107,7 +107,7 @@ class EpisodeState:
         self.status = list(details.status)
         self.events = []
 
-    def _let_go(self, item: int) -> None:
+    def _release(self, item: int) -> None:
         name = self._index.names[item]
         if name in self.inventory.carried:
             self._set(self.inventory.release(name))
