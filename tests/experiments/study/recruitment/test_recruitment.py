@@ -8,12 +8,14 @@ import time
 import msgspec
 import pytest
 
-from experiments.errors import ConfigError
+from experiments.errors import ConfigError, StoreError
 from experiments.study.file import Recruitment, read_people_study
 from experiments.study.recruitment import recruiter
 from experiments.trials.designs import FOLDER
 from experiments.visit.recruiter import InvalidLink, Preview
+from experiments.visit.store import Store
 from tests.experiments.visit.server.test_server import begin, go_to, phase, play_trial, post, serving
+from tests.scripted_workers import LAST, connected, started, until_phase
 
 CODES = {"completed": "C0MPLETE", "screened_out": "SCREEN0UT", "no_consent": "N0C0NSENT"}
 PROLIFIC = Recruitment(platform="prolific", study_id="study0000001", **CODES)
@@ -209,4 +211,37 @@ def test_a_task_that_was_over_when_its_page_was_closed_is_noted(tmp_path, monkey
             with sqlite3.connect(tmp_path / "study.db") as database:
                 noted = database.execute("SELECT ended FROM trial WHERE phase = 'task'").fetchall()
             database.close()
+        assert "Your opinion" in client.get(link).text
+
+
+def test_a_task_whose_end_the_database_refused_is_recorded_before_its_participant_times_out(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr("experiments.visit.server.background.SWEEP_S", 0.1)
+    finish_trial, refused = Store.finish_trial, []
+
+    async def refuse_once(self, *arguments):
+        if not refused:
+            refused.append(arguments)
+            raise StoreError("the database is away")
+        return await finish_trial(self, *arguments)
+
+    study = with_recruitment(PROLIFIC, abandoned_after=3.0, timed_out_after=3.0)
+    with serving(tmp_path, study) as client:
+        link = begin(client, **IDS)
+        go_to(client, link, study, "task")
+        monkeypatch.setattr(Store, "finish_trial", refuse_once)
+        with connected(client, link) as socket:
+            started(socket, "task")
+            socket.send_json({"type": "inputs", "inputs": [{"number": 1, "scroll": LAST}]})
+            until_phase(socket, "failed")
+        until, recorded = time.monotonic() + 20.0, []
+        while not recorded:
+            assert time.monotonic() < until
+            time.sleep(0.1)
+            with sqlite3.connect(tmp_path / "study.db") as database:
+                recorded = database.execute("SELECT ended FROM trial WHERE phase = 'task'").fetchall()
+                status = database.execute("SELECT status FROM person").fetchall()
+            database.close()
+        assert refused and status == [("assigned",)]
         assert "Your opinion" in client.get(link).text
