@@ -1,6 +1,6 @@
-"""The heads-up display: assistance conditions, the HUD state that they make, and its drawing.
+"""The heads-up display: assistance conditions, the HUD state that they return, and its drawing.
 
-Serves sessions, which show it, and authors of conditions; it knows values only, neither physics nor planner.
+It depends neither on the physics nor on the planner.
 """
 
 from typing import TYPE_CHECKING
@@ -55,39 +55,21 @@ if TYPE_CHECKING:
     from hud.texts import HudTexts
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
-        "errors": ("HudError",),
-        "lists": ("assemble", "random_order_rows"),
-        "markers": ("flagpoles",),
-        "projection": ("CameraView", "pointer_to"),
-        "schema": ("from_dict", "json_schema", "to_dict"),
-        "state": (
-            "BinEntry",
-            "ChecklistItem",
-            "HudState",
-            "InventorySlot",
-            "Marker",
-            "Message",
-            "MessageKind",
-            "MiniMap",
-            "Pointer",
-        ),
-        "task": (
-            "Alternative",
-            "KnownPlan",
-            "PlanAhead",
-            "TaskObject",
-            "TaskReceptacle",
-            "TaskStep",
-            "TaskView",
-        ),
-        "texts": ("HudTexts",),
+        "errors": "HudError",
+        "lists": "assemble random_order_rows",
+        "markers": "flagpoles",
+        "projection": "CameraView pointer_to",
+        "schema": "from_dict json_schema to_dict",
+        "state": "BinEntry ChecklistItem HudState InventorySlot Marker Message MessageKind MiniMap Pointer",
+        "task": "Alternative KnownPlan PlanAhead TaskObject TaskReceptacle TaskStep TaskView",
+        "texts": "HudTexts",
     }
 
     def __getattr__(name):
         import importlib
 
         for module, names in _MODULES.items():
-            if name in names:
+            if name in names.split():
                 return getattr(importlib.import_module(f"hud.{module}"), name)
         raise AttributeError(f"module 'hud' has no attribute {name!r}; its public names are {__all__}")
 

@@ -1,6 +1,7 @@
-"""Lay the HUD over a frame."""
+"""Drawing of the HUD, and of captions, over frames."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -9,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hud import minimap as maps
-from hud import panels
-from hud.canvas import Patch, Rect
-from hud.checklist import count_text, draw_checklist, hidden_text
+from hud import panels, theme
+from hud.canvas import Canvas, Patch, Rect
 from hud.errors import FrameError
 from hud.layout import Layout, arrange, pointer_rect, unit_of
-from hud.options.minimap import FLOORPLAN
-from hud.state import HudState, MiniMap
+from hud.state import FLOORPLAN, HudState, MiniMap
 from hud.stencils import Pictures, Stencils
 from hud.texts import HudTexts, filled
 from hud.theme import POINTER
@@ -24,17 +23,15 @@ Draw = Callable[..., Patch]
 
 
 class Compositor:
-    """Draws HUD states over frames, and keeps each panel until what it says has changed.
-
-    The result depends on the arguments alone; what is kept only saves time.
+    """Draws HUD states over frames. A panel is drawn again only if its content has changed.
 
     Args:
-        pictures: RGBA pictures, uint8 (s, s, 4), straight alpha, by the keys of states; the floor plan may be any
-            rectangle. Must not change.
+        pictures: RGBA pictures by key, uint8 (s, s, 4), straight alpha. Only the floor plan need not be square. They
+            must not change.
         texts: Words of the HUD.
 
     Raises:
-        FrameError: A picture has another shape or type.
+        FrameError: A picture has the wrong shape or type.
     """
 
     def __init__(self, pictures: Pictures, texts: HudTexts) -> None:
@@ -51,17 +48,14 @@ class Compositor:
         self._patches: dict[str, tuple[object, Patch]] = {}
 
     def compose(self, frame: NDArray[np.uint8], state: HudState) -> NDArray[np.uint8]:
-        """A copy of `frame` with the HUD on top.
+        """Return a copy of a frame with the HUD drawn over it. Markers are left to the renderer.
 
         Args:
-            frame: RGB, uint8, shape (H, W, 3), at least 320 x 240; not changed.
-            state: What to show. Its markers are part of the world, drawn by the renderer.
-
-        Returns:
-            RGB, uint8, shape (H, W, 3).
+            frame: RGB, uint8, shape (H, W, 3), at least 320 x 240.
+            state: HUD state to draw.
 
         Raises:
-            FrameError: The frame has another shape or type, or is too small.
+            FrameError: The frame has the wrong shape or type, or is too small.
         """
         if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
             raise FrameError(f"frame must be uint8 (H, W, 3), got {frame.dtype} {frame.shape}")
@@ -81,12 +75,12 @@ class Compositor:
         return out
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
-        """Where the panels of `state` go in a frame of `width` x `height` px."""
+        """Return the layout of the panels of `state` in a frame of `width` x `height` px."""
         unit = unit_of(width, height)
         if self._stencils.unit != unit:
             self._stencils = Stencils(self._stencils.pictures, unit)
             self._patches.clear()
-        key = (width, height, _without_what_moves(state))
+        key = (width, height, _without_motion(state))
         if self._layout is None or self._layout[0] != key:
             self._layout = (key, arrange(key[2], width, height, self._stencils.typeface))
         found = self._layout[1]
@@ -96,7 +90,6 @@ class Compositor:
         return dataclasses.replace(found, panels={**found.panels, "pointer": pointer})
 
     def _patch(self, name: str, draw: Draw, *what: object) -> Patch:
-        """What `draw` makes of `what`; the one drawn last under this name if it is the same."""
         known = self._patches.get(name)
         if known is None or known[0] != what:
             known = self._patches[name] = (what, draw(self._stencils, *what))
@@ -106,22 +99,21 @@ class Compositor:
 def compose(
     frame: NDArray[np.uint8], state: HudState, pictures: Pictures, texts: HudTexts
 ) -> NDArray[np.uint8]:
-    """One frame with the HUD on top; for many frames keep a `Compositor`.
+    """Draw the HUD over one frame. Use a `Compositor` to draw many frames.
 
     Args:
-        frame: RGB, uint8, shape (H, W, 3), at least 320 x 240; not changed.
-        state: What to show.
-        pictures: RGBA pictures, uint8 (s, s, 4), by the keys that the state uses.
+        frame: RGB, uint8, shape (H, W, 3), at least 320 x 240.
+        state: HUD state to draw.
+        pictures: RGBA pictures by key, uint8 (s, s, 4), straight alpha.
         texts: Words of the HUD.
 
     Raises:
-        FrameError: The frame or a picture has another shape or type, or the frame is too small.
+        FrameError: The frame or a picture has the wrong shape or type, or the frame is too small.
     """
     return Compositor(pictures, texts).compose(frame, state)
 
 
-def _without_what_moves(state: HudState) -> HudState:
-    """The state less what changes from frame to frame without moving a panel."""
+def _without_motion(state: HudState) -> HudState:
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None
@@ -138,16 +130,16 @@ def _without_what_moves(state: HudState) -> HudState:
 
 
 def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tuple[Any, ...]]:
-    """By panel: the function that draws it, and what it takes besides stencils and rectangle."""
-    hidden = hidden_text(layout.first, len(state.checklist) - layout.stop, texts)
-    header = (state.checklist_title, count_text(state.checklist, texts))
+    """Return, for each panel, its drawing function and the arguments that follow the stencils and the rectangle."""
+    hidden = panels.hidden_text(layout.first, len(state.checklist) - layout.stop, texts)
+    header = (state.checklist_title, panels.count_text(state.checklist, texts))
     bins = state.bins[: len(layout.bin_rows)]
     more = len(state.bins) - len(bins)
     title = filled(texts.more_bins, count=more) if more else texts.bins
     found: dict[str, tuple[Any, ...]] = {
         "progress": (panels.draw_progress, state.delivered, state.total),
         "checklist": (
-            draw_checklist,
+            panels.draw_checklist,
             header,
             state.checklist[layout.first : layout.stop],
             layout.rows,
@@ -171,3 +163,39 @@ def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tup
         step = round(state.pointer.angle / (2.0 * math.pi) * panels.POINTER_STEPS) % panels.POINTER_STEPS
         found["pointer"] = (panels.draw_pointer, step)
     return found
+
+
+class Captions:
+    """Draws captions of a title and a line of detail at the bottom of frames of one size, px.
+
+    Raises:
+        FrameError: The size is too small.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        self._size = (width, height)
+        self._stencils = Stencils({}, unit_of(width, height))
+        self._patch = functools.lru_cache(64)(self._draw)
+
+    def over(self, frame: NDArray[np.uint8], title: str, detail: str = "") -> NDArray[np.uint8]:
+        """Return a copy of an RGB frame, uint8, shape (height, width, 3), with a caption."""
+        width, height = self._size
+        if frame.shape != (height, width, 3):
+            raise FrameError(f"frame must be of shape {(height, width, 3)}, got {frame.shape}")
+        out = np.array(frame, dtype=np.uint8, order="C", copy=True)
+        patch = self._patch(title, detail)
+        rows, columns = patch.keep.shape[:2]
+        bottom = height - self._stencils.typeface.px(2 * theme.MARGIN)
+        patch.lay_over(out, (width - columns) // 2, bottom - rows)
+        return out
+
+    def _draw(self, title: str, detail: str) -> Patch:
+        typeface = self._stencils.typeface
+        px, room = typeface.px, self._size[0] - typeface.px(6 * theme.MARGIN)
+        first, second = typeface.fit(title, theme.CHIP, room), typeface.fit(detail, theme.BAR, room)
+        text_width = max(typeface.width(first, theme.CHIP), typeface.width(second, theme.BAR))
+        height = px(2 * theme.PADDING + theme.LINE * (2.4 if second else 1.2))
+        canvas = Canvas.panel(self._stencils, Rect(0, 0, text_width + px(4 * theme.PADDING), height))
+        canvas.text(px(2 * theme.PADDING), px(theme.PADDING + 13), first, theme.CHIP, theme.TEXT)
+        canvas.text(px(2 * theme.PADDING), px(theme.PADDING + 31), second, theme.BAR, theme.QUIET)
+        return canvas.patch()

@@ -1,34 +1,32 @@
-"""Typed errors of the HUD.
+"""Errors of the HUD.
 
-    HudError
-    ├── ConditionError    no assistance condition of that name, or it is not usable
-    ├── TaskViewError     a task view names an object or receptacle that it does not hold
-    ├── FrameError        a frame, picture or camera has an unusable shape
-    ├── MessageError      no message of that key
-    └── SchemaError       a dictionary does not describe a HUD state
-
-Every message names the offending value and what to do about it.
+HudError
+├── ConditionError    an assistance condition does not exist or cannot be used
+├── TaskViewError     a task view names an object or receptacle that it does not contain
+├── FrameError        a frame, picture or camera has the wrong shape
+├── MessageError      a message key does not exist
+└── SchemaError       a dictionary does not describe a HUD state
 """
 
 
 class HudError(Exception):
-    """Base of every error raised by :mod:`hud`."""
+    """Base class of all errors of :mod:`hud`."""
 
 
 class ConditionError(HudError):
-    """No assistance condition of that name, or it is not usable."""
+    """An assistance condition does not exist or cannot be used."""
 
 
 class TaskViewError(HudError):
-    """A task view names an object or receptacle that it does not hold."""
+    """A task view names an object or receptacle that it does not contain."""
 
 
 class FrameError(HudError):
-    """A frame, picture or camera has an unusable shape."""
+    """A frame, picture or camera has the wrong shape."""
 
 
 class MessageError(HudError):
-    """No message of that key."""
+    """A message key does not exist."""
 
 
 class SchemaError(HudError):

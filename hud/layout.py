@@ -1,4 +1,4 @@
-"""Where each panel goes; nothing overlaps.
+"""Layout of the panels, which never overlap.
 
 progress        message bar         clock
 task list                            bins
@@ -18,12 +18,12 @@ from hud.errors import FrameError
 from hud.state import BinEntry, ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
 
-CONTEXT = 2  # rows above the current one that stay in sight
+CONTEXT_ROWS = 2  # rows that stay visible above the current one
 
 
 @dataclass(frozen=True)
 class ListRow:
-    """A row of a list: its height, px, the px that its text may take, and its detail, broken into lines."""
+    """Height of a list row, the width left for its text, both in px, and its detail broken into lines."""
 
     height: int
     text_width: int
@@ -32,23 +32,23 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rectangles of the panels in a frame, px, and what fits into them."""
+    """Rectangles of the panels in a frame, px, and the rows and lines that they show."""
 
-    panels: Mapping[str, Rect]  # those that are shown, by name, in the order in which they are drawn
-    free: Rect  # the part of the view between the panels
-    first: int  # index of the first row of the task list that is shown
-    rows: tuple[ListRow, ...]  # the rows of the task list that are shown
-    bin_rows: tuple[ListRow, ...]  # the rows of the list of bins that are shown, from the first one on
-    message_lines: tuple[str, ...]  # the message, broken into lines
+    panels: Mapping[str, Rect]  # visible panels by name, in drawing order
+    free: Rect  # area between the panels
+    first: int  # index of the first visible row of the task list
+    rows: tuple[ListRow, ...]  # visible rows of the task list
+    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, which starts with its first row
+    message_lines: tuple[str, ...]  # message broken into lines
 
     @property
     def stop(self) -> int:
-        """One past the index of the last row of the task list that is shown."""
+        """Index after the last visible row of the task list."""
         return self.first + len(self.rows)
 
 
 def unit_of(width: int, height: int) -> float:
-    """Frame px per theme px: the frame, of 320 x 240 px or more, always has room for 640 x 480 theme px."""
+    """Return the scale, frame px per theme px, at which a frame of at least 320 x 240 px holds 640 x 480 theme px."""
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
@@ -58,7 +58,7 @@ def unit_of(width: int, height: int) -> float:
 
 
 def margins(width: int, height: int) -> tuple[int, int, int, int]:
-    """Room above, below, to the left and to the right of a picture, px, in which all but messages lie beside it."""
+    """Return the space above, below, left and right of a picture, px, which holds all panels except long messages."""
     chips = theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP
     left, right = 2 * theme.MARGIN + theme.MAX_LIST_WIDTH, 2 * theme.MARGIN + theme.BINS_WIDTH_WIDE
     hands = theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN
@@ -67,8 +67,8 @@ def margins(width: int, height: int) -> tuple[int, int, int, int]:
 
 
 def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
-    """Lay out the panels of `state`, without its pointer, in a frame of a width and a height, px."""
-    grid = _Grid(width, height, typeface)
+    """Lay out the panels of `state`, except its pointer, in a frame of `width` x `height` px."""
+    grid = _PanelGrid(width, height, typeface)
     checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
     bins, bin_rows = grid.bins(state.bins, minimap)
@@ -88,7 +88,10 @@ def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Lay
 
 
 def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
-    """A square of `side` px at the edge of the free view in a direction, rad, counter-clockwise from the right."""
+    """Return a square of `side` px at the edge of the free view.
+
+    The angle, rad, is counter-clockwise from the right.
+    """
     half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
     dx, dy = math.cos(angle), -math.sin(angle)
     reach = min(
@@ -100,9 +103,12 @@ def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
 
 
 def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
-    """First and one past the last row to show in `room` px: the current one, two before it, then what fits."""
+    """Return the index of the first visible row and the index after the last one.
+
+    The current row and up to two rows before it are visible, then as many rows as fit into `room` px.
+    """
     first, stop, used = current, current + 1, heights[current]
-    while first > max(0, current - CONTEXT) and used + heights[first - 1] <= room // 2:
+    while first > max(0, current - CONTEXT_ROWS) and used + heights[first - 1] <= room // 2:
         first -= 1
         used += heights[first]
     while stop < len(heights) and used + heights[stop] <= room:
@@ -115,7 +121,7 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
 
 
 def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
-    """First and one past the last row to show in `room` px, from `first` on, or earlier near the end."""
+    """Return the same as `visible_rows` for a list scrolled to row `first`, or less far near its end."""
     ends = np.cumsum(heights)
     last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
     first = min(max(first, 0), last_first, len(heights) - 1)
@@ -124,14 +130,12 @@ def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
 
 
 def _current_row(items: Sequence[ChecklistItem]) -> int:
-    """Index of the row that must be visible: the current one, or the first, or the last when all are done."""
+    """Return the index of the current row, else of the first row, or of the last one of a finished plan."""
     last = len(items) - 1 if items[-1].number is not None else 0
     return next((i for i, item in enumerate(items) if item.current), last)
 
 
-class _Grid:
-    """Sizes of a frame's panels, px."""
-
+class _PanelGrid:
     def __init__(self, width: int, height: int, typeface: Typeface) -> None:
         self._width, self._height = width, height
         self._typeface, px = typeface, typeface.px
@@ -144,17 +148,15 @@ class _Grid:
         self._bins_left = width - self.margin - self._bins_width
         self._top = self.margin + self._chip_height + self._gap
         self._column_height = height - px(theme.LIST_BOTTOM) - self._top
-        self._left = self.margin + self._list_width + self._gap  # of what is between the two lists
+        self._left = self.margin + self._list_width + self._gap  # left edge of the space between the lists
         self._between = self._bins_left - self._gap - self._left
 
     def chip(self, x: int) -> Rect:
-        """A small panel in an upper corner."""
         return Rect(x, self.margin, self.chip_width, self._chip_height)
 
     def checklist(
         self, items: tuple[ChecklistItem, ...], scroll: int
     ) -> tuple[Rect | None, int, tuple[ListRow, ...]]:
-        """Rectangle of the task list, its first row and the rows it shows; never more than fit."""
         if not items:
             return None, 0, ()
         rows = tuple(self._list_row(item) for item in items)
@@ -170,7 +172,6 @@ class _Grid:
         return Rect(self.margin, self._top, self._list_width, height), first, rows[first:stop]
 
     def _list_row(self, item: ChecklistItem) -> ListRow:
-        """More lines of detail where one is too short for what is still to be done."""
         taken = 2 * theme.PADDING + 2 + theme.TILE + theme.GAP + (0 if item.number is None else theme.NUMBER)
         if item.target_picture is not None:
             taken += theme.TARGET + 3
@@ -179,7 +180,6 @@ class _Grid:
         return ListRow(self._px(theme.ROW + theme.LINE * max(0, len(detail) - 1)), width, detail)
 
     def minimap(self, minimap: MiniMap | None) -> Rect | None:
-        """As wide as the list of bins, in the lower right corner, in the proportions of the house."""
         if minimap is None:
             return None
         inset = 2 * self._px(theme.MAP_INSET)
@@ -191,7 +191,7 @@ class _Grid:
     def bins(
         self, entries: tuple[BinEntry, ...], below: Rect | None
     ) -> tuple[Rect | None, tuple[ListRow, ...]]:
-        """Rectangle of the list of bins and its rows; places get fewer lines when many bins must fit."""
+        """Return the rectangle of the list of bins and its rows. Places get fewer lines if many bins must fit."""
         if not entries:
             return None, ()
         px = self._px
@@ -213,7 +213,6 @@ class _Grid:
         return Rect(self._bins_left, self._top, self._bins_width, height), rows
 
     def inventory(self) -> Rect:
-        """Two slots at the bottom, below the task list, apart from each other and centred as far as there is room."""
         px = self._px
         span = self._bins_left - self._gap - self.margin
         width = min(2 * px(theme.SLOT_WIDTH) + px(theme.BETWEEN_HANDS), span)
@@ -226,7 +225,7 @@ class _Grid:
         )
 
     def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
-        """One line between the chips when the text fits there, else up to three lines between the lists."""
+        """Return the message bar and its lines. A text too long for one line between the chips gets up to three."""
         if message is None or message.opacity <= 0.0 or not message.text.strip():
             return None, ()
         face, extra = theme.BAR, self._px(theme.MESSAGE_ICON + 2 * theme.PADDING)
@@ -242,10 +241,9 @@ class _Grid:
         return Rect(self._centred(width, left, span), self.margin, width, height), lines
 
     def free(self, inventory: Rect) -> Rect:
-        """The view between the lists, below the tallest message and above the inventory."""
         top = self._top + (theme.MESSAGE_LINES - 1) * self._px(theme.LINE + 3)
         return Rect(self._left, top, self._between, inventory.y - self._gap - top)
 
     def _centred(self, width: int, left: int, span: int) -> int:
-        """First column of something `width` wide: as near to the middle of the frame as `span` px from `left` allow."""
+        """Return the column that centres `width` px in the frame as far as the `span` px from `left` allow."""
         return min(max((self._width - width) // 2, left), left + span - width)

@@ -1,4 +1,4 @@
-"""What conditions have in common: the list of bins, the hands, rows of objects in random order, flagpoles."""
+"""Building blocks of conditions: rows of objects in random order, flagpoles, and the panels of every condition."""
 
 import math
 from collections.abc import Callable
@@ -7,11 +7,11 @@ from hud.markers import flagpole
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
 from hud.task import TaskObject, TaskView
 
-NEAR = 1.6  # m; about where an object leaves the lower edge of the view
+NEAR = 1.6  # m; an object nearer than this is about to leave the view at its lower edge
 
 
 def in_sentence(label: str) -> str:
-    """A label inside a sentence: "Blue mug" to "blue mug"; "LEGO car" and "T-shirt" stay."""
+    """Return a label as it reads in a sentence: "Blue mug" becomes "blue mug", but "LEGO car" and "T-shirt" stay."""
     first, _, rest = label.partition(" ")
     stem = first.partition("-")[0]
     plain = len(stem) > 1 and stem.isalpha() and first[:1].isupper() and first[1:].islower()
@@ -19,12 +19,12 @@ def in_sentence(label: str) -> str:
 
 
 def bins(view: TaskView) -> tuple[BinEntry, ...]:
-    """Every receptacle with picture, room and place in the room: all conditions show these (PAPER sections 5 and 7)."""
+    """List all receptacles with picture, room and place in the room (PAPER sections 5 and 7)."""
     return tuple(BinEntry(r.label, f"{r.room}, {r.place}", r.picture) for r in view.receptacles)
 
 
 def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
-    """Contents of the left and the right hand; at a capacity of one, only the right hand carries."""
+    """Return the contents of the left and the right hand. With a capacity of one, only the right hand carries."""
     left, right = (
         InventorySlot() if name is None else InventorySlot(view.object(name).label, view.object(name).picture)
         for name in view.hands
@@ -33,9 +33,9 @@ def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
 
 
 def random_order(view: TaskView) -> tuple[TaskObject, ...]:
-    """Objects in the participant's order; picked ones at the bottom, in the order of picking.
+    """Return the objects in the participant's random order, followed by the picked ones in the order of their picks.
 
-    An object that was dropped counts as not picked.
+    A dropped object does not count as picked.
     """
     picks = [name for kind, name in view.steps_done if kind == "pick"]
     last_pick = {name: i for i, name in enumerate(picks)}
@@ -46,7 +46,7 @@ def random_order(view: TaskView) -> tuple[TaskObject, ...]:
 
 
 def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tuple[ChecklistItem, ...]:
-    """Rows of the objects in `random_order`, picked ones crossed out."""
+    """Make a row for each object, in the order of `random_order`. Rows of picked objects are crossed out."""
     return tuple(
         ChecklistItem(
             text=o.label,
@@ -61,7 +61,7 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
 
 
 def misplaced_flagpoles(view: TaskView) -> tuple[Marker, ...]:
-    """A flagpole over every misplaced object, known through walls (PAPER section 5)."""
+    """Make a flagpole, visible through walls, over every misplaced object (PAPER section 5)."""
     markers: list[Marker] = []
     for item in view.objects:
         if item.status == "loose":
@@ -77,7 +77,10 @@ def assemble(
     markers: tuple[Marker, ...] = (),
     pointer: Pointer | None = None,
 ) -> HudState:
-    """The HUD state of a condition: its own list and markers, and what every condition shows."""
+    """Make the HUD state of a condition from its task list, markers and pointer.
+
+    The bins, hands, message, progress and clock are those of the task view, as in every condition.
+    """
     return HudState(
         checklist_title=title,
         checklist=checklist,

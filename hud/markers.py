@@ -1,4 +1,4 @@
-"""World-locked digital objects of the conditions: flagpoles, breadcrumbs, the goal (PAPER section 5)."""
+"""Virtual objects that conditions place in the world: breadcrumbs, flagpoles and pins (PAPER section 5)."""
 
 import functools
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
-CHEST = 0.75  # height of the breadcrumb line at the person's end, of the eye's
+CHEST = 0.75  # height of the breadcrumbs at the person's end of the path, as a share of the eye height
 BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
 BREADCRUMB_SPACING = 0.28  # m along the floor path
 
-RIM_RADIUS = 1.3  # of the white rim, in radii of the breadcrumb
+RIM_RADIUS = 1.3  # radius of the white rim, in radii of the breadcrumb
 
 # Roles of markers.
 BREADCRUMB = "breadcrumb"
@@ -29,10 +29,9 @@ SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
 def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float = 0.0) -> tuple[Marker, ...]:
-    """Spheres along a floor path (k, 2), m, from chest height down to the floor at its end (PAPER section 5).
+    """Make spheres along a floor path (k, 2), m, from chest height down to the floor at its end (PAPER section 5).
 
-    The person's eyes are `eye_height` m above the floor. The spheres are counted back from the end; the first
-    `clearance` m of the path stay empty.
+    Their spacing is counted from the end of the path. The first `clearance` m of the path stay empty.
     """
     chest = CHEST * eye_height
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -56,20 +55,20 @@ def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float =
 
 
 def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
-    """A thin white disc around each breadcrumb: who sees no red would lose bare spheres on a brown floor."""
+    """Make a white disc around each breadcrumb, for people who cannot tell red from a brown floor."""
     return tuple(
         Marker("cylinder", crumb.position, (RIM_RADIUS * crumb.size[0], 0.003, 0.0), WHITE, RIM, crumb.x_ray)
         for crumb in crumbs
     )
 
 
-@functools.lru_cache(maxsize=1024)  # most objects stay where they are from one state to the next
+@functools.lru_cache(maxsize=1024)  # most objects do not move between two states
 def flagpole(
     position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
 ) -> tuple[Marker, ...]:
-    """A pole with a flag above an object, 1.2 m tall, banded so that it stands out from any background.
+    """Make a banded pole with a flag, 1.2 m tall, over an object.
 
-    A low one has half the height and no flag; an x-ray one also shows faintly through walls.
+    A low one has half the height and no flag. An x-ray one also shows, dimmed, through walls.
     """
     x, y, z = position
     foot, top = z + 0.25, z + (0.85 if low else 1.45)
@@ -89,21 +88,21 @@ def flagpole(
 
 
 def flagpoles(state: HudState) -> dict[str, Vec2]:
-    """Which objects have a flagpole: instance name -> floor position of the pole, m, in the order shown.
+    """Return the floor position of each flagpole, m, by object name, in the order shown.
 
-    A participant's percept is computed from this, so that it holds what the picture shows and no more.
+    Simulated participants see flagpoles only through this function, so they see what the picture shows.
     """
     return {
         marker.object: marker.position[:2]
         for marker in state.markers
         if marker.role == FLAGPOLE
         and marker.object is not None
-        and marker.shape != "box"  # flags stand beside
+        and marker.shape != "box"  # a flag, which is not over the object
     }
 
 
 def pin(position: Vec3, role: str = GOAL) -> tuple[Marker, ...]:
-    """A pin that stands over the goal of the next step or over a bin, m, and a disc around its foot."""
+    """Make a pin over a goal or a bin, and a disc around its foot."""
     x, y, z = position
     return (
         Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), role),

@@ -1,4 +1,4 @@
-"""Messages of the message bar, and how it fades (PAPER section 3.2)."""
+"""Messages of the message bar (PAPER section 3.2)."""
 
 from types import MappingProxyType
 from typing import Final
@@ -8,8 +8,8 @@ from hud.lists import in_sentence
 from hud.state import Message, MessageKind
 from hud.texts import HudTexts, filled
 
-SHOWN = 3.5  # s at full opacity
-FADE = 0.5  # s from opaque to gone
+SHOWN = 3.5  # s for which a message is opaque
+FADE = 0.5  # s in which it then disappears
 
 _OK, _NO, _INFO = MessageKind.SUCCESS, MessageKind.REFUSAL, MessageKind.INFO
 
@@ -49,7 +49,18 @@ def message(
     receptacle: str | None = None,
     opacity: float = 1.0,
 ) -> Message:
-    """The message for an event or a refusal ("picked", "hands_full"), with labels of the object and the receptacle."""
+    """Make the message for an event or a refusal, such as "picked" or "hands_full".
+
+    Args:
+        key: Field of `HudTexts`.
+        texts: Words of the HUD.
+        object: Label of the object.
+        receptacle: Label of the receptacle.
+        opacity: 1 opaque, 0 gone.
+
+    Raises:
+        MessageError: There is no such message.
+    """
     if key not in KINDS:
         raise MessageError(f"no message {key!r}; there are {', '.join(KINDS)}")
     text = filled(
@@ -63,5 +74,5 @@ def message(
 
 
 def fade(age: float) -> float:
-    """Opacity of a message of `age` seconds: full for `SHOWN`, then linearly down to 0 within `FADE`."""
+    """Return the opacity of a message of `age` s: 1 for `SHOWN` s, then falling linearly to 0 within `FADE` s."""
     return min(1.0, max(0.0, (SHOWN + FADE - age) / FADE))

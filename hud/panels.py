@@ -1,21 +1,21 @@
-"""Drawing of the small panels: values in, a patch out. The task list is in `hud.checklist`."""
+"""Drawing of the panels, except the mini-map."""
 
 import math
 
 from hud import theme
 from hud.canvas import Canvas, Patch, Rect
 from hud.layout import ListRow
-from hud.state import BinEntry, InventorySlot, MessageKind
+from hud.state import BinEntry, ChecklistItem, InventorySlot, MessageKind
 from hud.stencils import Stencils
 from hud.text import ELLIPSIS
+from hud.texts import HudTexts, filled
 
-POINTER_STEPS = 72  # drawn directions of the pointer, 5 degrees apart
+POINTER_STEPS = 72  # number of drawn directions, 5 degrees apart
 
 
 def draw_bins(
     stencils: Stencils, rect: Rect, title: str, bins: tuple[BinEntry, ...], rows: tuple[ListRow, ...]
 ) -> Patch:
-    """The list of bins: a title, and picture, name and place of each."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
     x = px(theme.PADDING + 2)
@@ -45,7 +45,7 @@ def draw_inventory(
     hands: tuple[str, str],
     empty: str,
 ) -> Patch:
-    """The hands, at the left and the right end: a picture and a name each, or a word that it is empty."""
+    """Draw the hands at both ends of the panel. `hands` are their names, `empty` is the word for an empty hand."""
     canvas = Canvas(stencils, rect.width, rect.height)
     for slot, hand, at_the_left in zip(slots, hands, (True, False), strict=True):
         if slot is not None:
@@ -60,7 +60,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, when_empty: tuple[str, str],
     inset = px(5) + side + px(theme.GAP) if held else px(theme.PADDING + 1)
     face, colour = (theme.LABEL, theme.TEXT) if held else (theme.DETAIL, theme.QUIET)
     lines: tuple[str, ...] = ()
-    # A long name gets a wider slot at the cost of the view between the hands.
+    # A long name gets a wider slot, which leaves less of the view between the hands.
     for size in (
         (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY, theme.SLOT_WIDTH)
     ):
@@ -89,7 +89,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, when_empty: tuple[str, str],
 
 
 def draw_message(stencils: Stencils, rect: Rect, kind: MessageKind, lines: tuple[str, ...]) -> Patch:
-    """The message bar at full opacity: a symbol in the colour of its tone, and the text."""
+    """Draw the message bar at full opacity."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
     tone = theme.TONES[kind]
@@ -112,7 +112,7 @@ def draw_message(stencils: Stencils, rect: Rect, kind: MessageKind, lines: tuple
 
 
 def draw_progress(stencils: Stencils, rect: Rect, delivered: int, total: int) -> Patch:
-    """How many objects are where they belong, as a number and as a bar."""
+    """Draw the number of delivered objects and a progress bar."""
     canvas = Canvas.panel(stencils, rect)
     px = canvas.px
     text = canvas.typeface.fit(f"{delivered} / {total}", theme.CHIP, rect.width - px(8))
@@ -129,14 +129,13 @@ def draw_progress(stencils: Stencils, rect: Rect, delivered: int, total: int) ->
 
 
 def clock_text(seconds: float) -> str:
-    """Elapsed time as m:ss, or h:mm:ss from one hour on."""
+    """Format a time as m:ss, or as h:mm:ss from one hour on."""
     whole = max(0, math.floor(seconds))
     hours, minutes = divmod(whole // 60, 60)
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
 
 
 def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
-    """Elapsed time beside a small dial."""
     canvas = Canvas.panel(stencils, rect)
     px, u = canvas.px, canvas.unit
     width = canvas.typeface.width(text, theme.CHIP)
@@ -150,7 +149,7 @@ def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
 
 
 def draw_pointer(stencils: Stencils, rect: Rect, step: int) -> Patch:
-    """A disc with an arrow; `step` of `POINTER_STEPS` directions, counter-clockwise from the right."""
+    """Draw an arrow on a disc. `step` is its direction, of `POINTER_STEPS`, counter-clockwise from the right."""
     canvas = Canvas(stencils, rect.width, rect.height)
     centre, u = rect.width / 2.0, canvas.unit
     canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)
@@ -158,3 +157,85 @@ def draw_pointer(stencils: Stencils, rect: Rect, step: int) -> Patch:
     outline = ((11.0, 0.0), (-5.0, -8.0), (-2.0, 0.0), (-5.0, 8.0))
     canvas.arrow(centre, 2.0 * math.pi * step / POINTER_STEPS, outline, u, theme.ACCENT)
     return canvas.patch()
+
+
+def count_text(items: tuple[ChecklistItem, ...], texts: HudTexts) -> str:
+    """Return the number of objects left, or the number of the next step of a plan."""
+    left = sum(not item.done for item in items)
+    if any(item.number is not None for item in items):
+        number = len(items) - left + 1
+        return filled(texts.next_step, number=number, count=len(items)) if left else texts.done
+    return filled(texts.left, count=left) if left else texts.none_left
+
+
+def hidden_text(above: int, more: int, texts: HudTexts) -> str:
+    """Return a note about the items hidden before and after the visible ones."""
+    notes = (
+        filled(texts.above, count=above) if above else "",
+        filled(texts.more, count=more) if more else "",
+    )
+    return " · ".join(note for note in notes if note)
+
+
+def draw_checklist(
+    stencils: Stencils,
+    rect: Rect,
+    header: tuple[str, str],
+    items: tuple[ChecklistItem, ...],
+    rows: tuple[ListRow, ...],
+    hidden: str,
+) -> Patch:
+    """Draw the task list. `header` is its title and count, `hidden` a note about items that do not fit."""
+    canvas = Canvas.panel(stencils, rect)
+    px, width = canvas.px, canvas.typeface.width
+    title, count = header
+    x = px(theme.PADDING + 2)
+    right = canvas.width - x
+    taken = width(count, theme.DETAIL) + px(theme.GAP)
+    line = canvas.typeface.fit(title, theme.TITLE, right - x - taken)
+    canvas.text(x, px(17), line, theme.TITLE, theme.TEXT)
+    canvas.text(right - taken + px(theme.GAP), px(17), count, theme.DETAIL, theme.QUIET)
+    top = round(theme.HEADER * canvas.unit)
+    for item, row in zip(items, rows, strict=True):
+        _draw_row(canvas, item, row, top)
+        top += row.height
+    text = canvas.typeface.fit(hidden, theme.DETAIL, right - x)
+    canvas.text(x, canvas.height - px(theme.PADDING), text, theme.DETAIL, theme.QUIET)
+    return canvas.patch()
+
+
+def _draw_row(canvas: Canvas, item: ChecklistItem, row: ListRow, top: int) -> None:
+    px, side = canvas.px, canvas.px(theme.TILE)
+    if item.current:
+        area = Rect(px(3), top, canvas.width - 2 * px(3), row.height)
+        canvas.rounded(area, 5.0 * canvas.unit, theme.ACCENT, 0.16)
+        bar = Rect(px(2), top + px(4), px(3), row.height - 2 * px(4))
+        canvas.rounded(bar, 1.5 * canvas.unit, theme.ACCENT, 1.0)
+    x = px(theme.PADDING + 2)
+    if item.number is not None:
+        label, face = str(item.number), theme.LABEL if item.current else theme.DETAIL
+        right = x + px(theme.NUMBER) - px(3)
+        canvas.text(right - canvas.typeface.width(label, face), top + px(21), label, face, theme.QUIET)
+        x += px(theme.NUMBER)
+    canvas.tile(item.picture, x, top + px(3), side, 0.5 if item.done else 1.0)
+    if item.target_picture is not None:
+        small = px(theme.TARGET)
+        left = canvas.width - px(theme.PADDING) - small
+        canvas.tile(item.target_picture, left, top + px(5), small, 0.4 if item.done else 1.0)
+    _draw_text(canvas, item, row, x + side + px(theme.GAP), top)
+
+
+def _draw_text(canvas: Canvas, item: ChecklistItem, row: ListRow, x: int, top: int) -> None:
+    px = canvas.px
+    face = theme.ITEM_CURRENT if item.current else theme.ITEM
+    if canvas.typeface.width(item.text, face) > row.text_width:
+        face = theme.Face(theme.DETAIL.size, face.weight)
+    line = canvas.typeface.fit(item.text, face, row.text_width)
+    baseline = top + (px(15) if row.detail else px(22))
+    drawn = canvas.text(x, baseline, line, face, theme.DONE if item.done else theme.TEXT)
+    if item.done and drawn > 0:
+        y = baseline - px(4.5)
+        canvas.shape([(x - px(1), y), (x + drawn + px(1), y)], theme.TEXT, line=max(1.0, 1.2 * px(1)))
+    for i, detail in enumerate(row.detail):
+        baseline = top + px(28 + theme.LINE * i)
+        canvas.text(x, baseline, detail, theme.DETAIL, theme.DONE if item.done else theme.QUIET)

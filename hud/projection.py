@@ -1,4 +1,4 @@
-"""Pinhole projection of the eye camera, and where to point when something is out of view."""
+"""Pinhole projection of the eye camera, and the pointer to a goal out of view."""
 
 import math
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ from hud.errors import FrameError
 from hud.state import Pointer, Vec3
 
 _IDENTITY, _ROUNDING = np.eye(3), 1e-6
-NEAR = 1e-6  # m; nearer than this along the view direction counts as behind the eye
+NEAR = 1e-6  # m; points at a smaller depth count as behind the eye
 
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """A pinhole camera with square pixels and its principal point at the centre of the image.
+    """A pinhole camera with square pixels and its principal point at the image centre.
 
     Raises:
-        FrameError: A shape or a number is unusable.
+        FrameError: A shape or a number is not valid.
     """
 
     position: NDArray[np.float64]  # eye, m, (3,)
@@ -48,15 +48,15 @@ class CameraView:
         return self.height / 2.0 / math.tan(self.fovy / 2.0)
 
     def to_eye(self, points: ArrayLike) -> NDArray[np.float64]:
-        """House frame to eye frame (right, up, forward), m; shape (..., 3) to (..., 3)."""
+        """Transform points (..., 3), m, from the house frame to the eye frame (right, up, forward)."""
         local = (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation
         return np.asarray(local * np.array([1.0, 1.0, -1.0]), dtype=np.float64)
 
 
 def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pixels (n, 2) at which points (n, 3), m, appear, NaN behind the eye, and their depths along the view, m, (n,).
+    """Return the pixels (n, 2) of points (n, 3), m, and their depths, m, (n,). Pixels of points behind the eye are NaN.
 
-    x is to the right and y down; the image spans 0..width and 0..height.
+    x points right and y down. The image spans 0..width and 0..height.
     """
     local = camera.to_eye(np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)))
     depth = local[:, 2]
@@ -70,20 +70,23 @@ def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64],
 
 
 def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
-    """Whether a point appears inside the image, at least `margin` of the image's height from its edge."""
+    """Return True if a point is in the image, at least `margin` times the image height from its edge."""
     pixels, _ = project(camera, [point])
     x, y = pixels[0]
     inset = margin * camera.height
-    # NaN, behind the eye, compares false.
+    # Points behind the eye have NaN pixels, which compare false.
     return bool(inset <= x <= camera.width - inset and inset <= y <= camera.height - inset)
 
 
 def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
-    """A pointer at the edge of the view towards a target, m; None if that is in view, `margin` from the edge."""
+    """Return a pointer to a target, m, or None if the target is in view.
+
+    In view means at least `margin` times the image height from the edge of the image.
+    """
     if in_view(camera, target, margin):
         return None
     right, up, forward = (float(v) for v in camera.to_eye(target))
     if forward <= 0.0:
-        # Behind: people turn about the vertical, so point left or right.
+        # The target is behind the person, who has to turn left or right.
         return Pointer(angle=0.0 if right >= 0.0 else math.pi)
     return Pointer(angle=math.atan2(up, right))

@@ -1,6 +1,6 @@
-"""HudState as JSON, for a page that draws the HUD itself, and the JSON schema of that.
+"""HUD states as JSON, and their JSON schema.
 
-Both follow from the annotations of the value types, so they cannot drift from them.
+Both are derived from the annotations of the value types.
 """
 
 import dataclasses
@@ -15,20 +15,20 @@ from hud.errors import SchemaError
 from hud.state import HudState
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-LARGEST = 1e6  # of a coordinate, a size, a time
+LARGEST = 1e6  # largest allowed coordinate, size or time
 
 
 def to_dict(state: HudState) -> dict[str, Any]:
-    """Plain JSON values: dataclasses as objects, tuples as arrays, enumerations as their values."""
+    """Convert a HUD state to plain JSON values."""
     plain: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(dataclasses.asdict(state)))
     return plain
 
 
 def from_dict(raw: object) -> HudState:
-    """The inverse of `to_dict`.
+    """Convert the result of `to_dict` back to a HUD state.
 
     Raises:
-        SchemaError: A field is missing, unknown or of the wrong type; the message names where.
+        SchemaError: A field is missing, unknown or of the wrong type. The message contains its path.
     """
     try:
         state = msgspec.convert(raw, HudState)
@@ -39,10 +39,10 @@ def from_dict(raw: object) -> HudState:
 
 
 def check_state(state: object) -> None:
-    """Make sure that something is a HUD state which can be drawn and sent, whatever its annotations say.
+    """Check that the result of a condition is a HUD state that can be drawn and sent, including values in its fields.
 
     Raises:
-        SchemaError: It is not; the message says what it is instead, or which value is of the wrong kind.
+        SchemaError: It is not. The message contains the path of the faulty value.
     """
     if not isinstance(state, HudState):
         kind = "None" if state is None else f"a value of type {type(state).__name__}"
@@ -54,7 +54,7 @@ def check_state(state: object) -> None:
 
 
 def _plain(value: Any, where: str) -> Any:
-    """Dataclasses as objects, sequences as lists; no number out of bounds, no text that cannot be written."""
+    """Convert dataclasses to dictionaries and sequences to lists. Reject numbers and texts that cannot be shown."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {
             f.name: _plain(getattr(value, f.name), f"{where}.{f.name}") for f in dataclasses.fields(value)
@@ -64,7 +64,7 @@ def _plain(value: Any, where: str) -> Any:
     if isinstance(value, tuple | list):
         return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
     if isinstance(value, float) and not abs(value) <= LARGEST:
-        raise SchemaError(f"a HudState that cannot be shown: {value} is no usable number - at `{where}`")
+        raise SchemaError(f"a HudState that cannot be shown: {value} is not a usable number - at `{where}`")
     if isinstance(value, str):
         try:
             value.encode()
@@ -74,7 +74,7 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON schema of what `to_dict` returns: every field is required, and no other is allowed."""
+    """Return the JSON schema of `to_dict`'s result. All fields are required, and no others are allowed."""
     schema = msgspec.json.schema(HudState)
     for definition in schema["$defs"].values():
         if "properties" in definition:
@@ -85,7 +85,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _check_fields(raw: Any, written: Any, where: str) -> None:
-    """Refuse unknown fields and those that were left out although they have a default."""
+    """Raise a SchemaError if a field is unknown, or is missing although it has a default."""
     if isinstance(written, dict):
         if set(raw) != set(written):
             raise SchemaError(
@@ -99,7 +99,7 @@ def _check_fields(raw: Any, written: Any, where: str) -> None:
 
 
 def _expected(error: str) -> str:
-    """What to write instead of the value that msgspec's `error` names by its path (`$.markers[0].shape`)."""
+    """Return a hint about the value that msgspec's `error` names by its path (`$.markers[0].shape`)."""
     definitions = json_schema()["$defs"]
     node = definitions["HudState"]
     for name in re.findall(r"\.(\w+)", error.rpartition(" at `")[2]):

@@ -1,4 +1,4 @@
-"""HudState: everything the person is shown, as one value. Drawing is a pure function of it."""
+"""`HudState`: everything that the person is shown, as one value."""
 
 import enum
 from dataclasses import dataclass
@@ -8,22 +8,23 @@ Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
 Shape = Literal["sphere", "cylinder", "box"]
+FLOORPLAN = "floorplan"  # key of the picture of the house from above
 
 
 @dataclass(frozen=True)
 class Marker:
-    """A world-locked digital object.
+    """A virtual object in the world.
 
     Attributes:
-        shape: `sphere` (size[0] radius), `cylinder` (size[0] radius, size[1] half-length, upright) or
-            `box` (half-sizes).
+        shape: `sphere` (size[0] is the radius), `cylinder` (upright; size[0] is the radius, size[1] half the length) or
+            `box` (half sizes).
         position: Centre in the house frame, m.
-        size: Sizes in m; meaning by shape.
+        size: Sizes, m. Their meaning depends on the shape.
         rgba: Colour, components in 0..1.
-        role: What it is for: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal`, `bin`.
-        x_ray: Whether it also shows, dimmed, through walls.
-        object: Instance name of the object that it stands over, or None.
-        outlined: Whether a sphere has a dark outline.
+        role: Purpose: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal` or `bin`.
+        x_ray: True if the marker also shows, dimmed, through walls.
+        object: Instance name of the object below the marker, or None.
+        outlined: True if a sphere has a dark outline.
     """
 
     shape: Shape
@@ -37,7 +38,7 @@ class Marker:
 
 
 class MessageKind(enum.Enum):
-    """Kind of message, which decides its colour and symbol."""
+    """Kind of a message. It determines colour and symbol."""
 
     INFO = "info"
     SUCCESS = "success"
@@ -46,7 +47,7 @@ class MessageKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Message:
-    """Text of the message bar, and its opacity at this moment: 1 opaque, 0 gone."""
+    """Text of the message bar, with its present opacity: 1 opaque, 0 gone."""
 
     text: str
     kind: MessageKind
@@ -55,18 +56,17 @@ class Message:
 
 @dataclass(frozen=True)
 class ChecklistItem:
-    """A row of the task list.
+    r"""A row of the task list.
 
     Attributes:
-        text: The object ("Blue mug").
-        detail: Below the text: where the object is, where it goes, what to do. Broken at its line break if it does
-            not fit in one line ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
+        text: Label of the object ("Blue mug").
+        detail: Second line, broken at its line break if it is too long ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
         picture: Key of the object's picture, or None.
         target_picture: Key of the receptacle's picture, or None.
-        number: Step number, or None where order means nothing.
-        done: Crossed out.
-        carried: Crossed out, but in a hand: what the page of a person marks in another way.
-        current: The step to do now.
+        number: Step number, or None in a list without an order.
+        done: True if the row is crossed out.
+        current: True for the step to do now.
+        carried: True if the object is in a hand. Such a row is crossed out in frames; the browser page marks it.
     """
 
     text: str
@@ -81,10 +81,7 @@ class ChecklistItem:
 
 @dataclass(frozen=True)
 class BinEntry:
-    """A receptacle in the list that every condition shows: picture, name and semantic location.
-
-    `place` is broken at its line break if it does not fit in one line.
-    """
+    """A receptacle in the list of bins. `place` is broken at its line break if it is too long for one line."""
 
     label: str
     place: str
@@ -93,7 +90,7 @@ class BinEntry:
 
 @dataclass(frozen=True)
 class InventorySlot:
-    """One hand: what it holds, or nothing."""
+    """Contents of a hand. Both fields are None if it is empty."""
 
     label: str | None = None
     picture: str | None = None
@@ -117,11 +114,11 @@ class MiniMap:
     Attributes:
         picture: Key of the picture that shows the house within `bounds`.
         bounds: xmin, ymin, xmax, ymax, m.
-        position: Where the person stands, m.
-        heading: Where the person looks, rad, 0 along +x, counter-clockwise.
+        position: Position of the person, m.
+        heading: Heading of the person, rad, 0 along +x, counter-clockwise.
         path: Points along the path to the goal, m.
         objects: Floor positions of the objects that have a flagpole, m.
-        goal: Where the path ends, m, or None.
+        goal: End of the path, m, or None.
     """
 
     picture: str
@@ -141,16 +138,16 @@ class HudState:
         checklist_title: Heading of the task list ("Objects to find", "Your plan").
         checklist: Rows, in the order shown.
         bins: The list of receptacles.
-        inventory: Left and right hand; no left one for a person who carries one object at most.
+        inventory: Left and right hand. The left one is None for a person who carries one object at most.
         message: Message bar, or None.
-        markers: World-locked objects.
-        rerouted: Whether the breadcrumbs start at the person and are replaced when the person leaves them.
-        delivered: How many objects are in their receptacle.
-        total: How many there are.
-        clock: Elapsed task time to show, s, or None.
+        markers: Virtual objects in the world.
+        rerouted: True if the breadcrumbs start at the person and are replaced when the person leaves them.
+        delivered: Number of objects in their receptacles.
+        total: Number of all objects.
+        clock: Elapsed task time, s, or None to show no clock.
         pointer: Arrow towards a goal out of view, or None.
         minimap: The house from above, or None.
-        scroll: By how many rows the task list is scrolled from where it follows the task, positive towards its end.
+        scroll: Number of rows by which the person has scrolled the task list, positive towards its end.
     """
 
     checklist_title: str

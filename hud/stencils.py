@@ -1,7 +1,6 @@
-"""What panels are drawn with: coverage of text and shapes, and pictures in their size.
+"""Caches of the masks and pictures that panels are drawn with.
 
-Making them is most of the work of drawing a panel, so they are kept, in tables of limited size. Everything here
-depends on its arguments alone, so keeping it changes no pixel.
+Making them takes most of the time of drawing. They depend only on their arguments, so caching changes no pixel.
 """
 
 import functools
@@ -21,7 +20,7 @@ Pictures = Mapping[str, NDArray[np.uint8]]
 
 
 class Stencil(NamedTuple):
-    """Coverage 0 to 1, shape (h, w), and the column and row of its upper left corner, px, relative to an origin."""
+    """Coverage, 0 to 1, shape (h, w), and its upper left corner relative to an origin, px."""
 
     mask: Floats
     x: int
@@ -29,14 +28,14 @@ class Stencil(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """A picture in its size: colours times opacity, 0 to 1, shape (3, s, s), and opacity, 0 to 1, shape (s, s)."""
+    """A scaled picture: colours times opacity, 0 to 1, shape (3, s, s), and opacity, 0 to 1, shape (s, s)."""
 
     colours: Floats
     opacity: Floats
 
 
 class Stencils:
-    """Text and RGBA pictures, uint8 (s, s, 4), straight alpha, by key, at `unit` frame px per theme px."""
+    """Masks of text and scaled pictures, uint8 RGBA (s, s, 4), straight alpha, at `unit` frame px per theme px."""
 
     def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures
@@ -46,7 +45,7 @@ class Stencils:
         self.scaled = functools.lru_cache(128)(self._scaled)
 
     def _text(self, text: str, face: Face) -> Stencil:
-        """A line of text; the origin is where its baseline begins."""
+        """Return the mask of a line of text. Its origin is the start of the baseline."""
         mask, baseline = self.typeface.rasterise(text, face)
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not len(rows):
@@ -56,7 +55,6 @@ class Stencils:
         return Stencil(share, int(columns[0]) - 1, int(rows[0]) - baseline)
 
     def _scaled(self, key: str, size: int) -> Scaled | None:
-        """The picture of that key at `size` px; None when there is none."""
         picture = self.pictures.get(key)
         if picture is None:
             return None
@@ -69,7 +67,7 @@ class Stencils:
 
 @functools.lru_cache(64)
 def rounded(width: int, height: int, radius: float, line: float) -> Floats:
-    """Coverage (height, width) of a rounded rectangle, or with `line` > 0 of its outline of that width, px."""
+    """Return the coverage (height, width) of a rounded rectangle, or of its outline if `line` > 0, px."""
     ys, xs = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
     dx = np.abs(xs - width / 2) - (width / 2 - radius)
     dy = np.abs(ys - height / 2) - (height / 2 - radius)
@@ -82,7 +80,7 @@ def rounded(width: int, height: int, radius: float, line: float) -> Floats:
 
 @functools.lru_cache(64)
 def disc(x: float, y: float, radius: float) -> Stencil:
-    """A smooth-edged disc with its middle at column `x`, row `y`, px."""
+    """Return the coverage of a disc with smooth edges, centred at column `x` and row `y`, px."""
     left, top, side = math.floor(x - radius) - 1, math.floor(y - radius) - 1, math.ceil(2 * radius) + 3
     ys, xs = np.mgrid[0:side, 0:side].astype(np.float32) + np.float32(0.5)
     distance = np.hypot(xs + left - x, ys + top - y)

@@ -1,4 +1,4 @@
-"""TaskView: what an assistance condition knows of the task, as one value."""
+"""`TaskView`: the state of the task as an assistance condition sees it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,20 +18,20 @@ _Value = TypeVar("_Value")
 
 
 class TaskStep(NamedTuple):
-    """A step of the task: pick an object up, or place it into its receptacle."""
+    """A step of the task: to pick an object up, or to place it into its receptacle."""
 
     kind: StepKind
     object: str
 
 
 class Alternative(NamedTuple):
-    """A step that is possible next, and its regret.
+    """A step that is possible next, with its regret.
 
     Attributes:
         kind: `pick` or `place`.
         object: Instance name.
-        extra: How much longer the rest of the task gets than with the best next step, m.
-        at_least: Whether `extra` is only a lower bound.
+        extra: Regret: extra length of the rest of the task compared with the best next step, m.
+        at_least: True if `extra` is only a lower bound.
     """
 
     kind: StepKind
@@ -46,13 +46,13 @@ class TaskObject:
 
     Attributes:
         name: Instance name, unique in the task.
-        label: What people call it ("Blue mug").
+        label: Name shown to people ("Blue mug").
         picture: Key of its picture.
         category: Category key.
-        room: Label of the room it is in now.
-        position: Its position now, m, house frame.
+        room: Label of its present room.
+        position: Present position in the house frame, m.
         status: `loose`, `carried` or `delivered`.
-        receptacle: Key of the receptacle it belongs to.
+        receptacle: Key of its receptacle.
     """
 
     name: str
@@ -78,32 +78,32 @@ class TaskReceptacle:
 
 
 class PlanAhead(Protocol):
-    """What the planner suggests; may be worked out when it is first asked for."""
+    """The planner's suggestion. Its properties may be computed at the first access."""
 
     @property
     def steps(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order, the next one first; empty without a planner."""
+        """Remaining steps in planned order, the next one first. Empty without a planner."""
         ...
 
     @property
     def segment(self) -> NDArray[np.float64] | None:
-        """As in `TaskView`, m, shape (k, 2)."""
+        """See `TaskView.segment`."""
         ...
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """As in `TaskView`, m, shape (k, 2)."""
+        """See `TaskView.path`."""
         ...
 
     @property
     def goal(self) -> Vec3 | None:
-        """Where the next step happens, m."""
+        """Position of the next step, m."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class KnownPlan:
-    """A `PlanAhead` that is there already; the attributes are the same."""
+    """A `PlanAhead` with fixed values."""
 
     steps: tuple[TaskStep, ...] = ()
     segment: NDArray[np.float64] | None = None
@@ -120,21 +120,21 @@ class TaskView:
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
         texts: Words of the HUD.
-        hands: Object name in the left and in the right hand, or None.
-        capacity: How many objects are carried at most.
+        hands: Object names in the left and the right hand, or None.
+        capacity: Largest number of objects that can be carried.
         steps_done: Successful picks and places so far, in order.
-        ahead: What the planner suggests: `plan`, `segment`, `path` and `goal`.
+        ahead: Source of `plan`, `segment`, `path` and `goal`.
         position: Floor position of the person, m.
         eye: Position of the eye, m.
-        eye_height: Of the eye above the floor when the person looks straight ahead, m.
-        message: What the message bar shows, or None.
+        eye_height: Height of the eye above the floor when the person looks straight ahead, m.
+        message: Content of the message bar, or None.
         clock: Elapsed task time to show, s, or None.
-        camera: The eye camera, which a pointer to a goal out of view needs; None for no pointer.
-        heading: Where the person looks, rad, 0 along +x, counter-clockwise.
-        bounds: xmin, ymin, xmax, ymax of the house, m, or None where there is no map of it.
-        scroll: By how many rows the task list is scrolled from where it follows the task, positive towards its end.
-        alternatives: Gives all steps that are possible next; called only by conditions that show them. Empty until
-            their regrets are known.
+        camera: The eye camera, which a pointer needs, or None.
+        heading: Heading of the person, rad, 0 along +x, counter-clockwise.
+        bounds: xmin, ymin, xmax, ymax of the house, m, or None without a map.
+        scroll: Number of rows by which the person has scrolled the task list, positive towards its end.
+        alternatives: Returns all steps that are possible next, or nothing until their regrets are known. Finding them
+            takes time, so only conditions that show them should call it.
 
     Raises:
         TaskViewError: A name is unknown or repeated, or `order` is not a permutation of the objects.
@@ -179,34 +179,34 @@ class TaskView:
 
     @property
     def plan(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order, the next one first; empty without a planner."""
+        """Remaining steps in planned order, the next one first. Empty without a planner."""
         self._check_steps(self.ahead.steps)
         return self.ahead.steps
 
     @property
     def segment(self) -> NDArray[np.float64] | None:
-        """Shortest floor path from where the last step was done, or the start, to the next one, m, shape (k, 2).
+        """Shortest floor path from the place of the last step, or the start, to the next step, m, shape (k, 2).
 
-        None when nothing is left to do.
+        None if nothing is left to do.
         """
         return _checked_path("segment", self.ahead.segment)
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """As `segment`, but from the person, and replaced when the person leaves it."""
+        """Shortest floor path from the person to the next step, replaced when the person leaves it, m, shape (k, 2)."""
         return _checked_path("path", self.ahead.path)
 
     @property
     def goal(self) -> Vec3 | None:
-        """Where the next step happens (the object, or its receptacle), m, or None."""
+        """Position of the next step's object or receptacle, m, or None."""
         return self.ahead.goal
 
     def object(self, name: str) -> TaskObject:
-        """The object called `name`; a TaskViewError where there is none."""
+        """Return the object called `name`. Raises TaskViewError if there is none."""
         return _named("object", {o.name: o for o in self.objects}, name)
 
     def receptacle(self, key: str) -> TaskReceptacle:
-        """The receptacle called `key`; a TaskViewError where there is none."""
+        """Return the receptacle called `key`. Raises TaskViewError if there is none."""
         return _named("receptacle", {r.key: r for r in self.receptacles}, key)
 
     def _check_steps(self, steps: tuple[TaskStep, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Text: measuring, shortening, wrapping and rasterising with the font that OpenCV carries inside."""
+"""Measuring, shortening, wrapping and rasterizing of text with OpenCV's built-in font."""
 
 import functools
 import re
@@ -11,9 +11,9 @@ from hud.theme import Face
 
 ELLIPSIS = "…"
 BUILT_IN_FONT = "sans"
-_SMALL = 10  # px, below which words run together at the font's own spaces, and digits at its decimal points
+_SMALL = 10  # px; below this size, spaces and decimal points of the font are too narrow
 _POINT = re.compile(r"(?<=\d)\.(?=\d)")
-_WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # a length in metres stays in one line with its unit
+_WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # a number and its unit "m" stay on one line
 
 
 class Typeface:
@@ -25,11 +25,10 @@ class Typeface:
         self.width = functools.lru_cache(4096)(self._width)
 
     def px(self, size: float) -> int:
-        """Theme px to frame px."""
+        """Convert theme px to frame px."""
         return round(size * self._unit)
 
     def _width(self, text: str, face: Face) -> int:
-        """Width of a line, px."""
         if not text:
             return 0
         size = max(1, self.px(face.size))
@@ -39,7 +38,7 @@ class Typeface:
         return int(max(width, left + width))
 
     def fit(self, text: str, face: Face, width: int) -> str:
-        """`text` in one line of at most `width` px, ending in an ellipsis when it had to be cut."""
+        """Return `text` on one line of at most `width` px, shortened with an ellipsis if necessary."""
         line = " ".join(text.split())
         if self.width(line, face) <= width:
             return line
@@ -53,7 +52,7 @@ class Typeface:
         return line[:low].rstrip(" ,.") + ELLIPSIS if low else ""
 
     def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """`text` broken between words into at most `lines` lines of `width` px; the last is cut with an ellipsis."""
+        """Break `text` between words into at most `lines` lines of `width` px. The last line may be shortened."""
         done: list[str] = []
         words: list[str] = _WORD.findall(text)
         while words and len(done) < lines - 1:
@@ -67,7 +66,7 @@ class Typeface:
         return tuple(done)
 
     def paragraph(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """`text` in one line when it fits in `width` px, else broken at its line breaks and then between words."""
+        """Return `text` on one line if it fits in `width` px, else broken at its line breaks, then between words."""
         whole = " ".join(text.split())
         if lines <= 1 or self.width(whole, face) <= width:
             fitted = self.fit(whole, face, width)
@@ -80,7 +79,10 @@ class Typeface:
         return tuple(broken)
 
     def rasterise(self, text: str, face: Face) -> tuple[NDArray[np.uint8], int]:
-        """Mask (h, w) of a line of text, 0 to 255, with an empty column on the left, and the row of its baseline."""
+        """Return the mask (h, w) of a line of text, 0 to 255, and the row of its baseline.
+
+        The first column of the mask is empty.
+        """
         size = max(1, self.px(face.size))
         baseline = size + size // 4
         mask = np.zeros((baseline + size // 2, self.width(text, face) + size), dtype=np.uint8)
@@ -89,5 +91,4 @@ class Typeface:
 
 
 def _spaced(text: str, size: int) -> str:
-    """Text as it is drawn at a size, px."""
     return _POINT.sub(" . ", text.replace(" ", "  ")) if size < _SMALL else text

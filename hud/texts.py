@@ -1,4 +1,4 @@
-"""Words of the HUD in one language. The caller reads them from a file, so that `hud` holds none itself."""
+"""Words of the HUD in one language. The caller reads them from a file."""
 
 import re
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 @dataclass(frozen=True)
 class HudTexts:
-    """All words that are drawn into the picture.
+    """All words that are drawn.
 
-    In `{object}` and `{receptacle}` stands a label as it reads within an English sentence ("blue mug"), in `{Object}`
-    and `{Receptacle}` the label itself ("Blue mug").
+    `{object}` and `{receptacle}` stand for a label inside a sentence ("blue mug"), `{Object}` and `{Receptacle}` for
+    the label itself ("Blue mug").
     """
 
     # Task list, bins and hands
@@ -66,5 +66,5 @@ class HudTexts:
 
 
 def filled(text: str, **values: object) -> str:
-    """Replace each `{name}` in a text by its value; places without a value stay."""
+    """Replace each `{name}` in a text by its value. Names without a value stay."""
     return _PLACE.sub(lambda place: str(values.get(place[1], place[0])), text)

@@ -1,7 +1,7 @@
-"""Colours and sizes of the HUD. Colours are sRGB 0..255; sizes are px of a 640 x 480 frame.
+"""Colours and sizes of the HUD. Colours are sRGB, 0..255. Sizes are px of a 640 x 480 frame.
 
-Hues are from the Okabe-Ito palette, which people with colour-vision deficiencies can tell apart. Nothing is
-told by hue alone: kinds of messages have symbols, done rows are crossed out, the current row is bold.
+The hues are from the Okabe-Ito palette, which is safe for colour-vision deficiencies. No information depends on hue
+alone: messages have symbols, done rows are crossed out, and the current row is bold.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from hud.state import MessageKind
 Rgb = tuple[int, int, int]
 
 PANEL: Final[Rgb] = (13, 17, 24)
-PANEL_OPACITY: Final = 0.72  # white text stays at 4.5 : 1 or better over a white wall
+PANEL_OPACITY: Final = 0.72  # white text has a contrast of at least 4.5 : 1 over a white wall
 EDGE: Final[Rgb] = (255, 255, 255)
 EDGE_OPACITY: Final = 0.16
 
@@ -35,7 +35,7 @@ TONES: Final = MappingProxyType(
 
 @dataclass(frozen=True)
 class Face:
-    """Size (px at 480 px height) and weight (400 regular, 600 semibold) of a text."""
+    """Font size (px at 480 px height) and weight (400 regular, 600 semibold)."""
 
     size: float
     weight: int
@@ -49,16 +49,16 @@ LABEL: Final = Face(12, 600)
 BAR: Final = Face(14, 500)
 CHIP: Final = Face(14, 600)
 
-MIN_FRAME: Final = (320, 240)  # px; text in smaller frames cannot be read
+MIN_FRAME: Final = (320, 240)  # px; text is illegible in smaller frames
 
-MARGIN: Final = 8  # between the panels and the edge of the frame
+MARGIN: Final = 8  # distance of the panels from the edge of the frame
 GAP: Final = 6
 PADDING: Final = 6
 PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
-TILE: Final = 30  # side of a picture; objects can be told apart
+TILE: Final = 30  # side of a picture, large enough to tell objects apart
 
-# The list of bins: side of a picture, line and gap; six bins with three lines of place each fit.
+# List of bins: side of a picture, height of a line, and gap. Six bins with three lines of place each fit.
 BIN_TILE: Final = 30
 BIN_LINE: Final = 13
 BIN_GAP: Final = 4
@@ -66,23 +66,21 @@ BIN_GAP: Final = 4
 CHIP_HEIGHT: Final = 28
 CHIP_WIDTH: Final = 76
 
-LIST_SHARE: Final = 0.3  # of the frame's width
+LIST_SHARE: Final = 0.3  # share of the frame's width
 MAX_LIST_WIDTH: Final = 230
-LIST_BOTTOM: Final = 64  # kept free below the lists, so that objects at the feet are seen
+LIST_BOTTOM: Final = 64  # free space below the lists, so that objects at the feet are visible
 HEADER: Final = 24
 FOOTER: Final = 17
 ROW: Final = 36
 NUMBER: Final = 19
-TARGET: Final = 20  # side of the picture of the receptacle
+TARGET: Final = 20  # side of the receptacle's picture
 
 BINS_WIDTH: Final = 160
-BINS_WIDTH_WIDE: Final = 170  # on frames that are wider than 4 : 3
+BINS_WIDTH_WIDE: Final = 170  # in frames wider than 4 : 3
 
 SLOT_WIDTH: Final = 118
-SLOT_WIDTH_LONG: Final = 133  # for names that would be cut
-SLOT_WIDTH_EMPTY: Final = (
-    86  # an empty hand takes less, so that objects at the feet are seen between the hands
-)
+SLOT_WIDTH_LONG: Final = 133  # for names that would be shortened
+SLOT_WIDTH_EMPTY: Final = 86  # narrow, so that objects at the feet are visible between empty hands
 SLOT_HEIGHT: Final = 40
 BETWEEN_HANDS: Final = 64
 
@@ -90,4 +88,4 @@ MESSAGE_LINES: Final = 3
 MESSAGE_ICON: Final = 26
 POINTER: Final = 36
 MAP_INSET: Final = 4
-MAX_MAP_HEIGHT: Final = 150  # leaves the bins room in a house that is deeper than wide
+MAX_MAP_HEIGHT: Final = 150  # leaves space for the bins if the house is deeper than wide

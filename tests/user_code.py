@@ -42,7 +42,7 @@ def condition(statement: str, after: int = 0) -> str:
 import os, sys, time
 from dataclasses import replace
 import numpy as np
-from hud.conditions.none import hud_state as shown
+from hud.builtin_conditions import none as shown
 from hud.state import Marker, Message, MessageKind
 count = 0
 def hud_state(view):

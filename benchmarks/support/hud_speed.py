@@ -16,9 +16,8 @@ from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.compose import Compositor
-from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
-from hud.state import HudState
+from hud.state import FLOORPLAN, HudState
 from mjsim.house.scene.scene import compose
 from mjsim.render import render_house_map, render_pictures
 from mjsim.render.cameras import camera_pose

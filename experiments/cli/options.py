@@ -15,8 +15,7 @@ from experiments.participants.registry import participant_names
 from experiments.session.film_config import FilmConfig
 from experiments.trials.design import numbers
 from experiments.trials.trial_config import DEFAULTS, SETTINGS, TrialConfig, episode_settings
-from hud.conditions import condition_names
-from hud.options import option_names
+from hud.conditions import CONDITIONS, OPTIONS
 from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solvers import SOLVERS
@@ -145,8 +144,8 @@ NAMES: dict[str, Callable[[], str]] = {  # what can be named, for help
         "in any condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
     ),
     "assistance": lambda: (
-        f": {', '.join(condition_names())}, or package.module:attribute; "
-        f"{', '.join(f'-{name}' for name in option_names())} may follow"
+        f": {', '.join(CONDITIONS)}, or package.module:attribute; "
+        f"{', '.join(f'-{name}' for name in OPTIONS)} may follow"
     ),
     "training_assistance": lambda: ": as --assistance",
     "planner": lambda: f": {', '.join(SOLVERS)}, or package.module:attribute",

@@ -11,7 +11,7 @@ from experiments.house import House
 from experiments.session.camera_path import CameraPath, camera_path
 from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
-from hud.caption import Captions
+from hud.compose import Captions
 from mjsim.house.compiled.house import compiled_house
 from mjsim.render import CameraPose, Renderer
 from mjsim.support.files import replacing

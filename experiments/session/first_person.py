@@ -14,9 +14,8 @@ from experiments.house import House
 from experiments.session.film_config import FilmConfig
 from experiments.session.video import VideoWriter
 from hud.compose import Compositor
-from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView
-from hud.state import HudState
+from hud.state import FLOORPLAN, HudState
 from mjsim.house.scene.avatar import EYE
 from mjsim.house.scene.scene import Scene
 from mjsim.render import Renderer, gl_info, render_house_map, render_pictures

@@ -14,7 +14,7 @@ from experiments.record.records import EventLog
 from experiments.trials.fingerprint import Inputs, trial_inputs
 from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
-from hud.conditions import condition, condition_names
+from hud.conditions import CONDITIONS, condition
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import parse_house
@@ -100,7 +100,7 @@ def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters
 
 def _may_not_fit(trial: TrialConfig) -> bool:
     """The default participant makes do with whatever a condition of this package shows."""
-    return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in condition_names()
+    return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in CONDITIONS
 
 
 def _begin(trial: TrialConfig, house: House) -> None:

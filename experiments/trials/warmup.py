@@ -16,7 +16,7 @@ from experiments.house import House
 from experiments.record.records import EventLog
 from experiments.trials.setup import prepare_session
 from experiments.trials.trial_config import TrialConfig
-from hud.conditions import condition_names
+from hud.conditions import CONDITIONS
 from mjsim.house.scene.scene import Scene, compose
 from mjsim.support.kernels import cache_base, cache_folder
 from mjsim.values.actions import WAIT, FollowPath, Move, Pick, Place
@@ -70,7 +70,7 @@ def act(house: House) -> None:
 def play(house: House) -> None:
     """Play the beginning of a trial in every condition."""
     scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue, visuals=False)
-    for assistance in condition_names():
+    for assistance in CONDITIONS:
         for fidelity, until in TRIALS:
             config = TrialConfig(
                 objects=2, assistance=assistance, seed=0, fidelity=fidelity, time_limit=until, regret=False

@@ -30,8 +30,7 @@ from experiments.trials.person import PARAMETERS as PERSON
 from experiments.trials.person import check_person
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
-from hud.conditions import condition, condition_names
-from hud.options import option_names
+from hud.conditions import CONDITIONS, OPTIONS, condition
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.values.person_parameters import RANGES
 from tools.data_dictionary import data_dictionary
@@ -65,7 +64,7 @@ def test_the_data_dictionary_is_up_to_date():
 
 
 def test_the_hud_page_names_every_condition_and_option():
-    assert all(f"`{name}`" in page("hud.md") for name in (*condition_names(), *option_names()))
+    assert all(f"`{name}`" in page("hud.md") for name in (*CONDITIONS, *OPTIONS))
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.5, 3.1, -1.5])

@@ -6,14 +6,13 @@ import hud_sample as sample
 import numpy as np
 import pytest
 
+from hud.builtin_options import REROUTE_CLEARANCE
 from hud.compose import Compositor, compose
-from hud.conditions import condition, condition_names
+from hud.conditions import CONDITIONS, OPTIONS, condition
 from hud.errors import ConditionError, HudError, MessageError, TaskViewError
 from hud.lists import in_sentence
 from hud.markers import breadcrumbs, flagpoles
 from hud.messages import FADE, KINDS, SHOWN, fade, message
-from hud.options import option_names
-from hud.options.reroute import CLEARANCE
 from hud.schema import from_dict, to_dict
 from hud.state import HudState, InventorySlot, MessageKind
 from hud.task import Alternative, KnownPlan, TaskStep
@@ -35,10 +34,9 @@ def with_status(view, **status):
     return dataclasses.replace(view, objects=objects)
 
 
-def test_every_file_of_the_package_is_a_condition():
-    assert condition_names() == ("guided", "highlight", "none", "optimal")
-    for name in condition_names():
-        assert isinstance(shown(name, sample.task(6)), HudState)
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_every_condition_returns_a_hud_state(name):
+    assert isinstance(shown(name, sample.task(6)), HudState)
 
 
 @pytest.mark.parametrize(
@@ -48,8 +46,8 @@ def test_every_file_of_the_package_is_a_condition():
         ("none-sparkle", r"'sparkle'.*minimap, pin, .*regret, .*xray"),
         ("magic-minimap", r"'magic'.*-minimap or -pin.* or -xray"),
         ("hud.nowhere:hud_state", "condition"),
-        ("hud.conditions.none:missing", "condition"),
-        ("hud.conditions.none:__doc__", "condition"),
+        ("hud.builtin_conditions:missing", "condition"),
+        ("hud.builtin_conditions:__doc__", "condition"),
         (":x", "condition"),
     ],
 )
@@ -59,7 +57,7 @@ def test_an_unknown_name_is_refused_with_the_choices(name, named):
     assert isinstance(caught.value, HudError)
 
 
-@pytest.mark.parametrize("name", condition_names())
+@pytest.mark.parametrize("name", CONDITIONS)
 def test_all_conditions_show_bins_hands_progress_clock_and_message(name):
     text = message("hands_full", sample.TEXTS)
     view = sample.task(12, steps=6, message=text, clock=12.5)
@@ -135,9 +133,9 @@ def test_guided_is_optimal_with_its_options():
     assert state.pointer is not None and state.rerouted
     assert view.path is not None
     assert tuple(m for m in state.markers if m.role == "breadcrumb") == breadcrumbs(
-        view.path, view.eye_height, CLEARANCE
+        view.path, view.eye_height, REROUTE_CLEARANCE
     )
-    assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(option_names())
+    assert {"reroute", "rims", "pin", "pointer", "bins", "minimap", "regret", "xray"} == set(OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -318,7 +316,7 @@ def test_a_step_that_was_done_and_can_be_done_again_is_noted_once():
 
 def test_options_combine_and_follow_outside_conditions():
     view = dataclasses.replace(sample.task(6), bounds=(-4.0, -1.0, 4.0, 7.0))
-    both = shown("hud.conditions.highlight:hud_state-xray-minimap", view)
+    both = shown("hud.builtin_conditions:highlight-xray-minimap", view)
     assert both == shown("highlight-minimap-xray", view)
     assert both.minimap is not None and all(m.x_ray for m in both.markers)
 

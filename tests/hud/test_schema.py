@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from hud.conditions import condition, condition_names
+from hud.conditions import CONDITIONS, condition
 from hud.errors import SchemaError
 from hud.messages import message
 from hud.schema import from_dict, json_schema, to_dict
@@ -19,7 +19,7 @@ CONFORMS = Draft202012Validator(json.loads(json.dumps(json_schema()))).is_valid
 
 
 @given(
-    st.sampled_from([*condition_names(), "highlight-minimap", "optimal-minimap-xray", "optimal-regret"]),
+    st.sampled_from([*CONDITIONS, "highlight-minimap", "optimal-minimap-xray", "optimal-regret"]),
     st.integers(0, 24),
     st.data(),
 )

@@ -10,7 +10,7 @@ from multiprocessing import get_context
 from experiments.house import House
 from experiments.trials import warmup
 from experiments.web.worker.encoders import Image, data_url
-from hud.options.minimap import FLOORPLAN
+from hud.state import FLOORPLAN
 from mjsim.formats.gltf.cache import cached_floor, cached_scene
 from mjsim.formats.gltf.store import scenes_folder
 from mjsim.render import render_house_map, render_pictures

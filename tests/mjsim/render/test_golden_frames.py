@@ -19,8 +19,8 @@ from hud.compose import Compositor
 from hud.conditions import condition
 from hud.markers import POLE_BANDS, breadcrumbs, flagpole, flagpoles
 from hud.messages import message
-from hud.options.minimap import FLOORPLAN
 from hud.projection import CameraView, in_view
+from hud.state import FLOORPLAN
 from hud.task import KnownPlan, TaskStep
 from mjsim.house.scene.scene import compose
 from mjsim.render import CameraPose, Renderer, render_house_map, render_pictures

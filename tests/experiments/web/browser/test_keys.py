@@ -13,7 +13,7 @@ from experiments.record.records import read_events
 from experiments.trials.replay.replay import replay
 from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
-from hud.conditions import condition_names
+from hud.conditions import CONDITIONS
 from tests.experiments.web.browser.key_presser import WATCH, KeyPresser, choose
 
 HARMLESS = (  # said where there is no graphics card, or because a test asks
@@ -21,7 +21,7 @@ HARMLESS = (  # said where there is no graphics card, or because a test asks
     "GL Driver Message",
 )
 FEW = [("chromium", 6, "none"), ("firefox", 6, "optimal")]
-MANY = [(browser, 6, name) for browser in ("chromium", "firefox") for name in condition_names()]
+MANY = [(browser, 6, name) for browser in ("chromium", "firefox") for name in CONDITIONS]
 SLOW = MANY if "MJSIM_ALL_CONDITIONS" in os.environ else FEW
 
 
