@@ -1,7 +1,15 @@
-from .base import Choice, Guidance, Participant, ParticipantFactory, Percept, Point, positions_of
-from .behaviour import Parameter
+from .base import (
+    Choice,
+    FullTurn,
+    Guidance,
+    Participant,
+    ParticipantFactory,
+    Percept,
+    Point,
+    positions_of,
+)
+from .distribution import Parameter
 from .follower import Follower
-from .looking import FullTurn
 from .nearest import Nearest
 from .registry import participant, participant_names
 from .visit_executor import VisitExecutor

@@ -1,4 +1,4 @@
-"""What a simulated participant perceives and how it answers."""
+"""The interface of simulated participants: their percept, their decisions, and what all of them use."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hud.state import HudState
-from mjsim.values.actions import Action, ActionResult
+from mjsim.values.actions import Action, ActionResult, Move
 from mjsim.values.episode import CAPACITY
 from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.values.person_parameters import PersonParameters
+from planner.errors import PlannerError
 from planner.plan import Visit
 
 if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
@@ -23,19 +24,23 @@ if TYPE_CHECKING:  # options of commands name participants, and must not load th
 Point = NDArray[np.float64]
 """Position on the floor, m, shape (2,)."""
 
-NEARBY = 1.3  # m
-USUAL_PERSON = PersonParameters()
+NEARBY = 1.3  # m; an object at the feet is nearer than this
+DEFAULT_PERSON = PersonParameters()
+FAR = 1e6  # m; distance if there is no path
+TURNING = 0.8  # share of the turning speed at which a person looks around
+LOOK_GAIN = 4.0  # speed at which the gaze is levelled, rad/s per rad of pitch
+FULL_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Guidance:
-    """The step that the HUD shows now: what to do, with which object, along which breadcrumbs.
+    """The step that the HUD shows now.
 
     Attributes:
-        visit: What to do.
+        visit: The step.
         path: Floor points of the path that the breadcrumbs mark, m, shape (k, 2).
-        goal: Where the object or the receptacle is, m, shape (2,).
-        tolerance: How far the person may leave the path before a new one is shown, m.
+        goal: Position of the object or the receptacle, m, shape (2,).
+        tolerance: Distance from the path beyond which a new path is shown, m.
     """
 
     visit: Visit
@@ -46,14 +51,14 @@ class Guidance:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A visit that is possible next, and what it costs compared with the best one.
+    """A visit that is possible next, and its regret.
 
     Attributes:
-        visit: What could be done.
-        goal: Where the object or the receptacle is, m, shape (2,).
-        regret: By how much it makes the rest of the task longer, m, as of the last visit.
-        capped: Whether `regret` is only a lower bound.
-        find_exact: Gives the exact regret, m, or None where nothing is proven; takes some 0.1 s.
+        visit: The visit.
+        goal: Position of the object or the receptacle, m, shape (2,).
+        regret: Extra length of the rest of the task, m, as of the last visit.
+        capped: True if `regret` is only a lower bound.
+        find_exact: Returns the exact regret, m, or None if nothing is proven. Takes about 0.1 s.
     """
 
     visit: Visit
@@ -64,30 +69,30 @@ class Choice:
 
 
 class Percept:
-    """What a person can know at one control step, without any assistance.
+    """What a person can know at one control step without any assistance.
 
-    A session adds what is in view and what the HUD shows, which is found out when it is asked for.
+    Sessions use a subclass that adds the objects in view and the HUD, computed at the first access.
 
     Args:
         seen: State of the world.
-        targets: Object instance name -> receptacle key.
+        targets: Receptacle key of each object, by instance name.
         answer: The world's answer to the previous action, if that was a pick or place.
-        blocked: Whether the walk makes no progress.
-        capacity: How many objects the person carries at most.
-        person: The participant itself.
+        blocked: True if the walk makes no progress.
+        capacity: Largest number of objects that can be carried.
+        person: Parameters of the participant's body.
 
     Attributes:
         time: Simulated time, s.
-        position: Own floor position, m, shape (2,).
-        heading: Own heading, rad.
-        pitch: Elevation of the own gaze, rad, positive upwards.
-        hands: Object in the left and in the right hand.
-        hands_full: Whether no other object can be carried.
-        busy: Whether a pick or place is under way.
-        targets: As above, from the lists in the HUD.
-        answer: As above.
-        blocked: As above; until the person has backed off.
-        person: As above: own speeds, reach, eyes and times.
+        position: Floor position, m, shape (2,).
+        heading: Heading, rad.
+        pitch: Elevation of the gaze, rad, positive upwards.
+        hands: Objects in the left and the right hand.
+        hands_full: True if no other object can be carried.
+        busy: True if a pick or place is in progress.
+        targets: As the argument. The lists of the HUD show them.
+        answer: As the argument.
+        blocked: As the argument. Remains True until the person has backed off.
+        person: As the argument.
     """
 
     def __init__(
@@ -98,7 +103,7 @@ class Percept:
         *,
         blocked: bool = False,
         capacity: int = CAPACITY,
-        person: PersonParameters = USUAL_PERSON,
+        person: PersonParameters = DEFAULT_PERSON,
     ) -> None:
         self._seen = seen
         self.time, self.position = seen.time, seen.position
@@ -110,67 +115,68 @@ class Percept:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Instance names in the hands."""
+        """Instance names of the objects in the hands."""
         return self._seen.carried
 
     @cached_property
     def nearby(self) -> Mapping[str, Point]:
-        """Misplaced objects at the feet (within 1.3 m) -> floor position, m, shape (2,)."""
+        """Floor positions of misplaced objects at the feet (within 1.3 m), m, shape (2,), by name."""
         loose = positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
         return {n: p for n, p in loose.items() if math.dist(p, self.position) < NEARBY}
 
     def look(self) -> Mapping[str, Point]:
-        """Misplaced objects in view at this moment -> floor position, m, shape (2,)."""
+        """Return the floor positions of the misplaced objects in view, m, shape (2,), by name."""
         return {}
 
-    def look_for(self, receptacles: Mapping[str, "ReceptacleGeometry"]) -> frozenset[str]:  # noqa: ARG002 - for a session
-        """Keys of those of the receptacles that are in view at this moment."""
+    def look_for(self, receptacles: Mapping[str, "ReceptacleGeometry"]) -> frozenset[str]:  # noqa: ARG002 - overridden
+        """Return the keys of those receptacles that are in view."""
         return frozenset()
 
     @property
     def visible_shares(self) -> Mapping[str, float]:
-        """How much is seen of each object in view: the share of the rays to it that nothing blocks, 0 < share <= 1."""
+        """Visible share of each misplaced object in view, 0 < share <= 1."""
         return {}
 
     def hud(self) -> HudState | None:
-        """What the HUD shows; None without one."""
+        """Return the HUD state, or None without a HUD."""
         return None
 
     @property
     def shown_roles(self) -> frozenset[str]:
-        """Roles of the markers that the HUD shows in this condition; the person knows it from the training."""
+        """Roles of the markers that the HUD shows in this condition, as the person has learnt in the training."""
         return frozenset()
 
     @property
     def guidance(self) -> Guidance | None:
-        """The step shown by the HUD, in conditions that show a path; None when all is done."""
+        """The step that the HUD shows, or None if the condition shows no path or all is done."""
         return None
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Flagpoles in view now, through walls too: object -> floor position, m, shape (2,)."""
+        """Floor positions of the flagpoles in view, also those behind walls, m, shape (2,), by object."""
         return {}
 
     @property
     def choices(self) -> Sequence[Choice]:
-        """All visits that are possible next with their regrets, the best first: for models of compliance.
+        """All visits that are possible next with their regrets, the best first.
 
-        No condition shows as much. Empty when all is done, and in live planning until the regrets are known.
+        Only models of compliance use them, because no condition shows as much. Empty when all is done, and in live
+        planning until the regrets are known.
         """
         return ()
 
 
 def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
-    """Floor positions of objects by name, m, shape (2,)."""
+    """Return the floor positions of objects by name, m, shape (2,)."""
     return {name: seen.object_positions[seen.object_names.index(name), :2] for name in names}
 
 
 class Participant(Protocol):
-    """A user of the assistance: sees a percept, answers with a decision.
+    """A user of the assistance, who answers percepts with decisions.
 
     Attributes:
-        needs: Roles of the world-locked markers it cannot do without (`breadcrumb`, `flagpole`); a session in a
-            condition that shows none of them is refused at the start. May be left out where there are none.
+        needs: Roles of the markers that the participant requires (`breadcrumb`, `flagpole`). A session whose condition
+            does not show them is refused. The attribute is optional.
     """
 
     needs: frozenset[str]
@@ -178,15 +184,53 @@ class Participant(Protocol):
     def act(self, percept: Percept) -> Action:
         """Choose the next action.
 
-        A path and a wait take many control steps, unless the session is filmed; then the participant is asked after
-        each. So as long as nothing happens the answer must stay the same.
+        A path or a wait takes many control steps, but in a filmed session the participant is asked again after each
+        step. So the answer must stay the same as long as nothing happens.
         """
         ...
 
 
 class ParticipantFactory(Protocol):
-    """Makes a participant for one session; the generator is its only source of chance."""
+    """A function that makes a participant for one session. The generator is the only source of randomness."""
 
     def __call__(self, house: "House", rng: np.random.Generator) -> Participant:
-        """Make a fresh participant that knows `house` from the familiarisation."""
+        """Make a participant that knows the house from the familiarization."""
         ...
+
+
+def estimated_distance(house: "House", start: Point, goal: Point) -> float:
+    """Return the walking distance between two points (2,), m, or `FAR` if there is no path."""
+    try:
+        return house.geodesics.shortest_path(start, goal).geodesic_distance
+    except PlannerError:
+        return FAR
+
+
+def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) -> list[float]:
+    """Return the walking distances from one point to several points, m. See `estimated_distance`."""
+    try:
+        return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
+    except PlannerError:  # at least one goal is unreachable
+        return [estimated_distance(house, start, goal) for goal in goals]
+
+
+class FullTurn:
+    """A full turn on the spot, which starts at a heading, rad.
+
+    With `level`, the gaze is brought to the horizontal. Otherwise the pitch stays.
+    """
+
+    def __init__(self, heading: float, *, level: bool = False) -> None:
+        self._turned, self._heading, self._level = 0.0, heading, level
+
+    def act(self, percept: Percept) -> Action | None:
+        """Return the next action, or None if the turn is complete."""
+        step = (percept.heading - self._heading + math.pi) % FULL_TURN - math.pi
+        self._turned, self._heading = self._turned + step, percept.heading
+        if self._turned >= FULL_TURN:
+            return None
+        look, fastest = -LOOK_GAIN * percept.pitch, percept.person.looking_speed
+        return Move(
+            turn=TURNING * percept.person.turning_speed,
+            look=min(max(look, -fastest), fastest) if self._level else 0.0,
+        )

@@ -1,9 +1,8 @@
-"""Knows the cost of every possible next visit, and mostly takes a cheap one: a model of compliance.
+"""A model of compliance that knows the regret of every possible next visit and prefers visits of low regret.
 
 A visit that makes the rest of the task r metres longer is chosen with probability proportional to
-exp(-r / temperature). The temperature is the parameter, m: `--user boltzmann:0.5`. Near 0 the visits are optimal; the
-higher it is, the less the cost matters, and from some 10 m on they are as good as random. The participant knows more
-than any condition shows and needs nothing shown, so it serves in all of them.
+exp(-r / temperature). The temperature is the parameter, m: `--user boltzmann:0.5`. Near 0 the visits are optimal, and
+above about 10 m they are almost random. The participant requires no markers, so it works in all conditions.
 """
 
 import math
@@ -22,10 +21,10 @@ TEMPERATURE = 0.5  # m
 
 
 def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
-    """A choice with probability proportional to exp(-regret / temperature), m; the best one at 0.
+    """Draw a choice with probability proportional to exp(-regret / temperature), m. At 0, return the best one.
 
-    Where only a lower bound is known, the exact regret is computed when such a choice is drawn, and the draw is
-    rejected as often as the bound makes it too likely: so the probabilities are exact, for a few exact regrets.
+    A capped regret is only a lower bound. If such a choice is drawn, its exact regret is computed, and the draw is
+    rejected with the probability by which the bound made it too likely. So the probabilities are exact.
     """
     if temperature <= 0:
         return min(choices, key=lambda choice: choice.regret)
@@ -44,7 +43,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
 
 
 class Boltzmann:
-    """Draws the next visit, and keeps to it once drawn; the higher the `temperature`, m, the less cost matters."""
+    """Draws the next visit and keeps to it until it is done or impossible."""
 
     needs: frozenset[str] = frozenset()
 
@@ -55,7 +54,6 @@ class Boltzmann:
         self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
-        """Make the visit that was drawn; draw again once it is done or impossible."""
         if percept.busy:
             return WAIT
         choices = {choice.visit: choice for choice in percept.choices}
@@ -68,7 +66,11 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """A maker of participants of this temperature; a ConfigError where it is not a number, or negative."""
+    """Return a factory of participants with this temperature.
+
+    Raises:
+        ConfigError: The temperature is not a number, or is negative.
+    """
     try:
         temperature = float(text)
     except ValueError:
@@ -83,5 +85,4 @@ def with_parameter(text: str) -> ParticipantFactory:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant of the default temperature."""
     return Boltzmann(house, rng, TEMPERATURE)

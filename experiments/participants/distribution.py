@@ -1,37 +1,42 @@
-"""Distributions of numbers over people, as TOML describes them and as a random number draws from them.
+"""Distributions of parameters over people. In TOML they are written as follows.
 
 walking_speed = {normal = [1.2, 0.2], min = 0.8}    # mean and standard deviation
 reading_time = {lognormal = [1.35, 0.35]}           # median, and standard deviation of the logarithm
-reach = {uniform = [0.8, 1.1]}                      # lowest and highest
+reach = {uniform = [0.8, 1.1]}                      # lowest and highest value
 lapse = {beta = [0.5, 3]}                           # both shape parameters, from 0 to 1
 follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # kinds of people: weight, distribution
 field_of_view = 1.2                                 # the same for each person
 """
 
+import functools
 import math
 import statistics
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 
 from experiments.errors import ConfigError, shown
 from mjsim.support.files import read_text
 
+if TYPE_CHECKING:
+    import numpy as np
+
 SHAPES = ("constant", "normal", "lognormal", "uniform", "beta", "mixture")
 _STANDARD = statistics.NormalDist()
 
 _Pair = tuple[float, float]
-_Weight = Annotated[float, msgspec.Meta(ge=0)]
+_NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 
 class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Distribution of one number: one of its shapes, cut off at `min` and `max`.
+    """Distribution of a number, truncated at `min` and `max`.
 
     Raises:
-        ConfigError: No shape is given or several, a number is not finite, or no values are left.
+        ConfigError: There is not exactly one shape, a number is not valid, or no values are left.
     """
 
     constant: float | None = None  # the same value for each person
@@ -40,9 +45,9 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     uniform: _Pair | None = None  # lowest and highest value
     beta: _Pair | None = None  # both parameters
     # kinds of people: weight, and a number or a distribution
-    mixture: "tuple[tuple[_Weight, float | Distribution], ...] | None" = None
-    min: float = -math.inf  # smaller values do not occur
-    max: float = math.inf  # larger values do not occur
+    mixture: "tuple[tuple[_NonNegative, float | Distribution], ...] | None" = None
+    min: float = -math.inf  # lowest value
+    max: float = math.inf  # highest value
 
     def __post_init__(self) -> None:
         if len([name for name in SHAPES if getattr(self, name) is not None]) != 1:
@@ -65,12 +70,12 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 
     @property
     def shape(self) -> str:
-        """The one of `SHAPES` that is given."""
+        """Name of the given shape, one of `SHAPES`."""
         return next(name for name in SHAPES if getattr(self, name) is not None)
 
     @property
     def _numbers(self) -> list[float]:
-        """The parameters of the shape, or the weights of the kinds."""
+        """Parameters of the shape, or weights of a mixture."""
         if self.constant is not None:
             return [self.constant]
         if self.mixture is not None:
@@ -78,7 +83,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return list(getattr(self, self.shape))
 
     def as_value(self) -> Any:
-        """The description, as in TOML; without limits that are infinite, and equal in all processes."""
+        """Return the description as in TOML, without infinite limits."""
         if self.constant is not None:
             return self.constant
         kinds = [[w, k.as_value() if isinstance(k, Distribution) else k] for w, k in self.mixture or ()]
@@ -86,9 +91,9 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return {self.shape: kinds or self._numbers, **limits}
 
     def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
-        """The value below which a share (0 to 1) of the distribution between two values lies.
+        """Return the value below which this share (0 to 1) of the distribution truncated at two values lies.
 
-        Of a mixture, the share first says which kind, and then which value of that kind.
+        In a mixture, the share first selects the kind, and then the value of that kind.
         """
         if self.constant is not None:
             return self.constant
@@ -102,7 +107,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return min(high, max(low, self._value(below + share * (above - below))))
 
     def _kind(self, share: float) -> "tuple[float | Distribution, float]":
-        """The kind of a mixture that a share picks, and the share within it."""
+        """Return the kind of a mixture that a share selects, and the share within that kind."""
         kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
         left = share * sum(weight for weight, _ in kinds)
         for weight, kind in kinds[:-1]:
@@ -140,7 +145,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 
 
 def distribution(name: str, given: object) -> Distribution:
-    """The distribution that a number or a table such as `{"normal": [1.2, 0.2], "min": 0.8}` describes."""
+    """Convert a number, or a table such as `{"normal": [1.2, 0.2], "min": 0.8}`, to a distribution."""
     try:
         return converted(given)
     except (msgspec.ValidationError, ConfigError) as error:
@@ -148,23 +153,28 @@ def distribution(name: str, given: object) -> Distribution:
 
 
 def converted(given: object) -> Distribution:
-    """As `distribution`, with errors that name no value: a ConfigError, or a ValidationError of msgspec."""
+    """Do the same as `distribution`, with errors that do not name the parameter.
+
+    Raises:
+        ConfigError: The description is not valid.
+        msgspec.ValidationError: A value has the wrong type.
+    """
     if isinstance(given, Mapping):
         return msgspec.convert(given, Distribution)
     return Distribution(constant=msgspec.convert(given, float))
 
 
 class Distributions(Mapping[str, Distribution]):
-    """Distributions of several values by name, sorted; the values of a group are named `motion.reach_time`."""
+    """Distributions by parameter name, sorted. Names of grouped parameters have a dot: `motion.reach_time`."""
 
     def __init__(self, values: Mapping[str, Distribution] | None = None) -> None:
         self._values = dict(sorted((values or {}).items()))
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "Distributions":
-        """Distributions as in TOML; tables of several are joined with a dot: `[compliance] follows = 1`."""
+        """Make distributions of a TOML table. A subtable `[compliance] follows = 1` is a group."""
         if not isinstance(values, Mapping):
-            raise ConfigError(f"{shown(values)} is no table of values, such as {{ walking_speed = 1.2 }}")
+            raise ConfigError(f"{shown(values)} is not a table of values such as {{ walking_speed = 1.2 }}")
         found: dict[str, Distribution] = {}
         for name, value in values.items():
             if value == {}:
@@ -177,7 +187,11 @@ class Distributions(Mapping[str, Distribution]):
 
     @classmethod
     def parse(cls, text: str) -> "Distributions":
-        """Read a TOML file, or a description between braces; a ConfigError where that is not possible."""
+        """Read a TOML file, or a description in braces.
+
+        Raises:
+            ConfigError: The file cannot be read, or the description is not valid.
+        """
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])
@@ -191,11 +205,11 @@ class Distributions(Mapping[str, Distribution]):
             raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """The description, as `of` takes it."""
+        """Return the description, which `of` accepts."""
         return {name: described.as_value() for name, described in self.items()}
 
     def updated(self, other: "Distributions") -> "Distributions":
-        """These distributions, replaced by those of `other` where it has any."""
+        """Return these distributions with those of `other` added or replaced."""
         return Distributions({**self, **other})
 
     def __getitem__(self, name: str) -> Distribution:
@@ -212,3 +226,63 @@ class Distributions(Mapping[str, Distribution]):
 
     def __repr__(self) -> str:
         return f"Distributions({self.as_dict()})"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter that differs from person to person."""
+
+    usual: float | Mapping[str, Any]  # default distribution over people, as in TOML
+    lowest: float  # smallest valid value
+    highest: float  # largest valid value
+    unit: str  # unit; empty for a plain number, `probability` for a number from 0 to 1
+
+    @functools.cached_property
+    def spread(self) -> Distribution:
+        """The default distribution, converted once because that takes longer than a draw."""
+        return converted(self.usual)
+
+    def check(self, name: str, value: float) -> None:
+        """Raise a ConfigError if a value is out of range."""
+        if not self.lowest <= value <= self.highest:
+            bounds = f"{self.lowest:.4g} to {self.highest:.4g} {self.unit}".rstrip()
+            raise ConfigError(f"{name} must be {bounds}, got {value:.4g}")
+
+
+def draw(
+    parameters: Mapping[str, Parameter], described: Distributions, rng: "np.random.Generator", of: str
+) -> dict[str, float]:
+    """Draw the values of a person, by parameter name.
+
+    Each value depends only on its own random number. `described` replaces default distributions. `of` names the owner
+    of the parameters in errors.
+    """
+    return quantiles(parameters, described, rng.random(len(parameters)).tolist(), of)
+
+
+def quantiles(
+    parameters: Mapping[str, Parameter], described: Distributions, shares: Sequence[float], of: str
+) -> dict[str, float]:
+    """Do the same as `draw` with a share from 0 to 1 for each parameter instead of a generator."""
+    for name in described:
+        if name not in parameters:
+            has = f"it has {', '.join(parameters)}" if parameters else "it has no parameters"
+            raise ConfigError(f"{of} has no {name!r}; {has}")
+    values = {}
+    for share, (name, parameter) in zip(shares, parameters.items(), strict=True):
+        try:
+            spread = described.get(name) or parameter.spread
+            values[name] = spread.quantile(share, parameter.lowest, parameter.highest)
+        except (msgspec.ValidationError, ConfigError) as error:
+            raise ConfigError(f"{name}: {error}") from error
+    return values
+
+
+def varies(usual: float | Mapping[str, Any], lowest: float, highest: float, unit: str = "") -> Any:
+    """Declare a dataclass field whose value differs from person to person. See `Parameter`."""
+    return field(metadata={"parameter": Parameter(usual, lowest, highest, unit)})
+
+
+def chance(usual: float | Mapping[str, Any]) -> Any:
+    """Declare a field as `varies` does, for a probability."""
+    return varies(usual, 0.0, 1.0, "probability")

@@ -1,4 +1,4 @@
-"""One person for all conditions: uses breadcrumbs where they are shown, else flagpoles, else its eyes."""
+"""Follows breadcrumbs if the condition shows them, otherwise behaves as `nearest` or `searcher`."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from mjsim.values.actions import WAIT, Action
 
 
 class BreadcrumbFollower:
-    """Walks along the breadcrumbs and makes the current step."""
+    """Walks along the breadcrumbs and makes the current step at their end."""
 
     needs = frozenset({"breadcrumb"})
 
@@ -19,14 +19,13 @@ class BreadcrumbFollower:
         self._executor = VisitExecutor(house)
 
     def act(self, percept: Percept) -> Action:
-        """Walk along the breadcrumbs; pick or place at their end."""
         if percept.busy or percept.guidance is None:
             return WAIT
         return self._executor.follow(percept, percept.guidance)
 
 
 class Follower:
-    """Follows breadcrumbs where the condition shows them, else flagpoles as `nearest` does, else it is a `searcher`."""
+    """Uses the best guidance on display: breadcrumbs, else flagpoles, else its own eyes."""
 
     needs: frozenset[str] = frozenset()
 
@@ -47,5 +46,4 @@ class Follower:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant that uses the best guidance on display."""
     return Follower(house, rng)

@@ -1,4 +1,4 @@
-"""Places that a person still has to search: those from which a room can be seen."""
+"""Places from which a person still has to search the rooms."""
 
 import math
 from dataclasses import dataclass
@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.base import Percept, Point
-from experiments.participants.distances import estimated_distances
+from experiments.participants.base import Percept, Point, estimated_distances
 
-SHIFT = 0.15  # m, by which places move at each round, so that objects hidden once are seen later
+SHIFT = 0.15  # m; standard deviation by which places move in each round, to see what was hidden before
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SearchPlace:
     """A place to look around from."""
 
     room: str  # key of its room
@@ -22,42 +21,44 @@ class Place:
 
 
 class Frontier:
-    """Places that have not been searched. When all have been, all are searched again, more closely."""
+    """Places that have not been searched.
+
+    After the last one, a new round begins in which the person looks more closely.
+    """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._left, self._round = self._all(), 1
 
-    def places(self) -> list[Place]:
-        """Places to look around from, at least one."""
+    def places(self) -> list[SearchPlace]:
+        """Return the places to look around from, at least one."""
         if not self._left:
             self._left, self._round = self._all(), self._round + 1
         return self._left
 
-    def _all(self) -> list[Place]:
+    def _all(self) -> list[SearchPlace]:
         return [
-            Place(room, self._house.navmesh.snap(point + self._rng.normal(0.0, SHIFT, size=2)))
+            SearchPlace(room, self._house.navmesh.snap(point + self._rng.normal(0.0, SHIFT, size=2)))
             for room, points in self._house.viewpoints.items()
             for point in points
         ]
 
-    def of_room(self, room: str, position: Point) -> Place:
-        """The place of a room that is nearest to a position, m, shape (2,)."""
+    def of_room(self, room: str, position: Point) -> SearchPlace:
+        """Return the place of a room nearest to a position, m, shape (2,)."""
         points = self._house.viewpoints.get(room)
-        if points is None:  # a room without any floor to stand on
-            return Place(room, position)
+        if points is None:  # a room without floor to stand on
+            return SearchPlace(room, position)
         gaps = estimated_distances(self._house, position, list(points))
-        return Place(room, points[int(np.argmin(gaps))])
+        return SearchPlace(room, points[int(np.argmin(gaps))])
 
-    def is_left(self, place: Place) -> bool:
-        """Whether it has not been searched yet."""
+    def is_left(self, place: SearchPlace) -> bool:
         return any(other is place for other in self._left)
 
-    def mark_searched(self, place: Place) -> None:
+    def mark_searched(self, place: SearchPlace) -> None:
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
-        """Mark the places of a room that are in view from inside it, no farther away than `within`, m, as searched."""
+        """Mark the places of a room as searched that are in view from inside the room within a distance, m."""
         within /= self._round  # a person who has missed something looks more closely
         walls = self._house.navmesh.outline
         self._left = [
@@ -68,7 +69,6 @@ class Frontier:
 
 
 def _sees(percept: Percept, point: Point, within: float, walls: NDArray[np.float64]) -> bool:
-    """Whether a place is near and in front of a person, with no wall in between."""
     way = point - percept.position
     aside = (math.atan2(way[1], way[0]) - percept.heading + math.pi) % (2.0 * math.pi) - math.pi
     in_front = np.linalg.norm(way) <= within and abs(aside) <= percept.person.field_of_view / 2.0
@@ -76,7 +76,10 @@ def _sees(percept: Percept, point: Point, within: float, walls: NDArray[np.float
 
 
 def free_length(walls: NDArray[np.float64], start: Point, goal: Point) -> float:
-    """Length of the straight way between points (2,), m, up to the first wall; walls have ends x, y, x, y, (e, 4)."""
+    """Return the length of the straight line between two points (2,), m, up to the first wall.
+
+    Walls (e, 4) are given by their ends x, y, x, y, m.
+    """
     way, along, offset = goal - start, walls[:, 2:] - walls[:, :2], walls[:, :2] - start
     cross = way[0] * along[:, 1] - way[1] * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""A person at the keyboard. `mjsim play` runs sessions with one; nothing simulates it."""
+"""A person at the keyboard, who takes part through `mjsim play` and cannot be simulated."""
 
 from typing import Never
 
@@ -9,5 +9,4 @@ from experiments.house import House
 
 
 def build(house: House, rng: np.random.Generator) -> Never:  # noqa: ARG001 - the interface of participants
-    """Refuse to simulate a person."""
     raise ConfigError("user human is a person at the keyboard; start `mjsim play` instead")

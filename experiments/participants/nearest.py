@@ -1,19 +1,18 @@
-"""Goes to the nearest flagpole while a hand is free, or to the nearest bin (condition `highlight`)."""
+"""Goes to the nearest flagpole while a hand is free, otherwise to the nearest bin (condition `highlight`)."""
 
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import Participant, Percept, Point
-from experiments.participants.looking import FullTurn
+from experiments.participants.base import FullTurn, Participant, Percept, Point
 from experiments.participants.visit_executor import VisitExecutor
 from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
 
 class Nearest:
-    """Greedy: goes to the nearest possible visit, and keeps to a decision once made.
+    """Makes the nearest possible visit, and keeps to it once chosen.
 
-    It turns around once to see all flagpoles, remembers them, and turns again when it knows of none.
+    The participant turns around once to see and remember all flagpoles, and again when it knows of none.
     """
 
     needs = frozenset({"flagpole"})
@@ -27,7 +26,6 @@ class Nearest:
         self._next_look = 0.0
 
     def act(self, percept: Percept) -> Action:
-        """Look around at first; then go to the nearest flagpole or bin, and pick or place there."""
         if percept.busy:
             return WAIT
         self._look(percept)
@@ -41,7 +39,7 @@ class Nearest:
         return self._visit(percept)
 
     def _look(self, percept: Percept) -> None:
-        """Learn where flagpoles are; forget those of objects in a hand, and of those that moved."""
+        """Learn the places of flagpoles. Forget those of carried objects and of objects that have moved."""
         self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._known.pop(name, None)
@@ -64,5 +62,4 @@ class Nearest:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:  # noqa: ARG001 - it makes no random choices
-    """Make a participant that goes to the nearest visit."""
     return Nearest(house)

@@ -1,4 +1,4 @@
-"""The participant of `mjsim study rehearse`, who plays through the study's server; no trial simulates it otherwise."""
+"""The participant of `mjsim study rehearse`, which plays through the study's server and nowhere else."""
 
 from typing import Never
 
@@ -9,5 +9,4 @@ from experiments.house import House
 
 
 def build(house: House, rng: np.random.Generator) -> Never:  # noqa: ARG001 - the interface of participants
-    """Refuse to simulate the participant of a rehearsal."""
     raise ConfigError("user rehearsal plays through a server; start `mjsim study rehearse` instead")

@@ -3,21 +3,21 @@
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import Participant, Percept, Point
-from experiments.participants.distances import estimated_distances
-from experiments.participants.frontier import Frontier, Place
-from experiments.participants.looking import FullTurn
+from experiments.participants.base import FullTurn, Participant, Percept, Point, estimated_distances
+from experiments.participants.frontier import Frontier, SearchPlace
 from experiments.participants.visit_executor import VisitExecutor
 from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
-SEARCHED = 0.5  # m from a viewpoint before the look around begins
-GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
+SEARCHED = 0.5  # m; a look around begins within this distance of a viewpoint
+GONE = 1.2  # m; a remembered object nearer than this and not in view is no longer there
 
 
 class Searcher:
-    """Picks objects that it has seen, places them when both hands are full or no others are known,
-    and searches the rest of the present room before the nearest unsearched one."""
+    """Picks objects that it has seen, and places them when its hands are full or it knows of no others.
+
+    It searches the rest of the present room before the nearest other place.
+    """
 
     needs: frozenset[str] = frozenset()
 
@@ -26,14 +26,13 @@ class Searcher:
         self._executor = VisitExecutor(house)
         self._remembered: dict[str, Point] = {}
         self._frontier = Frontier(house, rng)
-        self._target: Place | None = None
+        self._target: SearchPlace | None = None
         self._room: str | None = None
         self._turn: FullTurn | None = None
         self._next_look = 0.0
         self._choice: Visit | None = None
 
     def act(self, percept: Percept) -> Action:
-        """Look and remember; fetch or place known objects, else search."""
         if percept.busy:
             return WAIT
         self._look(percept)
@@ -53,7 +52,7 @@ class Searcher:
         self._remembered.update(percept.look())
 
     def _next_visit(self, percept: Percept) -> Visit | None:
-        """The next visit with known objects: fetch the nearest one, or place a carried one."""
+        """Return the next visit with known objects: pick the nearest one, or place a carried one."""
         bins = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         known = [Visit(VisitKind.PICK, name) for name in sorted(self._remembered)]
         feasible = bins if percept.hands_full else known or bins
@@ -88,7 +87,7 @@ class Searcher:
             self._target = None
         return IDLE
 
-    def _next_place(self, position: Point) -> Place:
+    def _next_place(self, position: Point) -> SearchPlace:
         left = self._frontier.places()
         here = [place for place in left if place.room == self._room] or left
         gaps = estimated_distances(self._house, position, [place.point for place in here])
@@ -96,5 +95,4 @@ class Searcher:
 
 
 def build(house: House, rng: np.random.Generator) -> Participant:
-    """Make a participant that knows the house but no place of an object."""
     return Searcher(house, rng)

@@ -1,25 +1,26 @@
-"""Execution of visits: path, stopping distance and action. All simulated participants share it."""
+"""Execution of visits, shared by all simulated participants: path, stopping distance, action, and search for bins."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.house import House
-from experiments.participants.base import Guidance, Percept, Point
-from experiments.participants.bin_search import BinSearch
-from experiments.participants.distances import estimated_distances
+from experiments.participants.base import NEARBY, FullTurn, Guidance, Percept, Point, estimated_distances
 from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick, Place
 from mjsim.world.walking.polyline import project
 from planner.plan import Visit, VisitKind
 
-STOP_SHARE = 0.72  # of the reach, from the goal: near enough to reach, far enough not to kick it
-CLOSER = 0.12  # m nearer after every refusal
+STOP_SHARE = 0.72  # stopping distance as a share of the reach, large enough not to kick the object
+CLOSER = 0.12  # m by which the stopping distance shrinks after a refusal
 MIN_STOP_DISTANCE = 0.30  # m
+ARRIVED = 0.5  # m; a look around begins within this distance of a viewpoint
+
+WalkTo = Callable[[Percept, Point, float], Action]
 
 
 class VisitExecutor:
-    """Executes visits; goes nearer after a refusal, and takes another path when blocked.
+    """Executes visits. It stops nearer after a refusal, and takes another path when blocked.
 
     A bin that the person has not seen is searched for first.
     """
@@ -36,9 +37,9 @@ class VisitExecutor:
     def act(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point], *, until: float | None = None
     ) -> Action:
-        """Walk the shortest known path to a visit, and make it.
+        """Walk the shortest known path to a visit, and make the visit.
 
-        `objects` are believed places, m, shape (2,); `until` is the simulated time at which to ask again, s.
+        `objects` are remembered places, m, shape (2,). `until` is the simulated time of the next decision, s.
         """
         if percept.busy:
             return WAIT
@@ -53,7 +54,7 @@ class VisitExecutor:
         return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
-        """Walk along the shown path and make the shown visit at its end; decide again at `until`, s."""
+        """Walk along the shown path and make the shown visit at its end. Decide again at `until`, s."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
@@ -72,26 +73,25 @@ class VisitExecutor:
     def walk_to(
         self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
     ) -> Action:
-        """Walk the shortest known path to a place, m, shape (2,), up to `stop_distance` m from it."""
+        """Walk the shortest known path to within `stop_distance`, m, of a place, m, shape (2,)."""
         return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
 
     def look_for_bins(self, percept: Percept) -> None:
-        """Notice bins that the person has not seen yet; call it at each look around."""
+        """Notice bins that the person has not seen yet. Call this at each look around."""
         self._bins.look(percept)
 
     def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:
-        """The visit of one or more with the shortest path to it; `objects` says where objects are, m, shape (2,)."""
+        """Return the visit with the shortest path to it. `objects` are remembered places, m, shape (2,)."""
         stands = [self._likely_stand(percept, visit, objects) for visit in visits]
         distances = estimated_distances(self._house, percept.position, stands)
         ranked = zip(distances, visits, strict=True)
         return min(ranked, key=lambda pair: (pair[0], pair[1].kind.value, pair[1].object))[1]
 
     def _knows(self, percept: Percept, visit: Visit) -> bool:
-        """Whether the person knows the place of a visit."""
         return visit.kind is VisitKind.PICK or self._bins.knows(percept.targets[visit.object])
 
     def _likely_stand(self, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> Point:
-        """End of the path to a visit, or start of the search for its bin, m, shape (2,)."""
+        """Return the end of the path to a visit, or the start of the search for its bin, m, shape (2,)."""
         if self._knows(percept, visit):
             return places(self._house, percept, visit, objects)[1]
         return self._bins.likely_place(percept.position, percept.targets[visit.object])
@@ -105,11 +105,10 @@ class VisitExecutor:
             self._stop_distance = max(self._stop_distance - CLOSER, MIN_STOP_DISTANCE)
 
     def _is_reading(self, percept: Percept) -> bool:
-        """Whether the person still stands and reads the next step."""
         return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
-        """The path as it was, or a new one if that leads elsewhere, is blocked, or the person has left it; (k, 2)."""
+        """Return the last path (k, 2), m, or a new one if it leads elsewhere, is blocked or was left."""
         path = self._path
         if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
             self._path = path = np.vstack(
@@ -120,7 +119,7 @@ class VisitExecutor:
     def _find_places(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
     ) -> tuple[Point, Point]:
-        """As `places`; computed again only for another visit, or when the object has moved."""
+        """Return the result of `places`, computed again for another visit or if the object has moved."""
         known = self._places
         if known is not None and known[0] == visit:
             _, goal, stand = known
@@ -132,7 +131,7 @@ class VisitExecutor:
 
 
 def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> tuple[Point, Point]:
-    """Place of a visit's object or receptacle, and end of the path to it, m, both of shape (2,)."""
+    """Return the place of a visit's object or receptacle and the end of the path to it, m, both of shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
         return goal, house.navmesh.snap(goal)
@@ -150,3 +149,80 @@ def _same(one: Point, other: Point) -> bool:
 
 def _is_off(path: NDArray[np.float64], percept: Percept) -> bool:
     return project(path, percept.position[0], percept.position[1])[1] > FollowPath.tolerance
+
+
+class BinSearch:
+    """The bins that the person knows, as given by `House.seen`, and the search for the others."""
+
+    def __init__(self, house: House) -> None:
+        self._house = house
+        known = house.receptacles if house.seen is None else house.seen
+        self._unknown = {key: found for key, found in house.receptacles.items() if key not in known}
+        self._next_look = 0.0
+        self._key: str | None = None
+        self._left: list[Point] = []
+        self._target: Point | None = None
+        self._turn: FullTurn | None = None
+
+    def knows(self, key: str) -> bool:
+        return key not in self._unknown
+
+    def look(self, percept: Percept) -> None:
+        """Notice the bins in view and those at the feet."""
+        if not self._unknown or percept.time < self._next_look - TIME_TOLERANCE:
+            return
+        self._next_look = percept.time + percept.person.looking_interval
+        for key in percept.look_for(self._unknown) | self._nearby(percept):
+            del self._unknown[key]
+
+    def until(self, time: float | None) -> float | None:
+        """Return the earlier of a time and the next look, s, or None if there is neither."""
+        if not self._unknown:
+            return time
+        return self._next_look if time is None else min(time, self._next_look)
+
+    def likely_place(self, position: Point, key: str) -> Point:
+        """Return the start of the search for a bin: the nearest viewpoint of its room, m, shape (2,)."""
+        points = self._viewpoints(key)
+        return points[self._nearest(position, points)]
+
+    def act(self, percept: Percept, key: str, walk_to: WalkTo) -> Action:
+        """Go to the viewpoints of the bin's room, the nearest first, and look around at each."""
+        if key != self._key:
+            self._key, self._left, self._target, self._turn = key, [], None, None
+        if self._turn is not None:
+            turning = self._turn.act(percept)
+            if turning is not None:
+                return turning
+            self._turn = None
+            self._target = None
+        if self._target is None:
+            self._target = self._next_viewpoint(percept.position, key)
+        if float(np.linalg.norm(self._target - percept.position)) > ARRIVED:
+            return walk_to(percept, self._target, ARRIVED)
+        self._turn = FullTurn(percept.heading)
+        return self.act(percept, key, walk_to)
+
+    def _next_viewpoint(self, position: Point, key: str) -> Point:
+        """Return the nearest viewpoint not searched yet, or after the last one the place next to the bin."""
+        if not self._left:
+            self._left = self._viewpoints(key)
+        return self._left.pop(self._nearest(position, self._left))
+
+    def _viewpoints(self, key: str) -> list[Point]:
+        """Return the viewpoints of a bin's room and, last, the place next to the bin, m, each (2,)."""
+        room = self._house.catalogue.receptacles[key].room
+        return [*self._house.viewpoints.get(room, ()), self._house.approaches[key]]
+
+    def _nearest(self, position: Point, points: list[Point]) -> int:
+        """Return the number of the nearest place. The last place counts only if there is no other."""
+        candidates = points[:-1] or points
+        return int(np.argmin(estimated_distances(self._house, position, candidates)))
+
+    def _nearby(self, percept: Percept) -> set[str]:
+        house, here = self._house, self._house.rooms.room_at(percept.position)
+        return {
+            key
+            for key, found in self._unknown.items()
+            if house.catalogue.receptacles[key].room == here and found.distance(percept.position) < NEARBY
+        }

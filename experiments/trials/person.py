@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.errors import ConfigError
-from experiments.participants.behaviour import Parameter, draw, quantiles
-from experiments.participants.distribution import Distributions
+from experiments.participants.distribution import Distributions, Parameter, draw, quantiles
 from mjsim.values.errors import PersonError
 from mjsim.values.motion_parameters import GROUPS
 from mjsim.values.person_parameters import RANGES, PersonParameters

@@ -8,8 +8,7 @@ import numpy as np
 from experiments.errors import ConfigError
 from experiments.house import House
 from experiments.participants.base import Participant
-from experiments.participants.behaviour import draw
-from experiments.participants.distribution import Distributions
+from experiments.participants.distribution import Distributions, draw
 from experiments.participants.registry import participant
 from experiments.record import records
 from experiments.record.journal import Journal

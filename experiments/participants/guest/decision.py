@@ -1,28 +1,34 @@
-"""The choice of the next visit: noisy, with a look a few visits ahead."""
+"""The guest's choice of the next visit or search, and the time it takes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.participants.behaviour import varies
+from experiments.house import House
+from experiments.participants.base import Percept, Point, estimated_distances
+from experiments.participants.distribution import varies
+from experiments.participants.frontier import Frontier, SearchPlace
+from mjsim.values.episode import CAPACITY
+from planner.errors import PlannerError
+from planner.plan import Visit, VisitKind
 
 
 @dataclass(frozen=True)
 class Decision:
-    """How a person chooses.
+    """Parameters of the choice.
 
-    People plan several moves ahead, the more the better they know a task (van Opheusden et al., Nature 618, 2023),
-    and regions of a building enter their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003). The
-    number of moves, the error of distances and the cost of a region are assumptions.
+    People plan several moves ahead, and more of them the better they know a task (van Opheusden et al., Nature 618,
+    2023). The regions of a building affect their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003).
+    The number of moves, the error of distances and the cost of a region are assumptions.
     """
 
-    # of the choice: an option that costs c metres more is taken with odds exp(-c / temperature), m
+    # an option that costs c metres more is chosen with odds exp(-c / temperature), m
     temperature: float = varies({"lognormal": [0.5, 0.35]}, 0.0, 1000.0, "m")
-    # how many visits are imagined, the nearest one next each time; rounded
+    # number of visits that are imagined, always the nearest one next; rounded
     look_ahead: float = varies({"uniform": [1.5, 4.5]}, 1.0, 12.0, "visits")
-    # standard deviation of the logarithm of a distance as it is judged
+    # standard deviation of the logarithm of an estimated distance
     distance_error: float = varies(0.15, 0.0, 5.0)
     # cost of entering another room in addition to the walk, m
     room_cost: float = varies(2.0, 0.0, 100.0, "m")
@@ -31,19 +37,19 @@ class Decision:
 
 @dataclass(frozen=True)
 class Task:
-    """The known rest of the task, by numbers of places."""
+    """The known rest of the task. Places are numbered, and place 0 is the person's."""
 
-    legs: NDArray[np.float64]  # costs of walks from place to place, m, shape (n, n); place 0 is the person's
+    legs: NDArray[np.float64]  # costs of walks from place to place, m, shape (n, n)
     picks: Sequence[int]  # place of each object that can be fetched
-    bins: Sequence[int]  # place of the bin of each of these
+    bins: Sequence[int]  # place of the bin of each of these objects
     carried: Sequence[int]  # place of the bin of each object in the hands
-    capacity: int  # how many objects are carried at most
+    capacity: int  # largest number of objects that can be carried
 
 
 def first_step_costs(task: Task, look_ahead: int) -> list[float]:
-    """Cost of the next `look_ahead` visits, m, for each possible first one: those of `picks`, then of `carried`.
+    """Return the cost of the next `look_ahead` visits, m, for each possible first visit: `picks`, then `carried`.
 
-    After the first, the nearest possible visit is imagined each time. With both hands full, picks are infinite.
+    After the first visit, always the nearest possible one follows. If the hands are full, picks cost infinity.
     """
     picks, carried, full = (
         list(range(len(task.picks))),
@@ -65,7 +71,7 @@ def first_step_costs(task: Task, look_ahead: int) -> list[float]:
 def _imagined(
     task: Task, legs: list[list[float]], at: int, picks: list[int], carried: list[int], visits: int
 ) -> float:
-    """Cost of some visits, each the nearest possible one, m."""
+    """Return the cost of a number of visits, always the nearest possible one, m."""
     picks, carried, cost = list(picks), list(carried), 0.0
     for _ in range(visits):
         options = [(legs[at][place], 1, place, k) for k, place in enumerate(carried)]
@@ -86,11 +92,129 @@ def _imagined(
 def judged_distances(
     legs: NDArray[np.float64], decision: Decision, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Distances as a person judges them, m; any shape."""
+    """Return distances as a person estimates them, m, in an array of any shape."""
     return np.asarray(legs * np.exp(decision.distance_error * rng.standard_normal(legs.shape)))
 
 
 def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator) -> int:
-    """Number of an option, with odds exp(-cost / temperature), m; the cheapest at 0, never one of infinite cost."""
+    """Choose an option with odds exp(-cost / temperature), m.
+
+    At 0, choose the cheapest. Infinite costs are never chosen.
+    """
     noise = rng.gumbel(size=len(costs))
     return int(np.argmin(np.asarray(costs) - temperature * noise))
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What the person knows of the task when choosing."""
+
+    objects: Mapping[str, Point]  # remembered places of objects, m, shape (2,)
+    pull: float  # weight of straight lines in estimates of distances to these objects, 0 to 1
+    search: bool  # True if a search is possible when no known object can be fetched
+
+
+class Chooser:
+    """Chooses visits and searches."""
+
+    def __init__(
+        self, decision: Decision, house: House, frontier: Frontier, rng: np.random.Generator
+    ) -> None:
+        self._decision, self._house, self._frontier, self._rng = decision, house, frontier, rng
+
+    def choose(self, percept: Percept, known: Known) -> Visit | SearchPlace | None:
+        """Return the next visit or search, or None if there is nothing to do."""
+        fetchable = [] if percept.hands_full else sorted(known.objects)
+        visits = [Visit(VisitKind.PICK, name) for name in fetchable]
+        visits += [Visit(VisitKind.PLACE, name) for name in percept.carried]
+        costs = self._visit_costs(percept, known, fetchable) if visits else []
+        if known.search and not fetchable and not percept.hands_full:
+            return self._or_search(percept, visits, costs)
+        return visits[choose(costs, self._decision.temperature, self._rng)] if visits else None
+
+    def _or_search(
+        self, percept: Percept, visits: Sequence[Visit], costs: Sequence[float]
+    ) -> Visit | SearchPlace:
+        places = self._frontier.places()
+        points = [place.point for place in places]
+        walks = np.array(estimated_distances(self._house, percept.position, points))
+        rooms = [place.room for place in places]
+        counted = walks + self._decision.room_cost * self._in_another_room(percept.position, rooms)
+        best = choose(
+            judged_distances(counted, self._decision, self._rng).tolist(),
+            self._decision.temperature,
+            self._rng,
+        )
+        options = [*costs, float(counted[best]) + self._decision.search_cost]
+        chosen = choose(options, self._decision.temperature, self._rng)
+        return visits[chosen] if chosen < len(visits) else places[best]
+
+    def _visit_costs(self, percept: Percept, known: Known, fetchable: Sequence[str]) -> list[float]:
+        """Return the costs of visits, m: objects that can be fetched, then carried ones."""
+        names = [*fetchable, *percept.carried]
+        bins = sorted({percept.targets[name] for name in names})
+        places = [percept.position, *(known.objects[n] for n in fetchable)]
+        places += [self._house.approaches[key] for key in bins]
+        place_of_bin = {key: 1 + len(fetchable) + k for k, key in enumerate(bins)}
+        task = Task(
+            legs=self._judged_legs(places, known.pull, len(fetchable)),
+            picks=range(1, 1 + len(fetchable)),
+            bins=[place_of_bin[percept.targets[name]] for name in fetchable],
+            carried=[place_of_bin[percept.targets[name]] for name in percept.carried],
+            capacity=CAPACITY if not percept.hands_full else len(percept.carried),
+        )
+        return first_step_costs(task, round(self._decision.look_ahead))
+
+    def _judged_legs(self, places: Sequence[Point], pull: float, objects: int) -> NDArray[np.float64]:
+        """Return the estimated costs of walks between places, m, shape (n, n).
+
+        The first `objects` places after the start are visible through walls, so straight lines count in their
+        distances.
+        """
+        points = np.array(places)
+        legs = self._all_legs(points)
+        straight = np.linalg.norm(points[:, None] - points[None], axis=2)
+        to_poles = slice(1, 1 + objects)
+        legs[:, to_poles] = (1 - pull) * legs[:, to_poles] + pull * straight[:, to_poles]
+        rooms = np.array([self._house.rooms.room_at(point) for point in points])
+        crossing = rooms[:, None] != rooms[None]
+        counted = judged_distances(legs, self._decision, self._rng) + self._decision.room_cost * crossing
+        return np.asarray(counted)
+
+    def _all_legs(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        try:
+            return self._house.geodesics.distances(points)
+        except PlannerError:  # at least one point is unreachable
+            return np.array([estimated_distances(self._house, point, list(points)) for point in points])
+
+    def _in_another_room(self, position: Point, rooms: Sequence[str]) -> NDArray[np.bool_]:
+        here = self._house.rooms.room_at(position)
+        return np.array([room != here for room in rooms])
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times of reading and deciding."""
+
+    # factor of all these times: below 1 for quick people, above 1 for slow ones
+    pace: float = varies({"lognormal": [1.0, 0.35]}, 0.05, 20.0)
+    # preparing one's next step mentally, s (Card, Moran and Newell, CACM 23, 1980: 1.35 s)
+    deciding: float = varies(1.35, 0.0, 60.0, "s")
+    # words per minute (Brysbaert, Journal of Memory and Language 109, 2019: 238)
+    reading_speed: float = varies(238.0, 10.0, 10_000.0, "words a minute")
+    words: float = varies(4.0, 0.0, 100.0)  # words in a row of the task list
+    # understanding a suggested step and its path before walking, s; a starting value
+    guided_step: float = varies(6.0, 0.0, 60.0, "s")
+    # relating the flagpoles to the house before a choice, s; a starting value
+    interpreting: float = varies({"uniform": [1.5, 3.0]}, 0.0, 60.0, "s")
+
+    def list_time(self, rows: int) -> float:
+        """Return the time to read a list, s."""
+        return self.pace * rows * self.words / self.reading_speed * 60.0
+
+    def choice_time(self, *, poles: bool) -> float:
+        """Return the time to choose the next visit, s, which is longer if there are flagpoles to interpret."""
+        return self.pace * (self.deciding + (self.interpreting if poles else 0.0))
+
+    def suggestion_time(self) -> float:
+        return self.pace * self.guided_step

@@ -1,4 +1,4 @@
-"""The simulated guest: notices, remembers, chooses, complies or not, and takes its time."""
+"""The guest, which combines the parts of the model."""
 
 import math
 from dataclasses import dataclass, replace
@@ -6,34 +6,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from experiments.house import House
-from experiments.participants.base import Guidance, Percept, Point
-from experiments.participants.frontier import Frontier, Place
-from experiments.participants.guest.compliance import Adherence, Compliance
-from experiments.participants.guest.decision import Decision as DecisionParameters
-from experiments.participants.guest.memory import Memory, Recollection
-from experiments.participants.guest.options import Chooser, Known
-from experiments.participants.guest.perception import Noticing, Perception
-from experiments.participants.guest.timing import Timing
-from experiments.participants.guest.walking import Detours, Walking
-from experiments.participants.looking import FullTurn
+from experiments.participants.base import FullTurn, Guidance, Percept, Point
+from experiments.participants.frontier import Frontier, SearchPlace
+from experiments.participants.guest.decision import Chooser, Decision, Known, Timing
+from experiments.participants.guest.deviations import Adherence, Compliance, Detours, Walking
+from experiments.participants.guest.perception import Memory, Noticing, Perception, Recollection
 from experiments.participants.visit_executor import VisitExecutor
 from hud.markers import BREADCRUMB, FLAGPOLE
 from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
 from mjsim.world.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
 
-ARRIVED = 0.5  # m from a place on the way, or one to look around from
-GONE = 1.2  # m: a remembered object nearer than this and not in view is no longer there
-SEEN_BIN = 2.0  # m; a bin nearer than this is known from then on
+ARRIVED = 0.5  # m; a place nearer than this is reached
+GONE = 1.2  # m; a remembered object nearer than this and not in view is no longer there
+SEEN_BIN = 2.0  # m; the place of a bin nearer than this is learnt
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """One person: the values of all parts."""
+    """Parameter values of one person."""
 
     perception: Perception
     memory: Memory
-    decision: DecisionParameters
+    decision: Decision
     compliance: Compliance
     walking: Walking
     timing: Timing
@@ -41,17 +36,17 @@ class Behaviour:
 
 @dataclass(frozen=True)
 class Intention:
-    """A visit or search that a person is about to make."""
+    """The visit or search that a person is about to make."""
 
-    aim: Visit | Place  # a visit, or a place to look around from
-    suggested: bool = False  # whether it is the suggested step
-    # whether it takes another path than the shown one, because it is off that path or was blocked on it
+    aim: Visit | SearchPlace  # a visit, or a place to search
+    suggested: bool = False  # True if this is the suggested step
+    # True if the person takes another path than the shown one, after leaving it or being blocked on it
     strays: bool = False
-    gives_up_at: float = math.inf  # Simulated time at which the suggested step is given up, s
+    gives_up_at: float = math.inf  # simulated time at which the suggested step is given up, s
 
 
 class Guest:
-    """Tidies like a person who was shown the house once, in any condition and with its guidance."""
+    """Tidies like a person who was shown the house once, and uses the guidance of any condition."""
 
     needs: frozenset[str] = frozenset()
 
@@ -69,20 +64,19 @@ class Guest:
         self._turn: FullTurn | None = None
         self._turned_for_poles = self._has_begun = False
         self._carried: set[str] = set()
-        self._brought: set[str] = set()  # no longer carried: believed to be in their bins
-        self._passed: set[str] = set()  # objects that were not picked up in passing
+        self._brought: set[str] = set()  # objects assumed to be in their bins, as they are no longer carried
+        self._passed: set[str] = set()  # objects considered for picking up in passing
         self._room: str | None = None
         self._read: Visit | None = None
         self._given_up: Visit | None = None
-        self._is_open = False  # whether it would take up the suggestion that it has read
+        self._is_open = False  # True if the person may still follow the suggestion that was read
         self._next_look = self._thinks_until = 0.0
 
     def act(self, percept: Percept) -> Action:
-        """Look; read and think; then continue with the present intention."""
         if percept.busy:
             return WAIT
         self._begin(percept)
-        if self._thinks(percept):  # while it looks at the HUD
+        if self._thinks(percept):  # looks at the HUD, not at the room
             return Wait(self._thinks_until)
         self._look(percept)
         decision = self._turn_around(percept)
@@ -91,10 +85,10 @@ class Guest:
             decision = self._turn_around(percept)
         if decision is not None:
             return decision
-        return Wait(self._thinks_until) if self._thinks(percept) else self._go_on(percept)
+        return Wait(self._thinks_until) if self._thinks(percept) else self._continue(percept)
 
     def _begin(self, percept: Percept) -> None:
-        """Read the list, unless the HUD shows the next step."""
+        """Read the list first, unless the HUD shows the next step."""
         if not self._has_begun:
             self._has_begun, self._next_look = True, percept.time
             rows = 0 if BREADCRUMB in percept.shown_roles else len(percept.targets)
@@ -104,7 +98,7 @@ class Guest:
         return percept.time < self._thinks_until - TIME_TOLERANCE
 
     def _look(self, percept: Percept) -> None:
-        """From time to time, learn the places of objects and bins, and pick up objects in passing."""
+        """At intervals, learn the places of objects and bins, and perhaps pick up an object in passing."""
         for name in percept.carried:
             self._known.drop(name)
         self._brought |= self._carried - set(percept.carried)
@@ -117,7 +111,8 @@ class Guest:
             self._room = room
             self._noticing.look_afresh()
         self._known.forget(percept.time, but=self._aim_object())
-        found = self._noticing.notice(percept) | (dict(percept.flagpoles) if self._misses(percept) else {})
+        poles = percept.flagpoles if self._misses_objects(percept) else {}
+        found = {**self._noticing.notice(percept), **poles}
         self._known.learn(found, percept.time)
         self._brought -= set(found)
         for key in sorted(set(self._house.receptacles) - self._known.bins):
@@ -128,9 +123,9 @@ class Guest:
         self._pick_up_in_passing(percept)
 
     def _look_around_if_there(self, percept: Percept) -> None:
-        """Once the goal of a search is in view or reached, perhaps look all around, then choose again."""
+        """Once the place of a search is reached or in view, perhaps look all around, then choose again."""
         aim = self._intention.aim if self._intention is not None else None
-        if not isinstance(aim, Place) or (
+        if not isinstance(aim, SearchPlace) or (
             self._frontier.is_left(aim) and not self._is_at(percept, aim.point)
         ):
             return
@@ -140,8 +135,7 @@ class Guest:
             self._noticing.look_afresh()
             self._turn = FullTurn(percept.heading)
 
-    def _misses(self, percept: Percept) -> bool:
-        """Whether the places of some remaining objects are unknown."""
+    def _misses_objects(self, percept: Percept) -> bool:
         return len(self._known.objects) + len(self._carried) + len(self._brought) < len(percept.targets)
 
     def _pick_up_in_passing(self, percept: Percept) -> None:
@@ -162,11 +156,11 @@ class Guest:
         return aim.object if isinstance(aim, Visit) else None
 
     def _is_sensible(self, percept: Percept) -> bool:
-        """Whether the present intention is still possible and wanted."""
+        """Return True if the present intention is still possible and wanted."""
         intention = self._intention
         if intention is None:
             return False
-        if isinstance(intention.aim, Place):
+        if isinstance(intention.aim, SearchPlace):
             return percept.hands_full or not self._options(percept, percept.guidance).objects
         if intention.suggested:
             is_shown = percept.guidance is not None and percept.guidance.visit == intention.aim
@@ -187,7 +181,7 @@ class Guest:
         return refused and near and name not in percept.look() and name not in percept.flagpoles
 
     def _decide(self, percept: Percept) -> None:
-        """Read a new suggestion; else form an intention, which takes time."""
+        """Read a new suggestion, or form an intention. Both take time."""
         shown = percept.guidance
         self._intention, self._stops = None, []
         if shown is not None and shown.visit != self._read:
@@ -195,7 +189,7 @@ class Guest:
             self._thinks_until = percept.time + self._behaviour.timing.suggestion_time()
             return
         if shown is not None and self._is_open:
-            self._is_open = self._adherence.takes_up()
+            self._is_open = self._adherence.follows()
             if self._is_open:
                 self._follow(percept, shown)
                 return
@@ -230,11 +224,10 @@ class Guest:
             else:
                 objects.pop(shown.visit.object, None)
         pull = self._behaviour.walking.pull if FLAGPOLE in percept.shown_roles else 0.0
-        return Known(objects, pull, search=self._misses(percept))
+        return Known(objects, pull, search=self._misses_objects(percept))
 
-    def _goal(self, percept: Percept, aim: Visit | Place, shown: Guidance | None) -> Point:
-        """Place of an aim, m, shape (2,)."""
-        if isinstance(aim, Place):
+    def _goal(self, percept: Percept, aim: Visit | SearchPlace, shown: Guidance | None) -> Point:
+        if isinstance(aim, SearchPlace):
             return aim.point
         if shown is not None and aim == shown.visit:
             self._known.learn({aim.object: shown.goal} if aim.kind is VisitKind.PICK else {}, percept.time)
@@ -244,7 +237,7 @@ class Guest:
         return self._house.approaches[percept.targets[aim.object]]
 
     def _turn_around(self, percept: Percept) -> Action | None:
-        """Continue a turn; at its end, the bins of this room are known."""
+        """Continue a turn. After a full turn, the bins of this room are known."""
         turning = self._turn.act(percept) if self._turn is not None else None
         if turning is None and self._turn is not None:
             self._turn = None
@@ -252,8 +245,8 @@ class Guest:
             self._known.bins |= {key for key in self._house.receptacles if bins[key].room == self._room}
         return turning
 
-    def _go_on(self, percept: Percept) -> Action:
-        """Walk by way of the stops to the aim, and pick or place there."""
+    def _continue(self, percept: Percept) -> Action:
+        """Walk along the stops to the aim, and pick or place there."""
         intention = self._intention
         if intention is None:
             return IDLE
@@ -262,7 +255,7 @@ class Guest:
         if self._stops:
             until = min(self._next_look, intention.gives_up_at)
             return self._executor.walk_to(percept, self._stops[0], ARRIVED, until=until)
-        if isinstance(intention.aim, Place):
+        if isinstance(intention.aim, SearchPlace):
             return self._executor.walk_to(percept, intention.aim.point, ARRIVED, until=self._next_look)
         return self._visit(percept, intention, intention.aim)
 

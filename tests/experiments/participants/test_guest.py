@@ -10,15 +10,11 @@ from hypothesis import strategies as st
 from sessions import prepared
 
 from experiments.errors import ConfigError
-from experiments.participants.behaviour import draw
-from experiments.participants.distribution import Distributions
+from experiments.participants.distribution import Distributions, draw
 from experiments.participants.guest import PARAMETERS, as_behaviour
-from experiments.participants.guest.compliance import Adherence, Compliance
-from experiments.participants.guest.decision import Task, choose, first_step_costs
-from experiments.participants.guest.memory import Memory, Recollection
-from experiments.participants.guest.perception import Noticing, Perception
-from experiments.participants.guest.timing import Timing
-from experiments.participants.guest.walking import Detours, Walking
+from experiments.participants.guest.decision import Task, Timing, choose, first_step_costs
+from experiments.participants.guest.deviations import Adherence, Compliance, Detours, Walking
+from experiments.participants.guest.perception import Memory, Noticing, Perception, Recollection
 from experiments.trials.setup import draw_behaviour
 from experiments.trials.trial_config import TrialConfig
 
@@ -124,7 +120,7 @@ def test_full_hands_can_only_place():
 def test_others_do_as_often_as_they_are_said_to():
     person = Adherence(Compliance(0.3, 0.2, 0.4, 2.0, quits=0.0), np.random.default_rng(0))
     times = range(8000)
-    assert np.mean([person.takes_up() for _ in times]) == pytest.approx(0.3, abs=0.02)
+    assert np.mean([person.follows() for _ in times]) == pytest.approx(0.3, abs=0.02)
     given_up = [person.gives_up_after(5.0) for _ in times]
     assert np.mean([after is not None for after in given_up]) == pytest.approx(0.2, abs=0.02)
     assert all(0.0 <= after <= 5.0 for after in given_up if after is not None)
@@ -136,7 +132,7 @@ def test_whoever_quits_follows_nothing_more_and_sooner_or_later_everybody_does()
     people = [
         Adherence(Compliance(1.0, 0.0, 0.0, 2.0, quits=0.1), np.random.default_rng(k)) for k in range(2000)
     ]
-    followed = np.array([[person.takes_up() for _ in range(20)] for person in people])
+    followed = np.array([[person.follows() for _ in range(20)] for person in people])
     assert np.all(np.diff(followed.astype(int), axis=1) <= 0)
     assert followed.mean(axis=0) == pytest.approx(0.9 ** np.arange(1, 21), abs=0.04)
 

@@ -1,0 +1,107 @@
+"""The guest's deviations: from suggested steps, and from the shortest path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.house import House
+from experiments.participants.base import Point, estimated_distances
+from experiments.participants.distribution import chance, varies
+
+MIN_DETOUR = 0.5  # m; shorter detours are not taken
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """Parameters of compliance with suggested steps.
+
+    The published variance of deviations is largest under `optimal` at every difficulty, as if there were kinds of
+    people (PAPER section 8): some always follow, some sometimes, some hardly. The weights are starting values. A person
+    who always follows neither gives up a step nor picks up anything else, but may quit following.
+    """
+
+    # probability of following a suggested step
+    follows: float = chance({"mixture": [[0.62, 1.0], [0.20, {"beta": [2, 2]}], [0.18, {"beta": [1, 9]}]]})
+    abandons: float = chance({"beta": [1.0, 19.0]})  # probability of giving up a step on the way to it
+    # probability of picking up an object that is noticed next to the path, with a hand free
+    picks_up: float = chance({"uniform": [0.15, 0.30]})
+    beside: float = varies(2.0, 0.0, 20.0, "m")  # largest distance of such an object from the person
+    # probability, at each suggestion, of ignoring this and all later suggestions
+    quits: float = chance({"beta": [1.0, 99.0]})
+
+
+class Adherence:
+    """A person's decisions about suggestions."""
+
+    def __init__(self, compliance: Compliance, rng: np.random.Generator) -> None:
+        self.compliance, self._rng, self._has_quit = compliance, rng, False
+
+    def follows(self) -> bool:
+        """Decide whether to follow a suggested step."""
+        quits, chance = self._rng.random(2).tolist()
+        self._has_quit |= quits < self.compliance.quits
+        return chance < self.compliance.follows and not self._has_quit
+
+    def gives_up_after(self, duration: float) -> float | None:
+        """Return the time after which a step is given up on a walk of this duration, s, or None if it is not."""
+        chance, share = self._rng.random(2).tolist()
+        gives_up = chance < self.compliance.abandons and not self._always_follows
+        return share * duration if gives_up else None
+
+    def picks_up(self, distance: float) -> bool:
+        """Decide whether to pick up an object that was noticed at this distance, m, in passing."""
+        tempted = float(self._rng.random()) < self.compliance.picks_up
+        return tempted and distance <= self.compliance.beside and not self._always_follows
+
+    @property
+    def _always_follows(self) -> bool:
+        return self.compliance.follows >= 1.0
+
+
+@dataclass(frozen=True)
+class Walking:
+    """Parameters of departures from the shortest path. The shapes of the distributions are starting values."""
+
+    # probability, at each walk not along a shown path, of absent-mindedly going elsewhere first
+    lapse_rate: float = chance({"beta": [0.5, 3.0]})
+    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # longest walk to that place
+    # probability, at each walk to a flagpole in another room, of first walking to the point of this room
+    # nearest to the flagpole; also the weight of straight lines in estimated distances of flagpoles
+    pull: float = chance({"beta": [2.0, 3.0]})
+
+
+class Detours:
+    """Chooses the places that a walk passes before its goal."""
+
+    def __init__(self, walking: Walking, house: House, rng: np.random.Generator) -> None:
+        self._walking, self._house, self._rng = walking, house, rng
+
+    def stops(self, start: Point, goal: Point, *, pole: bool) -> list[Point]:
+        """Return the places to pass on the way, m, shape (2,) each. Usually there are none.
+
+        `pole` tells that a flagpole at the goal is visible through walls.
+        """
+        lapse, pulled = self._rng.random(2).tolist()
+        start, stops = self._house.navmesh.snap(start), []
+        if lapse < self._walking.lapse_rate:
+            stops += self._lapse(start)
+        if pole and pulled < self._walking.pull:
+            stops += self._towards(start, goal)
+        return stops
+
+    def _lapse(self, start: Point) -> list[Point]:
+        """Return a random place of the house that is not too far away, m, shape (2,), if there is one."""
+        places = np.concatenate(list(self._house.viewpoints.values()))
+        walks = np.array(estimated_distances(self._house, start, list(places)))
+        near = places[(walks > MIN_DETOUR) & (walks <= self._walking.lapse_distance)]
+        return [near[self._rng.integers(len(near))]] if len(near) else []
+
+    def _towards(self, start: Point, goal: Point) -> list[Point]:
+        """Return the place of this room, (2,), nearest to a goal in another room, if it is nearer than the start."""
+        room = self._house.rooms.room_at(start)
+        if room == self._house.rooms.room_at(goal):
+            return []
+        places = self._house.viewpoints.get(room, start[None])
+        gaps = np.linalg.norm(places - goal, axis=1)
+        nearer = gaps.min() < np.linalg.norm(start - goal) - MIN_DETOUR
+        return [places[gaps.argmin()]] if nearer else []
