@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars
-    from experiments.session.viewer import Progress as SessionProgress
+    from experiments.session.session import Progress as SessionProgress
     from experiments.trials.trial import run_trial
 
     config = TrialConfig(

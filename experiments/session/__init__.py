@@ -1,4 +1,4 @@
-"""One session: the loop in which a participant, an assistant and a world take turns, what it perceives, and films.
+"""One session: the loop of participant, assistant and world, what the participant perceives, and films.
 
-Serves trials, replays and the browser's worker, which all run the same `Session`.
+Trials, replays and the browser's worker run the same `Session`.
 """

@@ -1,4 +1,4 @@
-"""The assistant: sees the whole house, plans, and says what the HUD shows."""
+"""The assistant, which plans with full knowledge of the house and determines what the HUD shows."""
 
 import functools
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.participants.base import Choice, Guidance
-from experiments.record.records import EventLog
+from experiments.record.records import Event, EventLog
 from experiments.session.shown_path import TOLERANCE, PathsToNext
 from experiments.session.task_board import PlanView, TaskBoard
 from experiments.session.task_log import TaskLog
@@ -26,24 +26,25 @@ from planner.route import XY, TaskState
 from planner.service import Planner
 
 PLAN_ROLES = frozenset({BREADCRUMB, GOAL})
+WORLD_EVENTS = {kind.value: kind for kind in EventKind}
 VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLACE}
 
 
 class Assistant:
-    """Tells the planner about the state of the task, and the condition about the plan.
+    """Passes the state of the task to the planner, and the plan to the assistance condition.
 
     Args:
         board: Describes the task to the condition.
         assistance: Name of the assistance condition.
-        planner: Answers what to do next.
-        log: Where plans and visits are logged.
-        log_regrets: Whether the regret of every visit is logged.
-        options: Rules of the world, for how much a person carries.
+        planner: Makes the plans.
+        log: Receives plans and visits.
+        log_regrets: True to log the regret of every visit.
+        options: Rules of the world, which contain the capacity.
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
-        shows_plan: Whether the condition shows the plan or where it leads next.
-        shows_own: Whether the condition is a user's own.
+        shows_plan: True if the condition shows the plan or its next step.
+        shows_own: True if the condition is user code.
     """
 
     def __init__(
@@ -65,13 +66,14 @@ class Assistant:
         )
         self._deliveries = deliveries(self._house, self._episode)
         self._paths = PathsToNext(self._house.geodesics)
-        self._path_from: Observation | None = None  # where the paths to the next visit will start
+        self._path_from: Observation | None = (
+            None  # start of the paths to the next visit, which are not computed yet
+        )
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
-        self.shows_own = is_own(self._show)
+        self.is_custom = is_own(self._show)
 
     def begin(self, observation: Observation) -> None:
-        """Plan for the start of the task."""
         self._last_visit_at = observation.position.copy()
         self._plan(observation)
         self.show_message("started", observation.time)
@@ -84,7 +86,7 @@ class Assistant:
             self._planner.settle()
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
-        """Take note of the last control step and its events; replan where the person left the plan."""
+        """Process the last control step and its events. Make a new plan if the person has left the plan."""
         for event in events:
             if event.kind in VISIT_KIND:
                 made = Visit(VISIT_KIND[event.kind], event.object)
@@ -102,21 +104,36 @@ class Assistant:
 
     @property
     def expecting(self) -> bool:
-        """Whether a better plan may turn up at any moment, so that every control step has to be observed."""
+        """True if a better plan may arrive at any moment, so that every control step has to be observed."""
         return self._planner.pending
 
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
-        """Take note of a walk without events in which nothing moved, as `observe` of each step would.
+        """Process a walk during which nothing happened, with the same result as `observe` of each step.
 
         Args:
-            positions: Where the person was after every control step, m, shape (n, 2).
+            positions: Position of the person after every control step, m, shape (n, 2).
             observation: State at the end.
         """
         if (places := self._places_to_follow(observation)) is not None:
             self._paths.path.follow(positions, *places)
 
+    def observe_recorded(self, observation: Observation, events: Sequence[Event]) -> None:
+        """Observe a recorded control step by the events that were logged in it, and the state after it."""
+        for event in events:
+            if event["event"] == "attempt" and event["refusal"] is not None:
+                self.show_message(event["refusal"], observation.time, event["object"])
+        happened = [
+            WorldEvent(float(e["t"]), WORLD_EVENTS[e["event"]], e["object"], e["receptacle"])
+            for e in events
+            if e["event"] in WORLD_EVENTS
+        ]
+        self.observe(observation, happened)
+        for event in events:
+            if event["event"] == "scroll":
+                self.scroll(int(event["rows"]))
+
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Put a message about an event or a refusal into the message bar."""
+        """Show a message about an event or a refusal in the message bar."""
         self._board.show_message(key, time, object_name)
 
     def scroll(self, rows: int) -> None:
@@ -124,7 +141,7 @@ class Assistant:
         self._board.scroll(rows)
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
-        """What the HUD shows now; a condition needs the eye camera to point to a goal out of view."""
+        """Return the present HUD state. Conditions need the eye camera to point to a goal out of view."""
         view = self._board.view(
             observation,
             ahead=PlanView(self._board, observation, lambda: self._planner.route, self._paths_to),
@@ -135,7 +152,7 @@ class Assistant:
         return shown_by(self._show, self._assistance, view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
-        """The next step and the path that the breadcrumbs mark; None where there are none, or when all is done."""
+        """Return the step and the path that the breadcrumbs mark, or None if there are none or all is done."""
         if BREADCRUMB not in self.shown_roles or (visit := self._planner.next) is None:
             return None
         paths = self._paths_to(visit)
@@ -143,7 +160,7 @@ class Assistant:
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
-        """What can be done next and what it costs compared with the best, the best first; empty until it is known."""
+        """Return the visits that are possible next, the best first, or nothing until their regrets are known."""
         return tuple(
             Choice(
                 visit,
@@ -156,11 +173,10 @@ class Assistant:
         )
 
     def finish(self, time: float) -> None:
-        """The task is over: log the regrets of visits that were not known in time."""
+        """Log the regrets that were not known in time."""
         self._log.finish(time)
 
     def task_state(self, observation: Observation) -> TaskState:
-        """The task in the planner's terms."""
         positions = zip(observation.object_names, observation.object_positions, strict=True)
         loose = observation.names_with(ObjectStatus.LOOSE)
         return TaskState(
@@ -171,7 +187,7 @@ class Assistant:
         )
 
     def _plan(self, observation: Observation) -> None:
-        """Follow the plan, or make a new one where the task is no longer as planned."""
+        """Keep to the plan, or make a new one if the task is no longer as planned."""
         before = self._planner.replans if self.shows_plan else 0
         self._log.plan(
             observation.time, self.task_state(observation), self._last_visit_at, shown=self.shows_plan
@@ -181,7 +197,7 @@ class Assistant:
             self._board.announce_replan(observation.time)
 
     def _paths_to(self, visit: Visit) -> PathsToNext:
-        """The paths to the next visit; they are not computed before a condition asks for them."""
+        """Return the paths to the next visit. They are computed when a condition first asks for them."""
         if self._path_from is not None:
             start, self._path_from = self._path_from, None
             self._paths.begin(self._last_visit_at, start.position, *self._places(start, visit))
@@ -190,19 +206,18 @@ class Assistant:
     def _places_to_follow(
         self, observation: Observation
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """`_places` of the next visit; None while no path to it was asked for."""
+        """Return `_places` of the next visit, or None if no path to it was asked for."""
         if self._path_from is not None or (visit := self._planner.next) is None:
             return None
         return self._places(observation, visit)
 
     def _goal(self, observation: Observation, visit: Visit) -> NDArray[np.float64]:
-        """Where a visit happens, m, shape (2,)."""
         return np.array(self._board.goal(observation, visit)[:2])
 
     def _places(
         self, observation: Observation, visit: Visit
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the path to a visit leads, and the goal of the visit, m, both of shape (2,)."""
+        """Return the end of the path to a visit, and the goal of the visit, m, both of shape (2,)."""
         goal = self._goal(observation, visit)
         if visit.kind is VisitKind.PICK:
             return goal, goal
@@ -210,7 +225,7 @@ class Assistant:
 
 
 def deliveries(house: House, episode: Episode) -> dict[str, XY]:
-    """Where a person stands to deliver each object, by name, m."""
+    """Return the place where a person stands to deliver each object, m, by name."""
     return {name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()}
 
 

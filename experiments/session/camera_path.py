@@ -1,4 +1,4 @@
-"""The path of the fly-through camera: through all rooms, with a look around each of them and at each bin."""
+"""The camera path of the fly-through, which visits all rooms and looks at each bin."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -9,40 +9,37 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from experiments.house import House
+from experiments.participants.base import Point, estimated_distance
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
-from planner.errors import PlannerError
 
-Point = NDArray[np.float64]
-
-EYE_HEIGHT = PersonParameters().eye_height  # m: the same film for all persons
-STEP = 0.04  # s between two rows
+EYE_HEIGHT = PersonParameters().eye_height  # m; the film is the same for all people
+STEP = 0.04  # time between two rows, s
 SPEED = 1.3  # m/s
 TURNING = math.radians(75.0)  # rad/s
-LOOK_AHEAD = 0.8  # m along the path that the camera looks while it moves
-BIN_TIME = 2.0  # s that the camera rests on a bin
-BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m of the way that are left to a bin when the camera looks at it
-SMOOTHING = 0.25  # s, standard deviation
+LOOK_AHEAD = 0.8  # m; the moving camera looks at the point of the path this far ahead
+BIN_TIME = 2.0  # s for which the camera rests on a bin
+BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m before the end of the path, tried in turn until the bin is seen
+SMOOTHING = 0.25  # standard deviation of the Gaussian filter, s
 _FIELD = FieldOfView.of(PersonParameters())
 
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """Pose of the camera and the bin that it looks at, every `STEP` s."""
+    """Pose of the camera, and the bin that it looks at, every `STEP` s."""
 
     positions: NDArray[np.float64]  # m, shape (n, 3)
     headings: NDArray[np.float64]  # yaw of the gaze, rad, 0 along +x, counter-clockwise, shape (n,)
     pitches: NDArray[np.float64]  # elevation of the gaze, rad, shape (n,)
-    bins: tuple[str | None, ...]  # receptacle that the camera rests on, or None; length n
+    bins: tuple[str | None, ...]  # key of the bin that the camera rests on, or None; length n
 
     @property
     def duration(self) -> float:
-        """s."""
         return len(self.headings) * STEP
 
     def at(self, times: NDArray[np.float64]) -> "CameraPath":
-        """The rows at these times, s, shape (m,)."""
+        """Return the rows at these times, s, shape (m,)."""
         rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
         bins = tuple(self.bins[row] for row in rows)
         return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)
@@ -50,15 +47,13 @@ class CameraPath:
 
 @dataclass(frozen=True, eq=False)
 class _Stop:
-    """A place (2,), m, where the camera looks at a bin, or around where there is none."""
+    """A place (2,), m, from which the camera looks at a bin, or around if `bin` is None."""
 
     place: Point
     bin: str | None = None
 
 
 class _Camera:
-    """Collects rows: x, y, heading, pitch, and the bin in each."""
-
     def __init__(self, house: House, start: Point) -> None:
         self._house = house
         self.place, self.heading, self.pitch = start, 0.0, 0.0
@@ -66,7 +61,7 @@ class _Camera:
         self.bins: list[str | None] = []
 
     def move(self, place: Point) -> None:
-        """Along the shortest path, looking ahead."""
+        """Move along the shortest path, looking ahead."""
         points = np.asarray(self._house.geodesics.shortest_path(self.place, place).points)
         gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(gaps)])
@@ -85,7 +80,7 @@ class _Camera:
         self.place = points[-1]
 
     def turn(self, heading: float, pitch: float = 0.0) -> None:
-        """On the spot, the shorter way round."""
+        """Turn on the spot in the shorter direction."""
         change = (heading - self.heading + math.pi) % (2.0 * math.pi) - math.pi
         self._turn_by(change, pitch)
 
@@ -93,7 +88,6 @@ class _Camera:
         self._turn_by(2.0 * math.pi, 0.0)
 
     def look_at(self, house: House, key: str) -> None:
-        """Turn to a bin and rest on it."""
         offset = house.receptacles[key].center - np.array([*self.place, EYE_HEIGHT])
         pitch = math.atan2(offset[2], math.hypot(offset[0], offset[1]))
         self.turn(math.atan2(offset[1], offset[0]), pitch)
@@ -116,10 +110,10 @@ class _Camera:
 
 
 def camera_path(house: House) -> CameraPath:
-    """The way through a house, the same at each call.
+    """Return the path through a house. Calls with the same house return the same path.
 
-    It goes along shortest paths from the middle viewpoint of a room, where it looks around, to the room's bins, always
-    to the nearest one that is left; then to the nearest room that is left.
+    In each room the camera looks around from the middle viewpoint, then goes to the bins of the room, always to the
+    nearest one left. It continues in the nearest room left.
     """
     stops = {room: _stops(house, room) for room in house.viewpoints}
     room = next(iter(stops))
@@ -128,7 +122,7 @@ def camera_path(house: House) -> CameraPath:
         _visit(camera, house, stops.pop(room))
         if not stops:
             break
-        room = min(stops, key=lambda key: _gap(house, camera.place, stops[key][0].place))
+        room = min(stops, key=lambda key: estimated_distance(house, camera.place, stops[key][0].place))
     rows = np.vstack(camera.rows)
     smooth = gaussian_filter1d(rows, SMOOTHING / STEP, axis=0, mode="nearest")
     positions = np.column_stack([smooth[:, :2], np.full(len(rows), EYE_HEIGHT)])
@@ -136,7 +130,10 @@ def camera_path(house: House) -> CameraPath:
 
 
 def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: float) -> dict[str, float]:
-    """Receptacle key -> time at which a person who watches the film, and looks every `interval` s, sees it first, s."""
+    """Return the time at which a viewer of the film first sees each bin, s, by receptacle key.
+
+    The viewer looks every `interval` s. Bins that are not seen are missing.
+    """
     compiled = compiled_house(house.catalogue)
     times = np.arange(0.0, path.duration, interval)
     rows, left, seen = path.at(times), dict(house.receptacles), dict[str, float]()
@@ -155,14 +152,13 @@ def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: floa
 
 
 def _stops(house: House, room: str) -> list[_Stop]:
-    """The stops of a room, its middle viewpoint first."""
     middle = house.viewpoints[room][0]
     keys = [key for key, entry in house.catalogue.receptacles.items() if entry.room == room]
     return [_Stop(middle), *(_Stop(_bin_place(house, middle, key), key) for key in keys)]
 
 
 def _bin_place(house: House, start: Point, key: str) -> Point:
-    """A place on the way to a bin from which it is seen, (2,), m."""
+    """Return a place on the path to a bin from which the bin is seen, m, (2,)."""
     points = np.asarray(house.geodesics.shortest_path(start, house.approaches[key]).points)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     compiled, bin_ = compiled_house(house.catalogue), house.receptacles[key]
@@ -187,25 +183,18 @@ def _visit(camera: _Camera, house: House, stops: Sequence[_Stop]) -> None:
 
 
 def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
-    """The first stop, then always the nearest one that is left."""
+    """Yield the first stop, then always the nearest one left."""
     left = list(stops)
     stop = left.pop(0)
     yield stop
     while left:
-        gaps = [_gap(house, stop.place, other.place) for other in left]
+        gaps = [estimated_distance(house, stop.place, other.place) for other in left]
         stop = left.pop(int(np.argmin(gaps)))
         yield stop
-
-
-def _gap(house: House, start: Point, goal: Point) -> float:
-    try:
-        return house.geodesics.shortest_path(start, goal).geodesic_distance
-    except PlannerError:
-        return math.inf
 
 
 def _interpolate(
     points: NDArray[np.float64], along: NDArray[np.float64], at: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Points (m, 2) of a polyline (k, 2) at these lengths (m,), where `along` (k,) are those of its corners, m."""
+    """Return the points (m, 2) of a polyline (k, 2) at lengths (m,). `along` (k,) are the lengths at its corners, m."""
     return np.asarray(np.column_stack([np.interp(at, along, points[:, i]) for i in range(2)]))

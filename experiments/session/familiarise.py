@@ -1,4 +1,4 @@
-"""What a simulated participant learns before the task: the story and the fly-through (PAPER sections 4 and 7)."""
+"""The familiarization of simulated participants: the story and the fly-through (PAPER sections 4 and 7)."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,22 +14,25 @@ from mjsim.house.sight.sight import FieldOfView
 from mjsim.support.files import read_text
 from mjsim.values.person_parameters import PersonParameters
 
+STORY_FILE = Path(__file__).with_name("story.md")
+READING_SPEED = 238.0  # words per minute (Brysbaert, Journal of Memory and Language 109, 2019)
+
 
 @dataclass(frozen=True)
 class Familiarisation:
     """The phases before the task."""
 
-    ended: tuple[dict[str, Any], ...]  # what `phase_ended` says of each phase, in order
-    seen: frozenset[str] | None  # receptacles that the participant has seen; None if it knows them all
+    ended: tuple[dict[str, Any], ...]  # fields of the `phase_ended` event of each phase, in order
+    seen: frozenset[str] | None  # keys of the bins that were seen; None if all are known
 
     def trained(self, events: Sequence[Event]) -> "Familiarisation":
-        """With the training, whose log holds these events: the bin that was used is known."""
+        """Return this familiarization with a training that logged these events. The bin used in it is known."""
         used = {event["receptacle"] for event in events if event["event"] == "placed"}
         end = {"phase": TRAINING, "duration_s": events[-1]["t"], "reason": events[-1]["reason"]}
         return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
 
     def log(self, log: EventLog) -> None:
-        """Log it, before the clock of the task starts."""
+        """Log the phases before the clock of the task starts."""
         for end in self.ended:
             log.append(0.0, PHASE_BEGUN, phase=end["phase"])
             log.append(0.0, PHASE_ENDED, **end)
@@ -38,9 +41,9 @@ class Familiarisation:
 def familiarise(
     phases: Collection[str], story: str | None, house: House, person: PersonParameters
 ) -> Familiarisation:
-    """Let a simulated participant read the story and watch the fly-through, as far as the trial has them.
+    """Let a simulated participant read the story and watch the fly-through, if the trial has these phases.
 
-    The bins that it sees are found by rays along the camera path, with its own field of view.
+    Rays along the camera path, within the participant's own field of view, determine which bins are seen.
     """
     ended = tuple(_phases(phases, story, house, person))
     seen = next((frozenset(end["bins"]) for end in ended if "bins" in end), None)
@@ -48,7 +51,7 @@ def familiarise(
 
 
 def watch_flythrough(house: House, person: PersonParameters) -> dict[str, Any]:
-    """Fields of the `phase_ended` event of a fly-through that a person watched."""
+    """Return the fields of the `phase_ended` event of a fly-through."""
     path = camera_path(house)
     seen = bins_seen(house, path, FieldOfView.of(person), person.looking_interval)
     return {"phase": FLYTHROUGH, "duration_s": round(path.duration, 6), "bins": seen}
@@ -64,12 +67,8 @@ def _phases(
         yield watch_flythrough(house, person)
 
 
-STORY_FILE = Path(__file__).with_name("story.md")
-READING_SPEED = 238.0  # words a minute (Brysbaert, Journal of Memory and Language 109, 2019)
-
-
 def story_text(path: Path | None = None) -> str:
-    """The story of a UTF-8 file, or of this package: plain text with blank lines between paragraphs."""
+    """Read the story from a UTF-8 file, by default that of this package. Blank lines separate paragraphs."""
     file = path or STORY_FILE
     try:
         text = read_text(file).strip()
@@ -83,5 +82,5 @@ def story_text(path: Path | None = None) -> str:
 
 
 def reading_time(text: str) -> float:
-    """How long an adult takes to read a text silently, s."""
+    """Return the time in which an adult reads a text silently, s."""
     return 60.0 * len(text.split()) / READING_SPEED

@@ -1,4 +1,4 @@
-"""The fly-through film: the rooms of a house and its bins, with captions (PAPER section 7)."""
+"""The fly-through film, with captions for rooms and bins (PAPER section 7)."""
 
 import math
 from collections.abc import Callable
@@ -31,13 +31,20 @@ def write_flythrough(
     seconds: float | None = None,
     on_progress: OnFrames = lambda *_: None,
 ) -> str:
-    """Film a house, whole or not at all; the SHA-256 of the frames, which are the same for the same arguments.
+    """Write the film of a house atomically, and return the SHA-256 of its frames, which equal arguments reproduce.
 
-    The film takes `seconds`, 1 or more, or as long as the camera's own speed says. `on_progress` is called with the
-    numbers of frames that are drawn and of all.
+    Args:
+        house: The house.
+        path: Video file to write.
+        film: Frame size and render profile.
+        seconds: Duration, at least 1 s, or None for that of the camera path.
+        on_progress: Called with the number of drawn frames and of all frames.
+
+    Raises:
+        ConfigError: The duration is too short.
     """
     if seconds is not None and seconds < MIN_DURATION:
-        raise ConfigError(f"a film of {seconds} s is too short; it takes {MIN_DURATION:.0f} s at least")
+        raise ConfigError(f"a film of {seconds} s is too short; it needs at least {MIN_DURATION:.0f} s")
     whole = camera_path(house)
     duration = seconds or whole.duration
     frames = round(duration * FPS)
@@ -52,7 +59,7 @@ def _draw(
     house: House, rows: CameraPath, film: FilmConfig, video: VideoWriter, on_progress: OnFrames
 ) -> None:
     compiled, count = compiled_house(house.catalogue), len(rows.headings)
-    # As wide as the view of a person, in pictures of any shape.
+    # The horizontal field of view is that of a person, whatever the shape of the picture.
     half = math.tan(PersonParameters().vertical_field / 2.0) * PICTURE_ASPECT * film.height / film.width
     captions = Captions(film.width, film.height)
     with Renderer(compiled.model, width=film.width, height=film.height, profile=film.profile) as renderer:
@@ -67,7 +74,6 @@ def _draw(
 
 
 def _bin_text(house: House, key: str | None) -> str:
-    """Caption of a bin: its name and place."""
     if key is None:
         return ""
     entry = house.catalogue.receptacles[key]

@@ -1,4 +1,4 @@
-"""Size and look of the frames of a film."""
+"""Size and look of films."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  #
 
 @dataclass(frozen=True)
 class FilmConfig:
-    """How frames are made.
+    """Settings of the frames of a film.
 
     Attributes:
-        width: Of the picture, px.
-        height: Of the picture, px.
+        width: Picture width, px.
+        height: Picture height, px.
         profile: Render profile.
-        beside: Whether lists and hands of the HUD lie beside the picture, as on the page of `mjsim play`: frames are
-            then larger than the picture.
-        field_of_view: Horizontal field of view of the picture, rad; None for that of the person.
+        beside: True if the panels of the HUD are next to the picture, as on the page of `mjsim play`. Frames are then
+            larger than the picture.
+        field_of_view: Horizontal field of view, rad, or None for that of the person.
 
     Raises:
         ConfigError: There is no such profile.
@@ -36,12 +36,10 @@ class FilmConfig:
 
     @property
     def margins(self) -> tuple[int, int, int, int]:
-        """Room above, below, to the left and to the right of the picture, px; frames of films have even sizes."""
+        """Space above, below, left and right of the picture, px, such that frames have even sizes."""
         if not self.beside:
             return 0, 0, 0, 0
-        from hud.layout import (
-            margins,
-        )  # imported late: it takes long, and the command line needs the rest at once
+        from hud.layout import margins  # imported late, because the command line imports this module
 
         top, below, left, right = margins(self.width, self.height)
         return top + (self.height + top + below) % 2, below, left, right + (self.width + left + right) % 2

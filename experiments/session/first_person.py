@@ -1,4 +1,4 @@
-"""First-person frames with the HUD over them, and films of them."""
+"""First-person frames with the HUD, and films of them."""
 
 import contextlib
 import dataclasses
@@ -26,16 +26,16 @@ from mjsim.world.world import World
 
 
 class FirstPersonRenderer:
-    """Makes first-person frames with the HUD over them. Use as a context manager; leaving it frees the GL context.
+    """Renders first-person frames with the HUD. Use it as a context manager to free the GL context.
 
     Args:
-        scene: The scene to render.
-        house: The house, for the pictures of its objects and receptacles.
+        scene: Scene to render.
+        house: House, whose objects and receptacles are in the pictures of the HUD.
         film: Frame size and render profile.
-        pictures: What `render_pictures` made of the house's catalogue, to use again; None to make them.
+        pictures: Result of `render_pictures` for the house's catalogue, or None to render the pictures.
 
     Raises:
-        RenderError: No off-screen GL context could be made, or the size or profile is unusable.
+        RenderError: There is no off-screen GL context, or the size or profile is not valid.
     """
 
     def __init__(
@@ -52,20 +52,20 @@ class FirstPersonRenderer:
         self._film = film
 
     def camera_view(self, data: Any) -> CameraView:
-        """The eye camera as the next frame of `data` shows it; a condition needs it to point to a goal."""
+        """Return the eye camera of the next frame of `data`."""
         pose = self._renderer.camera_pose(data, self._camera(data))
         width, height = self._film.width, self._film.height
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
-        """What the person sees.
+        """Render the view of the person with the HUD.
 
         Args:
             data: State of the scene's model.
-            state: What the HUD shows; its markers are drawn into the scene.
+            state: HUD state, whose markers are drawn into the scene.
 
         Returns:
-            RGB, uint8, shape (height, width, 3); larger where the lists lie beside the picture.
+            RGB, uint8, shape (height, width, 3), or larger if the panels are next to the picture.
 
         Raises:
             RenderError: A marker cannot be drawn, or the renderer is closed.
@@ -80,7 +80,6 @@ class FirstPersonRenderer:
         return self._compositor.compose(picture, state)
 
     def _camera(self, data: Any) -> str | CameraPose:
-        """The eye, as wide as the film says."""
         film = self._film
         if film.field_of_view is None:
             return EYE
@@ -98,7 +97,7 @@ class FirstPersonRenderer:
 
 
 class Filming:
-    """A viewer of a session that writes every frame to a video."""
+    """A viewer that writes every frame of a session to a video."""
 
     def __init__(self, renderer: FirstPersonRenderer, video: VideoWriter) -> None:
         self._renderer = renderer
@@ -107,22 +106,16 @@ class Filming:
     def camera(self, world: World) -> CameraView:
         return self._renderer.camera_view(world.data)
 
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - the interface of viewers
         self._video.write(self._renderer.frame(world.data, hud_state))
 
 
 class TrialFilm:
-    """A viewer that films a trial; if filming fails, the trial continues without a film.
-
-    Args:
-        scene: The scene.
-        house: The house.
-        film: Frame size and render profile.
-        path: Video file to write.
+    """A viewer that films a trial. If filming fails, the trial continues without a film.
 
     Attributes:
-        failure: Why there is no film, or None.
-        renderer_name: What draws the frames, or None.
+        failure: Reason why there is no film, or None.
+        renderer_name: Name of the GL renderer, or None.
     """
 
     def __init__(self, scene: Scene, house: House, film: FilmConfig, path: Path) -> None:
@@ -140,14 +133,13 @@ class TrialFilm:
 
     @property
     def frames_sha256(self) -> str | None:
-        """Hash of all frames, once closed; None if there is no film."""
+        """Hash of all frames after `close`, or None if there is no film."""
         return self._video.frames_sha256 if self._video is not None and self.failure is None else None
 
     def camera(self, world: World) -> CameraView | None:
-        """The eye camera; None where nothing can be drawn."""
         return self._renderer.camera_view(world.data) if self._renderer is not None else None
 
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - all is in the world
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - the interface of viewers
         if self.failure is None and self._renderer is not None and self._video is not None:
             try:
                 self._video.write(self._renderer.frame(world.data, hud_state))
@@ -155,7 +147,7 @@ class TrialFilm:
                 self._give_up(error)
 
     def close(self) -> None:
-        """Finish the file, or remove what there is of it."""
+        """Finish the file, or remove it after a failure."""
         try:
             if self._video is not None:
                 self._video.close()

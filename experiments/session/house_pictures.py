@@ -1,4 +1,4 @@
-"""Pictures of a tidy house: a plan with the names of its rooms, and each room from a corner of it."""
+"""Pictures of a tidy house: a floor plan with room names, and a view of each room."""
 
 import math
 from collections.abc import Iterable
@@ -15,19 +15,19 @@ from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PersonParameters
 
 SIZE = (960, 640)  # px
-FIELD = math.radians(62.0)  # vertical; corners need a wider one than people have
-SCALE, MARGIN = 70.0, 0.4  # px/m of the plan; m around it
-TEXT, LINE = 13, 16  # px of letters and lines on the plan
-LOOKED_AT = 0.9  # m above the middle of a room
-PLACES = 3000
-SMALL, FAR = (96, 64), 4.0  # px and m in which views are compared
+FIELD = math.radians(62.0)  # vertical field of view, wider than a person's to show a room from its corner
+SCALE, MARGIN = 70.0, 0.4  # scale of the plan, px/m, and margin around it, m
+TEXT, LINE = 13, 16  # font size and line height on the plan, px
+TARGET_HEIGHT = 0.9  # m; views are directed to this height above the middle of a room
+PLACES = 3000  # number of sampled places to stand
+SMALL, FAR = (96, 64), 4.0  # size of the depth images in which views are compared, px, and largest depth, m
 
 
 def draw_house(house: House, folder: Path) -> list[Path]:
-    """Write `floorplan.png` and `room_<key>.png` into an existing folder; their paths.
+    """Write `floorplan.png` and `room_<key>.png` into an existing folder, and return their paths.
 
     Raises:
-        RenderError: Nothing can be drawn on this machine.
+        RenderError: Rendering failed.
     """
     pictures = {"floorplan": floor_plan(house)}
     model, data = compiled_house(house.catalogue).model, compiled_house(house.catalogue).data
@@ -45,9 +45,9 @@ def draw_house(house: House, folder: Path) -> list[Path]:
 
 
 def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """The house from above, with names and areas of the rooms, RGB.
+    """Draw the house from above with names and areas of the rooms, RGB.
 
-    `within` is the width and height, px, which it is to fill; else the scale is fixed.
+    The plan fills `within`, width and height in px. Without it, the scale is fixed.
     """
     x0, y0, x1, y1 = house.bounds
     bounds = x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
@@ -67,7 +67,7 @@ def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[n
 
 
 def _write_over(plan: NDArray[np.uint8], lines: tuple[str, ...], x: int, y: int) -> None:
-    """Lines of text with their middle at a pixel, on ground that is paler than the rest."""
+    """Write lines of text centred at a pixel, on lightened ground."""
     widths = [_width(text) for text in lines]
     half, top = max(widths) // 2 + 3, y - len(lines) * LINE // 2
     ground = plan[max(top, 0) : top + len(lines) * LINE + 4, max(x - half, 0) : x + half]
@@ -82,11 +82,10 @@ def _width(text: str) -> int:
 
 
 def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]]:
-    """Views over rooms from where one can stand, as far from their middle as that is, one for each corner: those first
-    in which the least is hidden by what is near.
+    """Return a view from each corner of each room, those with the least nearby obstruction first.
 
     Raises:
-        RenderError: Nothing can be drawn on this machine.
+        RenderError: Rendering failed.
     """
     compiled = compiled_house(house.catalogue)
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
@@ -107,15 +106,15 @@ def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]
 def _corner_views(
     house: House, room: str, places: NDArray[np.float64], center: NDArray[np.float64]
 ) -> list[CameraPose]:
-    """Views to the middle of a room (2,), m, from the farthest of some places (n, 2) in each quarter around it."""
+    """Return views to the middle of a room (2,), m, from the farthest place (n, 2) in each quarter around it."""
     offsets = places - center
     quarters = (offsets > 0) @ (1, 2)
     mine = [np.flatnonzero(quarters == quarter) for quarter in range(4)]
     corners = [places[rows[np.hypot(*offsets[rows].T).argmax()]] for rows in mine if len(rows)]
     views = []
     for place in corners or [house.viewpoints[room][0]]:
-        # A room that is seen from its middle is seen towards its longer side.
+        # From the middle of a room, look along x.
         target = center if np.hypot(*(place - center)) > 0.3 else place + np.array([1.0, 0.0])
         eye = np.array([*place, PersonParameters().eye_height])
-        views.append(CameraPose.looking_at(eye, np.array([*target, LOOKED_AT]), FIELD))
+        views.append(CameraPose.looking_at(eye, np.array([*target, TARGET_HEIGHT]), FIELD))
     return views

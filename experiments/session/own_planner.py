@@ -1,4 +1,4 @@
-"""Planners by name; of a user's own one, no plan is used before it was checked, and no claim is believed."""
+"""Planners by name. Plans and claims of custom planners are checked."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,29 +13,30 @@ from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solvers import SolveLimit, Solver, solver
 
-SAME = 1e-6  # share of its length by which what is said of a tour may be rounded
+CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in a claimed length or bound
 
 
 def planner_named(name: str, *, exact: bool = True) -> Solver:
-    """The planner of this name; a user's own one is checked, and with `exact` the exact planner bounds its tours.
+    """Return the planner of this name. A custom one is wrapped in an `OwnPlanner`.
+
+    With `exact`, the exact planner bounds the tours of a custom planner.
 
     Raises:
-        PlannerError: There is none.
+        PlannerError: There is no such planner.
     """
     found = solver(name)
     return OwnPlanner(name, found, ExactSolver() if exact else None) if is_own(found) else found
 
 
 class OwnPlanner:
-    """A planner of a user's own.
+    """A custom planner, whose plans are replayed before use.
 
-    Its plans are replayed. Length, bound and status of what this gives are worked out here; a wrong length is an error,
-    and what it claims of bound and status is dropped.
+    Length, bound and status of the returned plans are computed here. A wrong length is an error.
 
     Args:
-        name: Names it in records and messages.
-        planner: What the user wrote.
-        exact: Bounds the tours; None where nothing does but the check.
+        name: Name in records and messages.
+        planner: The user's planner.
+        exact: Bounds the tours, or None to use only the bound of the check.
     """
 
     def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
@@ -43,13 +44,17 @@ class OwnPlanner:
         self._what = f"planner {name!r}"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """The plan that it gives; raises `UserCodeError` where it fails, or its plan is not what it says."""
+        """Return the plan of the custom planner.
+
+        Raises:
+            UserCodeError: The planner failed, or its plan is not feasible or has a wrong length.
+        """
         return self._with_bound(problem, self._asked(problem, seed, limit))
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """The plans that it gives, one by one, and the last with its bound; raises as `solve`."""
+        """Yield the plans of the custom planner, and finally the last plan with its bound. Raises as `solve`."""
         plan = None
         if hasattr(self._planner, "improve"):
             with user_code(self._planner, self._what):
@@ -78,7 +83,7 @@ class OwnPlanner:
         return self._checked(problem, given)
 
     def _checked(self, problem: RoutingProblem, given: Any) -> Plan:
-        """The tour of a plan, with its true length; its bound is what the planner claims."""
+        """Return the plan with its true length and the bound of the check."""
         where = definition(self._planner.solve)
         if not isinstance(given, Plan):
             raise UserCodeError(f"{self._what} answered {shown(given)}; it must be a Plan{where}")
@@ -86,7 +91,7 @@ class OwnPlanner:
             visits = tuple(Visit(VisitKind(kind), name) for kind, name in given.visits)
             said = Plan(visits, given.cost, given.lower_bound, given.status, given.seconds)
             cost = replayed(problem, said)
-            close = problem.tolerance(cost) + SAME * cost
+            close = problem.tolerance(cost) + CLAIM_TOLERANCE * cost
             if abs(cost - said.cost) > close:
                 raise ProblemError(f"the tour is {cost:.6f} m long, not {said.cost:.6f} m")
             if said.lower_bound > cost + close:
@@ -94,26 +99,25 @@ class OwnPlanner:
                     f"the lower bound of {said.lower_bound:.6f} m exceeds the cost of {cost:.6f} m"
                 )
             bound = check(problem, Plan(visits, cost, 0.0, Status.FEASIBLE, said.seconds))
-        except Exception as error:  # whatever the plan holds
+        except Exception as error:  # the plan may contain anything
             raise UserCodeError(
                 f"{self._what} gave a plan that does not hold: {describe(error)}{where}"
             ) from error
         return _bounded(problem, said, cost, bound)
 
     def _with_bound(self, problem: RoutingProblem, plan: Plan) -> Plan:
-        """The plan with the bound of the exact planner."""
         if self._exact is None or plan.status is Status.OPTIMAL or not self._exact.applies(problem):
             return plan
         return _bounded(problem, plan, plan.cost, self._exact.solve(problem).lower_bound)
 
 
 def _copied(problem: RoutingProblem) -> RoutingProblem:
-    """What a user's own code may change without harm."""
+    """Return a copy that user code may change."""
     return replace(problem, distances=problem.distances.copy())
 
 
 def _bounded(problem: RoutingProblem, plan: Plan, cost: float, bound: float) -> Plan:
-    """A plan with this length and the bound that was found for it, m."""
+    """Return a plan with this length and bound, m."""
     optimal = cost - bound <= problem.tolerance(cost)
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(plan.visits, cost, cost if optimal else bound, status, float(plan.seconds))

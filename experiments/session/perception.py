@@ -1,4 +1,4 @@
-"""What the participant of a session perceives: its own body, what is in view, and what the HUD shows."""
+"""The percept of participants in a session."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -25,15 +25,15 @@ from mjsim.world.world import World
 
 
 class SessionPercept(Percept):
-    """A percept in a session under an assistance condition; what takes work is worked out at most once.
+    """A percept in a session. Expensive parts are computed once, at the first access.
 
     Args:
         seen: State of the world.
         answer: The world's answer to the previous pick or place.
-        world: The physics, in that state.
-        assistant: Knows the guidance.
-        hud: Gives what the HUD shows.
-        blocked: Whether the walk makes no progress.
+        world: The world in that state.
+        assistant: Provides the guidance.
+        hud: Returns the HUD state.
+        blocked: True if the walk makes no progress.
     """
 
     def __init__(
@@ -53,12 +53,10 @@ class SessionPercept(Percept):
         self._world, self._assistant, self._hud = world, assistant, hud
 
     def look(self) -> Mapping[str, Point]:
-        """Misplaced objects in view -> floor position, m, shape (2,); what lies in its bin is not misplaced."""
         return self._in_view
 
     @cached_property
     def visible_shares(self) -> Mapping[str, float]:
-        """Of the misplaced objects in view."""
         seen, world = self._seen, self._world
         return visible_shares(
             world.scene, world.data, seen.eye, seen.heading, seen.pitch, among=list(self._in_view)
@@ -72,7 +70,6 @@ class SessionPercept(Percept):
         return positions_of(seen, names)
 
     def look_for(self, receptacles: Mapping[str, ReceptacleGeometry]) -> frozenset[str]:
-        """Those in view, by rays from the eye."""
         seen = self._seen
         scene, data = drawn_state(self._world.scene, self._world.data)
         return visible_receptacles(
@@ -95,12 +92,10 @@ class SessionPercept(Percept):
 
     @cached_property
     def guidance(self) -> Guidance | None:
-        """Where the condition shows the plan."""
         return self._assistant.guidance(self._seen)
 
     @cached_property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Those that are inside the field of view: object -> floor position, m, shape (2,)."""
         if FLAGPOLE not in self._assistant.shown_roles:
             return {}
         seen, state = self._seen, self._hud()
@@ -112,5 +107,4 @@ class SessionPercept(Percept):
 
     @cached_property
     def choices(self) -> Sequence[Choice]:
-        """From the assistant, in all conditions."""
         return self._assistant.choices(self._seen)

@@ -1,6 +1,8 @@
-"""The one loop: show, perceive, act, step, record. A simulated participant, a person and a replay run in it."""
+"""The loop of a session, which simulated participants, people and replays share: show, perceive, act, step, record."""
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from experiments.errors import RecordError, SessionError, UserCodeError, describe
 from experiments.participants.base import Participant
@@ -9,33 +11,56 @@ from experiments.record.reader import Record
 from experiments.record.writer import RecordWriter
 from experiments.session.assistant import Assistant
 from experiments.session.perception import SessionPercept
-from experiments.session.recorded_events import EXTERNAL_EVENTS, catch_up
 from experiments.session.signals import signal_of
 from experiments.session.user_code import decide, needs_of
-from experiments.session.viewer import OnProgress, Progress, Viewer
+from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.values.actions import IDLE, Action, ActionResult, StepAction, WorldEvent
 from mjsim.values.errors import PhysicsError
 from mjsim.values.observation import ObjectStatus, Observation, Steps
 from mjsim.world.world import World
 
-FINAL_HOLD = 1.6  # s that the session is shown after the last delivery
+# Logged events whose cause is outside the simulation.
+EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display", "draw")
+FINAL_HOLD = 1.6  # s for which the viewer sees the world after the last delivery
+
+
+class Viewer(Protocol):
+    """Receives the state of every control step, for example to film it."""
+
+    def camera(self, world: World) -> CameraView | None:
+        """Return the eye camera in which the HUD is seen, or None for a view from outside."""
+        ...
+
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None: ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Progress of a session, for progress bars."""
+
+    time: float
+    delivered: int
+    total: int
+
+
+OnProgress = Callable[[Progress], None]
 
 
 class Session:
-    """One trial from the start pose until everything is delivered or the time is up.
+    """One trial, from the start pose until everything is delivered or the time is up.
 
     Args:
-        world: The physics, freshly made.
+        world: The world, freshly made.
         assistant: Plans, and determines what the HUD shows.
-        participant: The user.
-        record: Takes control steps, checkpoints and events.
+        participant: The user of the assistance.
+        record: Receives control steps, checkpoints and events.
         time_limit: Simulated time after which the session ends, s.
-        viewer: Sees every control step, or None. Without one, paths and waits take many control steps at once; the run
-            is the same.
+        viewer: Receives every control step, or None. Without a viewer, paths and waits take many control steps at
+            once, with the same result.
 
     Attributes:
-        shows_each_step: Whether the viewer sees every control step; else those for which `show` is called.
+        shows_each_step: False if the viewer receives only the control steps for which `show` is called.
     """
 
     def __init__(
@@ -60,21 +85,21 @@ class Session:
         self._restored_step = -1
 
     def run(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Run from the start to the end; returns why it ended: `all delivered`, `time limit` or `interrupted`.
+        """Run the session and return the reason for its end: `all delivered`, `time limit` or `interrupted`.
 
         Raises:
-            SessionError: The participant needs guidance that the assistance condition does not show.
-            PhysicsError: The physics failed; the log says when.
+            SessionError: The participant requires guidance that the assistance condition does not show.
+            PhysicsError: The physics failed. The event log contains the time.
         """
         self.begin()
         return self.finish(on_progress)
 
     def begin(self) -> None:
-        """Make the first plan and show it; nothing is simulated yet.
+        """Make the first plan and show it, before anything is simulated.
 
         Raises:
-            SessionError: The participant needs guidance that the assistance condition does not show.
-            UserCodeError: A user-supplied condition failed.
+            SessionError: The participant requires guidance that the assistance condition does not show.
+            UserCodeError: A custom condition failed.
         """
         self._now = self._world.reset()
         self._first_state = self._now, self._world.health_sample, self._world.state_hash()
@@ -98,7 +123,7 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Run to the end, once started; returns and raises as `run` does. Whatever ends the session is logged."""
+        """Run a session that has begun to its end. The result and the errors are those of `run`."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
@@ -113,14 +138,13 @@ class Session:
         return reason
 
     def end(self, reason: str, **details: str) -> None:
-        """End the session, and log why; after the last step its state is recorded."""
+        """End the session and log the reason. Record the last state unless the session was interrupted."""
         if reason != INTERRUPTED:
             self._record_end(reason)
         self.assistant.finish(self._now.time)
         self._log_end(self._now.time, reason, **details)
 
     def fail(self, error: Exception) -> None:
-        """Log that an error ended the session."""
         reason = PHYSICS_ERROR if isinstance(error, PhysicsError) else ERROR
         self._log_end(self.record.time, reason, error=describe(error))
 
@@ -139,20 +163,20 @@ class Session:
 
     @property
     def end_reason(self) -> str | None:
-        """Why the session is over; None while it is not."""
+        """Reason for the end, or None while the session continues."""
         if self._delivered == len(self._now.object_names):
             return ALL_DELIVERED
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once: a control step, or as many as a path or a wait takes.
+        """Let the participant act once, for one control step or as many as a path or a wait takes.
 
         Raises:
             PhysicsError: The physics failed.
         """
         self._observe()
-        if self.assistant.shows_own:
-            self._hud_state()  # what cannot be shown ends a session that is not filmed as well
+        if self.assistant.is_custom:
+            self._hud_state()  # a faulty condition ends the session even if nothing is shown
         world = self._world
         percept = SessionPercept(
             self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked
@@ -160,9 +184,9 @@ class Session:
         self._step(decide(self._participant, percept), self._step_limit())
 
     def restore(self, record: Record, step: int | None) -> None:
-        """Continue from the checkpoint before a control step of a record, or from the start if that is None.
+        """Continue from the checkpoint before a control step of a record, or from the start if `step` is None.
 
-        The assistant is told the recorded poses and events before it, as its state is not in the checkpoint.
+        The assistant first observes the recorded steps, because its state is not in the checkpoint.
 
         Raises:
             StateError: The checkpoint does not fit the world.
@@ -175,16 +199,16 @@ class Session:
         self.assistant.begin(self._now)
         for before in range(step):
             self._now = record.observation(before + 1)
-            catch_up(self.assistant, self._now, record.events_of(before))
+            self.assistant.observe_recorded(self._now, record.events_of(before))
         self.record.restore(record, step)
         self._restored_step = step
         self._start(restored)
 
     def resume(self, record: Record) -> None:
-        """Continue where the record of an unfinished session ends, from its last checkpoint by its actions.
+        """Continue an unfinished record at its end. The actions after its last checkpoint are simulated again.
 
         Raises:
-            RecordError: It does not lead to the states that it holds.
+            RecordError: The simulated states differ from the recorded ones.
         """
         self.restore(record, max(record.checkpoint_steps, default=None))
         for step in range(self.record.step, record.steps):
@@ -192,18 +216,18 @@ class Session:
             self.repeat(record.action(step))
             if self.record.last_state_hash != record.recording["state_hash"][step]:
                 raise RecordError(
-                    f"the record does not lead to the state that it holds at step {step}; it was made by another "
+                    f"step {step} leads to another state than the recorded one; the record was made by another "
                     "version or on another machine"
                 )
         self.record.restore(record, record.steps)
 
     def repeat(self, action: StepAction) -> None:
-        """Carry out a recorded action; raises `PhysicsError` if the physics fails."""
+        """Execute a recorded action. Raises PhysicsError if the physics fails."""
         self._observe()
         self._step(action, 1)
 
     def repeat_events(self, record: Record, step: int) -> None:
-        """Repeat events from outside of the simulation before a control step, such as scrolling the task list."""
+        """Repeat external events before a control step, such as scrolling the task list."""
         if step == self._restored_step:
             return
         first = record.events_before(step - 1) if step else 0
@@ -215,36 +239,38 @@ class Session:
                 self.note(kind, **fields)
 
     def note(self, event: str, **fields: Any) -> None:
-        """Log something from outside of the simulation, in the present state."""
+        """Log an external event at the present time."""
         self._log.append(self._now.time, event, **fields)
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end; logged for replays."""
+        """Scroll the task list by a number of rows, positive towards its end, and log this for replays."""
         self.note("scroll", rows=rows)
         self.assistant.scroll(rows)
         self._hud = None
 
     def _log_end(self, time: float, reason: str, **details: str) -> None:
-        """Log the end; a record has one state at least."""
+        """Log the end, after at least one recorded state."""
         if not self.record.step:
             self.record.append(*self._first_state, Steps(IDLE))
         self._log.append(time, "end", reason=reason, **details)
 
     def _observe(self) -> None:
-        """Pass a checkpoint if one is due, and show the present state."""
+        """Store a checkpoint if one is due, and show the present state."""
         self._now = self.record.pass_checkpoint(self._world, self._now)
         if self.shows_each_step:
             self.show()
 
     def _step_limit(self) -> int:
-        """How many control steps the next action may take: one if a viewer is attached or a better plan may come."""
+        """Return the largest number of control steps that the next action may take.
+
+        It is one if there is a viewer or a better plan may arrive.
+        """
         if self._viewer is not None or self.assistant.expecting:
             return 1
         left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1
         return max(1, left if self._now.busy else min(left, self.record.steps_to_checkpoint(self._world)))
 
     def _step(self, action: Action, limit: int) -> None:
-        """Carry out an action, record its control steps, and report what happened."""
         before = self._now, self._world.health_sample, self._world.state_hash()
         try:
             step = self._world.step(action, limit)
@@ -254,13 +280,13 @@ class Session:
         self.record.append(*before, step.steps)
         self._now, self._answer = step.observation, step.result
         if step.result is not None:
-            self._note_attempt(step.result)
+            self._log_attempt(step.result)
         if step.steps.passed is not None:
             self.assistant.observe_walk(step.steps.passed.position, self._now)
-        self._note_events(step.events)
+        self._log_events(step.events)
 
     def _record_end(self, reason: str) -> None:
-        """Record the last state; show it for a moment, which is not measured."""
+        """Record the last state. After the last delivery, show it for a moment, which does not count."""
         if reason == ALL_DELIVERED:
             self.assistant.show_message("finished", self._now.time)
         self.record.append(self._now, self._world.health_sample, self._world.state_hash(), Steps(IDLE))
@@ -270,16 +296,14 @@ class Session:
             self._now = self._world.step(IDLE).observation
         self._now = end
 
-    def _note_events(self, events: tuple[WorldEvent, ...]) -> None:
-        """Log the events of the world and pass them to the assistant."""
+    def _log_events(self, events: tuple[WorldEvent, ...]) -> None:
         for event in events:
             self._log.append(event.time, event.kind.value, object=event.object, receptacle=event.receptacle)
         self.assistant.observe(self._now, events)
         if events:
             self._delivered = len(self._now.names_with(ObjectStatus.DELIVERED))
 
-    def _note_attempt(self, result: ActionResult) -> None:
-        """Log an attempt to pick or place; a refusal is shown."""
+    def _log_attempt(self, result: ActionResult) -> None:
         time, refusal = self._now.time, result.refusal.value if result.refusal else None
         kind = type(result.action).__name__.lower()
         self._log.append(
@@ -289,13 +313,13 @@ class Session:
             self.assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
-        """The present HUD state; composed once per state, when it is first read."""
+        """Return the present HUD state, which is computed once per state."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
             self._hud = self._now, self.assistant.hud_state(self._now, camera)
         return self._hud[1]
 
     def show(self) -> None:
-        """Let the viewer see the present state."""
+        """Pass the present state to the viewer, if there is one."""
         if self._viewer is not None:
             self._viewer.show(self._world, self._now, self._hud_state())

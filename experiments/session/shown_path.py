@@ -1,26 +1,24 @@
-"""The ways to the next visit that a HUD may show: the plan's segment, and the path from where the person is."""
+"""The paths to the next visit that a HUD may show: the plan's segment, and the path from the person."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.participants.base import Point
 from mjsim.world.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
 
-TOLERANCE = 0.6  # m the person may leave the path before a new one is shown
-MAX_GOAL_SHIFT = 0.25  # m an object may be pushed before a new path to it is shown
-
-Point = NDArray[np.float64]
+TOLERANCE = 0.6  # m; a new path is shown if the person is farther from the path
+MAX_GOAL_SHIFT = 0.25  # m; a new path is shown if the goal was pushed farther
 
 
 class ShownPath:
-    """A shortest path that stays where it is until its goal moves or the person leaves it; computed when it is needed.
+    """A shortest path, computed at the first access, that stays until its goal moves or the person leaves it.
 
     Args:
-        geodesics: Finds it.
-        rerouted: Whether there is a new one from where the person is when the person leaves it. The segment of a plan
-            stays (PAPER section 5).
+        geodesics: Finds the path.
+        rerouted: True to replace the path when the person leaves it. The segment of a plan stays (PAPER section 5).
     """
 
     def __init__(self, geodesics: Geodesics, *, rerouted: bool) -> None:
@@ -33,15 +31,15 @@ class ShownPath:
         """Show a new path.
 
         Args:
-            start: Where it starts, m, shape (2,).
-            target: Where it leads, m, shape (2,).
-            goal: The object, or the receptacle, m, shape (2,).
+            start: Start of the path, m, shape (2,).
+            target: End of the path, m, shape (2,).
+            goal: Position of the object or the receptacle, m, shape (2,).
         """
         self._start, self._target, self._goal, self._points = start.copy(), target.copy(), goal.copy(), None
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """The whole path, m, shape (k, 2).
+        """Points of the whole path, m, shape (k, 2).
 
         Raises:
             UnreachableError: There is no path.
@@ -51,16 +49,16 @@ class ShownPath:
         return self._points
 
     def ahead(self, position: Point) -> NDArray[np.float64]:
-        """The path from its point nearest to the person, m, shape (k, 2)."""
+        """Return the path from its point nearest to the person, m, shape (k, 2)."""
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
     def follow(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
-        """Show a new path where the person left this one.
+        """Show a new path wherever the person has left the last one.
 
         Args:
-            positions: Where the person was, one position after another, m, shape (n, 2).
-            target: As in `begin`.
-            goal: As in `begin`.
+            positions: Successive positions of the person, m, shape (n, 2).
+            target: See `begin`.
+            goal: See `begin`.
         """
         off = -1
         while self._rerouted and self._points is not None:
@@ -70,7 +68,7 @@ class ShownPath:
             self._renew(positions[off], target, goal)
 
     def follow_goal(self, position: Point, target: Point, goal: Point) -> None:
-        """Show a new path if the goal has moved; `position` is the person's, m, shape (2,)."""
+        """Show a new path if the goal has moved. `position` is the person's, m, shape (2,)."""
         if self._points is not None and math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
             self._renew(position if self._rerouted else self._start, target, goal)
 
@@ -82,12 +80,9 @@ class ShownPath:
 class PathsToNext:
     """The paths to the next visit that a condition may show.
 
-    Args:
-        geodesics: Finds shortest paths.
-
     Attributes:
-        segment: The segment of the plan, from where the last visit ended.
-        path: The path from where the person is.
+        segment: The segment of the plan, from the place of the last visit.
+        path: The path from the person.
     """
 
     def __init__(self, geodesics: Geodesics) -> None:
@@ -95,12 +90,12 @@ class PathsToNext:
         self.path = ShownPath(geodesics, rerouted=True)
 
     def begin(self, last_visit: Point, position: Point, target: Point, goal: Point) -> None:
-        """Lead to another visit; all m, shape (2,): where the last one ended, the person, and as in `ShownPath`."""
+        """Lead to another visit. All positions are in m, shape (2,), as in `ShownPath`."""
         self.segment.begin(last_visit, target, goal)
         self.path.begin(position, target, goal)
 
     def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """Show new paths where the person left one or the goal has moved; all m, shape (2,)."""
+        """Show new paths if the person has left one or the goal has moved. All positions are in m, shape (2,)."""
         self.segment.follow_goal(position, target, goal)
         self.path.follow_goal(position, target, goal)
         self.path.follow(np.array([position]), target, goal)

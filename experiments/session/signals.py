@@ -1,4 +1,4 @@
-"""Signals that ask a process to stop: Ctrl-C, SIGTERM (what clusters send) and SIGHUP (a terminal that is closed)."""
+"""Handling of SIGINT (Ctrl-C), SIGTERM (from clusters) and SIGHUP (closed terminal)."""
 
 import asyncio
 import os
@@ -11,11 +11,11 @@ from typing import Any, NoReturn, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 T = TypeVar("T")
-PATIENCE = 2.0  # s that a trial has to notice a signal, before it is interrupted wherever it is
+CHECK_TIMEOUT_S = 2.0  # a trial that has not checked for signals after this time is interrupted
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal asked to stop.
+    """A signal asked the process to stop.
 
     Attributes:
         number: The signal.
@@ -31,13 +31,13 @@ def signal_of(stop: KeyboardInterrupt) -> signal.Signals:
 
 
 def exit_code(number: int) -> int:
-    """The exit code of a process that a signal stopped, as shells have it."""
+    """Return the exit code that shells use for a process stopped by a signal."""
     return 128 + number
 
 
 @contextmanager
 def signals_raised() -> Iterator[None]:
-    """Raise `Stopped` wherever the main thread is when a signal comes."""
+    """Raise `Stopped` in the main thread when a signal arrives."""
 
     def stop(number: int, _frame: FrameType | None) -> None:
         raise Stopped(number)
@@ -48,7 +48,7 @@ def signals_raised() -> Iterator[None]:
 
 @contextmanager
 def exit_raised() -> Iterator[None]:
-    """Let `os._exit` of this thread raise `SystemExit` in the block; other threads and processes end as they ask."""
+    """Make `os._exit` raise `SystemExit` in this thread during the block. Other threads and processes still exit."""
     leave, here = os._exit, (os.getpid(), threading.get_ident())
 
     def refuse(status: int) -> NoReturn:
@@ -64,10 +64,10 @@ def exit_raised() -> Iterator[None]:
 
 
 class PostponedSignals:
-    """Signals that have come, and wait until it is convenient.
+    """Signals that have arrived but are not handled yet.
 
     Attributes:
-        number: The first of them, or None.
+        number: The first signal, or None.
     """
 
     def __init__(self) -> None:
@@ -75,26 +75,26 @@ class PostponedSignals:
         self._saving = False
 
     def check(self) -> None:
-        """Stop here, if a signal has come.
+        """Stop if a signal has arrived.
 
         Raises:
-            Stopped: It has.
+            Stopped: A signal has arrived.
         """
         if self.number is not None:
             self._stop_timer()
             raise Stopped(self.number)
 
     def save(self) -> None:
-        """From here on nothing is interrupted any more."""
+        """Allow no interruption from now on."""
         self._saving = True
         self._stop_timer()
 
-    def note(self, number: int, _frame: FrameType | None) -> None:
-        """Take a signal; who does not `check` in time, such as a participant that hangs, is interrupted."""
+    def record(self, number: int, _frame: FrameType | None) -> None:
+        """Record a signal. Code that does not call `check` in time, such as a hanging participant, is interrupted."""
         first, self.number = self.number is None, self.number or number
         if first and not self._saving:
             signal.signal(signal.SIGALRM, self._interrupt)
-            signal.setitimer(signal.ITIMER_REAL, PATIENCE)
+            signal.setitimer(signal.ITIMER_REAL, CHECK_TIMEOUT_S)
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
         if self.number is not None and not self._saving:
@@ -107,17 +107,17 @@ class PostponedSignals:
 
 @contextmanager
 def signals_postponed() -> Iterator[PostponedSignals]:
-    """Note signals instead of being interrupted by them; in other threads than the main one, nothing changes."""
+    """Record signals during the block instead of being interrupted. Has no effect outside the main thread."""
     postponed = PostponedSignals()
-    with _handled(postponed.note):
+    with _handled(postponed.record):
         yield postponed
 
 
 def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
-    """What a coroutine gives, as `asyncio.run` does it; a signal cancels it, so that it tidies up.
+    """Run a coroutine like `asyncio.run`. A signal cancels it, so that it can clean up.
 
     Raises:
-        Stopped: A signal came.
+        Stopped: A signal arrived.
     """
     came: list[int] = []
 
@@ -125,7 +125,7 @@ def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
         task, loop = asyncio.current_task(), asyncio.get_running_loop()
 
         def stop(number: int, _frame: FrameType | None) -> None:
-            if task is not None and not came:  # it is tidying up after the first one
+            if task is not None and not came:  # a second signal does not interrupt the cleanup
                 came.append(number)
                 loop.call_soon_threadsafe(task.cancel)
 
@@ -142,7 +142,7 @@ def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
 
 @contextmanager
 def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
-    """Handle all signals but those that the process ignores (as after `nohup`) by `handler`."""
+    """Install a handler for all signals except those that the process ignores (as after `nohup`)."""
     previous: dict[signal.Signals, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for number in SIGNALS:

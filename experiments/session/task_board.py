@@ -1,4 +1,4 @@
-"""From the state of the world to what an assistance condition sees: labels, pictures, rooms, messages."""
+"""The state of the world as an assistance condition sees it: labels, pictures, rooms and messages."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -22,17 +22,16 @@ from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
 
-READING_TIME = 2.0  # s that a message is shown before the announcement of a new plan replaces it
+READING_TIME = 2.0  # s for which a message is shown before the announcement of a new plan replaces it
 REPLANNED = "replanned"
 
 
 def task_step(visit: Visit) -> TaskStep:
-    """A visit in the terms of the HUD."""
     return TaskStep(visit.kind.value, visit.object)
 
 
 class _Shown(NamedTuple):
-    """A message: its key, since when it is shown, s, and the object that it is about."""
+    """A message by its key, the time since which it is shown, s, and its object."""
 
     key: str
     since: float
@@ -41,13 +40,13 @@ class _Shown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanView:
-    """The planner's suggestion in one state of the world, computed when a condition asks for it (`PlanAhead`).
+    """The planner's suggestion in one state of the world (a `PlanAhead`), computed when a condition asks for it.
 
     Attributes:
         board: Describes the task.
         observation: State of the world.
-        route: Gives the route.
-        paths: Gives the paths to its next visit.
+        route: Returns the route.
+        paths: Returns the paths to the next visit.
     """
 
     board: "TaskBoard"
@@ -62,19 +61,16 @@ class PlanView:
 
     @cached_property
     def segment(self) -> NDArray[np.float64] | None:
-        """Floor points of the plan's segment to the next visit, m, shape (k, 2)."""
         visit = self._next
         return None if visit is None else self.paths(visit).segment.points
 
     @cached_property
     def path(self) -> NDArray[np.float64] | None:
-        """Floor points of the path from the person to the next visit, m, shape (k, 2)."""
         visit = self._next
         return None if visit is None else self.paths(visit).path.ahead(self.observation.position)
 
     @cached_property
     def goal(self) -> Vec3 | None:
-        """Where the next visit happens, m."""
         visit = self._next
         return None if visit is None else self.board.goal(self.observation, visit)
 
@@ -85,13 +81,13 @@ class PlanView:
 
 
 class TaskBoard:
-    """Describes the state of the task to the conditions, and keeps the message bar and the steps done.
+    """Describes the task to the conditions, and keeps the message and the steps done.
 
     Args:
         house: The house.
         episode: The disorganized house.
         order: Object names in this participant's random order (PAPER section 5).
-        eye_height: Of the person, m.
+        eye_height: Eye height of the person, m.
     """
 
     def __init__(
@@ -122,14 +118,14 @@ class TaskBoard:
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or refusal from `time` s on; it replaces the one before."""
+        """Show a message about an event or refusal from `time`, s, in place of the last one."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:
             self._replanned_at = None
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Show that the plan was changed at `time` s, once the latest message was shown for `READING_TIME`."""
+        """Announce a new plan made at `time`, s, once the last message was shown for `READING_TIME`."""
         self._replanned_at = time
 
     def view(
@@ -141,14 +137,14 @@ class TaskBoard:
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
     ) -> TaskView:
-        """The task as a condition sees it now.
+        """Return the task as a condition sees it now.
 
         Args:
             observation: State of the world.
-            ahead: What the planner suggests.
-            capacity: How many objects the person carries at most.
+            ahead: The planner's suggestion.
+            capacity: Largest number of objects that can be carried.
             camera: The eye camera.
-            regrets: Gives the regrets of visits that are possible next.
+            regrets: Returns the regrets of the visits that are possible next.
         """
         return TaskView(
             objects=self._task_objects(observation),
@@ -191,7 +187,7 @@ class TaskBoard:
         )
 
     def _shown(self, time: float) -> "_Shown":
-        """The message that the bar shows at a time, fresh or faded."""
+        """Return the message of the bar at a time, s, whether or not it has faded."""
         if self._replanned_at is None:
             return self._latest
         since = max(self._replanned_at, self._latest.since + READING_TIME)
@@ -202,13 +198,13 @@ class TaskBoard:
         return self.house.catalogue.objects[model].label
 
     def goal(self, observation: Observation, visit: Visit) -> Vec3:
-        """Where a visit happens: the object itself, or the middle of the receptacle, m."""
+        """Return the position of a visit's object, or the middle of its receptacle, m."""
         if visit.kind is VisitKind.PICK:
             return _vec3(observation.object_positions[observation.object_names.index(visit.object)])
         return _vec3(self.house.receptacles[self.episode.targets[visit.object]].center)
 
     def _task_objects(self, observation: Observation) -> tuple[TaskObject, ...]:
-        """All objects; those that have not changed since the last call are the same values."""
+        """Return all objects. An object that has not changed since the last call is the same value."""
         positions, statuses = observation.object_positions.tolist(), observation.object_status
         for i, (position, status) in enumerate(zip(positions, statuses, strict=True)):
             known = self._objects.get(i)

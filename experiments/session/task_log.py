@@ -1,5 +1,6 @@
-"""Logs the plans of a session and its visits, with what was suggested and what each visit costs."""
+"""The log of a session's plans and visits, with suggestions and regrets."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.house import House
 from experiments.record.records import EventLog
-from experiments.session.reach_bound import reach_bound
+from mjsim.house.compiled.sites import ReceptacleGeometry
 from mjsim.values.episode import Episode
 from planner.plan import Status, Visit, VisitKind
 from planner.route import Route, TaskState
@@ -15,17 +16,17 @@ from planner.service import Planner
 
 
 class TaskLog:
-    """Asks for plans and logs them in every condition, as deviations are counted in all of them (PAPER section 6).
+    """Requests plans and logs them in every condition, because deviations count in all of them (PAPER section 6).
 
-    A line takes its place in the log at once, and is filled in when the planner has answered.
+    A line gets its place in the log at once, and its content when the planner has answered.
 
     Args:
-        planner: Makes the plans, and the regrets of visits.
-        log: Takes the events.
+        planner: Makes the plans and finds the regrets.
+        log: Receives the events.
         house: The house.
         episode: The disorganized house.
-        capacity: How many objects the person carries at most.
-        regrets: Whether the regret of every visit is logged.
+        capacity: Largest number of objects that can be carried.
+        regrets: True to log the regret of every visit.
     """
 
     def __init__(
@@ -37,16 +38,16 @@ class TaskLog:
         self._visits = 0
 
     def plan(self, time: float, state: TaskState, position: NDArray[Any], *, shown: bool) -> None:
-        """Ask for the plan for a state, and log it if it is a new one.
+        """Request the plan for a state, and log it if it is new.
 
         Args:
             time: Simulated time, s.
             state: The task as it is now.
-            position: Where the person is, m, shape (2,).
-            shown: Whether the plan is shown.
+            position: Position of the person, m, shape (2,).
+            shown: True if the plan is shown.
 
         Raises:
-            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
+            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
         """
         line, first = self._log.reserve(), self._state is None
         if first:
@@ -65,7 +66,7 @@ class TaskLog:
         self._planner.ask(state, shown=shown, then=fill)
 
     def improve(self, time: float, state: TaskState) -> bool:
-        """Follow a better plan for the same task if there is one; whether its visits are others."""
+        """Adopt a better plan for the same task if there is one. Return True if its visits differ."""
         before, better = self._planner.route, self._planner.improve(state)
         if better is None:
             return False
@@ -73,12 +74,12 @@ class TaskLog:
         return before is None or better.visits != before.visits
 
     def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
-        """Log a visit, and the plan that was there before it.
+        """Log a visit and the plan before it.
 
         Args:
             time: Simulated time, s.
             made: The visit.
-            position: Where the person is, m, shape (2,).
+            position: Position of the person, m, shape (2,).
         """
         assert self._state is not None  # noqa: S101 - for the type checker
         line, state, number = self._log.reserve(), self._state, self._visits
@@ -105,12 +106,15 @@ class TaskLog:
         self._last_visit_at = position
 
     def finish(self, time: float) -> None:
-        """The task is over: log the regrets of visits that were not known in time."""
+        """Log the regrets that were not known in time."""
         for (number, names), regret in self._planner.finish():
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
     def _distance_to(self, state: TaskState, made: Visit) -> float:
-        """Planner's distance from the place of the visit before to this one: an object's, or in front of a bin, m."""
+        """Return the planner's distance from the place of the last visit to the place of this one, m.
+
+        The place of a delivery is in front of the bin.
+        """
         place = state.deliveries[made.object]
         if made.kind is VisitKind.PICK:
             place = state.loose.get(made.object, state.position)
@@ -120,7 +124,7 @@ class TaskLog:
         return float(self._house.geodesics.shortest_path(here, there).geodesic_distance)
 
     def _alternatives(self, state: TaskState, made: Visit, suggested: Visit | None) -> dict[str, int | bool]:
-        """How many other visits were feasible, and how many of them place another object into the suggested bin."""
+        """Count the other feasible visits, and those that place another object into the suggested bin."""
         feasible = len(state.carried) + (len(state.loose) if len(state.carried) < self._capacity else 0)
         tied: set[str] = set()
         if suggested is not None and suggested.kind is VisitKind.PLACE:
@@ -133,7 +137,7 @@ class TaskLog:
         }
 
     def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
-        """Extra cost of a visit and of the suggested one; the next visit of a proven plan has none."""
+        """Return the regrets of a visit and of the suggested one. The next visit of a proven plan has none."""
         proven = route is not None and route.plan.status is Status.OPTIMAL
         suggested = route.next if route else None
         names: dict[Visit, tuple[str, ...]] = {made: ("regret_m",)}
@@ -148,7 +152,7 @@ class TaskLog:
 
 
 def _plan_fields(route: Route) -> dict[str, Any]:
-    """Fields of a plan in the log; cost and bound are those of the state that it was made for."""
+    """Return the fields of a plan in the log. Cost and bound are those of the state that it was made for."""
     return {
         "cost_m": round(route.plan.cost, 6),
         "lower_bound_m": round(route.plan.lower_bound, 6),
@@ -163,3 +167,30 @@ def _as_json(visit: Visit) -> list[str]:
 
 def _rounded(metres: float | None) -> float | None:
     return None if metres is None else round(metres, 6)
+
+
+def reach_bound(tour: float, house: House, episode: Episode) -> float:
+    """Return a lower bound of the walk in any order of visits, m.
+
+    A person who picks and places from a distance can save that distance on the way to a place and again on the way from
+    it, except after the last visit. Objects are assumed to stay in place, and arms to reach over free floor only.
+
+    Args:
+        tour: A lower bound of all tours between the places of the visits, m.
+        house: The house, with the person's reach.
+        episode: The disorganized house.
+    """
+    reach = house.person.reach
+    places = [
+        reach + _extent(house.receptacles[key])
+        for key in (episode.targets[placed.name] for placed in episode.objects)
+    ]
+    saved = 2 * (len(places) * reach + sum(places)) - min(places, default=0.0)
+    return max(0.0, tour - saved)
+
+
+def _extent(receptacle: ReceptacleGeometry) -> float:
+    """Return the distance on the floor from a receptacle's approach to the farthest point of its volume, m."""
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * receptacle.half_size
+    floor = (corners @ receptacle.rotation.T + receptacle.center)[:, :2]
+    return float(np.linalg.norm(floor - receptacle.approach, axis=1).max())

@@ -1,4 +1,4 @@
-"""Calls user-supplied participants, conditions and planners, and names the culprit of an error."""
+"""Calls of custom participants, conditions and planners, with errors that name their origin."""
 
 import os
 import signal
@@ -33,24 +33,24 @@ from mjsim.values.actions import Action
 from mjsim.values.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
-LONGEST_LIMIT = 1e6  # s
+MAX_CALL_LIMIT = 1e6  # s
 PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, RenderError)
 
 
 class _Overdue(BaseException):
-    """A call took too long; no `except Exception` of the code that was called stops it."""
+    """A call exceeded its time limit. User code cannot stop this with `except Exception`."""
 
 
 @contextmanager
 def user_code(code: object, what: str) -> Iterator[None]:
-    """Wrap whatever user-supplied `code` raises in a `UserCodeError`, `SystemExit` included, and limit its time.
+    """Raise a `UserCodeError` for any exception of user code in the block, `SystemExit` included, and limit its time.
 
     Args:
-        code: A function, or an object with methods.
-        what: Names it in the message.
+        code: Function, or object with methods. The block has no effect if this is code of this project.
+        what: Name of the code in messages.
 
     Raises:
-        UserCodeError: `code` is not part of this project, and raised or took longer than `CALL_LIMIT` says.
+        UserCodeError: The code raised an exception or exceeded the time limit.
     """
     if not is_own(code):
         yield
@@ -70,14 +70,14 @@ def user_code(code: object, what: str) -> Iterator[None]:
 def _call_limit() -> float:
     text = os.environ.get(CALL_LIMIT) or "0"
     try:
-        return min(abs(float(text)), LONGEST_LIMIT)
+        return min(abs(float(text)), MAX_CALL_LIMIT)
     except ValueError:
         raise ConfigError(f"{CALL_LIMIT} is {text!r}; give a number of seconds") from None
 
 
 @contextmanager
 def _time_limit(limit: float) -> Iterator[None]:
-    """Interrupt the block after a time, s, 0 for none; signals reach the main thread alone."""
+    """Interrupt the block after a time, s. 0 means no limit. Has no effect outside the main thread."""
     if not limit or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -90,24 +90,26 @@ def _time_limit(limit: float) -> Iterator[None]:
     try:
         yield
     finally:
-        if signal.getsignal(signal.SIGALRM) is interrupt:  # else a signal came, and its timer runs
+        if (
+            signal.getsignal(signal.SIGALRM) is interrupt
+        ):  # otherwise a signal has arrived, and its timer is running
             signal.setitimer(signal.ITIMER_REAL, *before)
             signal.signal(signal.SIGALRM, handler)
 
 
 def is_own(code: object) -> bool:
-    """Whether a function or an object is a user's own."""
+    """Return True if a function or object is user code."""
     return str(getattr(code, "__module__", None) or "").partition(".")[0] not in PACKAGES
 
 
 def make_participant(
     name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
 ) -> Participant:
-    """The participant called `name`, made for a house, with the values of its model if that has any.
+    """Make a participant for a house, with the behaviour drawn for the person if its model has parameters.
 
     Raises:
         ConfigError: There is no such participant.
-        UserCodeError: A user-supplied participant cannot be created, or has no method `act`.
+        UserCodeError: A custom participant cannot be created, or has no method `act`.
     """
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
@@ -121,7 +123,7 @@ def make_participant(
 
 
 def needs_of(participant: Participant) -> frozenset[str]:
-    """Roles of the markers that a participant requires; none by default.
+    """Return the roles of the markers that a participant requires.
 
     Raises:
         UserCodeError: `needs` is not a set of names.
@@ -137,10 +139,10 @@ def needs_of(participant: Participant) -> frozenset[str]:
 
 
 def decide(participant: Participant, percept: Percept) -> Action:
-    """The decision of a participant.
+    """Return the decision of a participant.
 
     Raises:
-        UserCodeError: A user-supplied participant failed, or returned something other than a decision.
+        UserCodeError: A custom participant failed, or returned something other than a decision.
     """
     name = type(participant).__qualname__
     with user_code(participant, f"participant {name}"):
@@ -155,10 +157,10 @@ def decide(participant: Participant, percept: Percept) -> Action:
 
 
 def shown_by(condition: Condition, name: str, view: TaskView) -> HudState:
-    """The HUD state of an assistance condition.
+    """Return the HUD state of an assistance condition.
 
     Raises:
-        UserCodeError: A user-supplied condition failed, or returned something that cannot be shown.
+        UserCodeError: A custom condition failed, or returned something that cannot be shown.
     """
     with user_code(condition, f"assistance condition {name!r}"):
         state = condition(view)

@@ -1,4 +1,4 @@
-"""H.264 video that browsers play, encoded beside the simulation in a thread of its own."""
+"""H.264 videos for browsers, encoded in a separate thread."""
 
 import hashlib
 import queue
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 
 Image = NDArray[np.uint8]
-QUEUE_LENGTH = 8  # frames; enough that neither thread waits often, few enough to take little memory
+QUEUE_LENGTH = 8  # frames
 
 
 class VideoWriter:
-    """Writes frames to an MP4 file. Use as a context manager; the file is complete on leaving it.
+    """Writes frames to an MP4 file. Use it as a context manager to complete the file.
 
     Args:
-        path: File to write; its folder must exist.
+        path: File to write, in an existing folder.
         width: Frame width, px, even (4:2:0 chroma).
         height: Frame height, px, even.
         fps: Frames per second.
@@ -44,11 +44,11 @@ class VideoWriter:
 
     @property
     def frames_sha256(self) -> str:
-        """Hash of the frames that the encoder has taken, pixel for pixel; of all of them once closed."""
+        """Hash of the encoded frames, complete after `close`."""
         return self._hash.hexdigest()
 
     def write(self, frame: Image) -> None:
-        """Append a frame, uint8 RGB of shape (height, width, 3); the caller must not change it afterwards.
+        """Append a frame, uint8 RGB of shape (height, width, 3), which the caller must not change afterwards.
 
         Raises:
             RecordError: The frame has another shape, or the encoder failed.
@@ -59,7 +59,7 @@ class VideoWriter:
         self._queue.put(frame)
 
     def close(self) -> None:
-        """Encode what is queued and finish the file.
+        """Encode the queued frames and complete the file.
 
         Raises:
             RecordError: The encoder failed.
@@ -88,9 +88,9 @@ class VideoWriter:
 
     def _encode_all(self) -> None:
         height, width, _ = self._shape
-        # faststart puts the index first, so that a browser plays before the whole file has arrived.
+        # faststart puts the index first, so that a browser can play the file while it is loading.
         with av.open(str(self._path), "w", options={"movflags": "+faststart"}) as container:
-            # One encoder thread: x264's rate control then repeats bit for bit, and the renderer needs the cores.
+            # With one thread x264 is deterministic, and the renderer keeps the other cores.
             stream = container.add_stream(
                 "libx264", rate=self._fps, options={"preset": "veryfast", "crf": "22", "threads": "1"}
             )

@@ -16,10 +16,9 @@ from experiments.record.records import EventLog
 from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant, deliveries
 from experiments.session.own_planner import planner_named
-from experiments.session.session import Session
+from experiments.session.session import Session, Viewer
 from experiments.session.task_board import TaskBoard
 from experiments.session.user_code import make_participant
-from experiments.session.viewer import Viewer
 from experiments.trials.fingerprint import fingerprint, trial_inputs
 from experiments.trials.person import check_person, drawn_person
 from experiments.trials.trial_config import TrialConfig

@@ -19,8 +19,8 @@ from experiments.record.records import EventLog
 from experiments.record.run_directory import add_files, run_directory
 from experiments.session.familiarise import Familiarisation, familiarise
 from experiments.session.film_config import FilmConfig
+from experiments.session.session import OnProgress, Progress
 from experiments.session.signals import Stopped, signals_postponed
-from experiments.session.viewer import OnProgress, Progress
 from experiments.trials.floor_plan import draw_topdown
 from experiments.trials.setup import (
     draw_person,

@@ -10,7 +10,7 @@ from experiments.record.phases import BROKEN_OFF, COMPLETE, PHYSICS_ERROR
 from experiments.record.reader import Record
 from experiments.record.records import EVENTS, RECORDING, TRAJECTORY, Event
 from experiments.record.verify import Mismatch
-from experiments.session.recorded_events import WORLD_EVENTS
+from experiments.session.assistant import WORLD_EVENTS
 from experiments.trials.replay.replayer import Replayer
 
 # Events that follow from the physics, and what the assistant makes of them. Searches of the planner are not repeated:

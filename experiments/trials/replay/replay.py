@@ -13,8 +13,8 @@ from experiments.record.reader import Record, read_run
 from experiments.record.verify import Mismatch, checksum_mismatches, damage, derived_mismatches
 from experiments.session.film_config import CAMERAS, FIRST_PERSON, FREE, FilmConfig
 from experiments.session.first_person import Filming, FirstPersonRenderer
+from experiments.session.session import Viewer
 from experiments.session.video import VideoWriter
-from experiments.session.viewer import Viewer
 from experiments.trials.replay.comparison import simulated_mismatches
 from experiments.trials.replay.external_view import ExternalViewer, camera_path
 from experiments.trials.replay.phases import phase_mismatches

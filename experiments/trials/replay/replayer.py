@@ -13,9 +13,8 @@ from experiments.record.records import RECORDING, Event, EventLog
 from experiments.record.verify import Mismatch
 from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant
-from experiments.session.session import Session
+from experiments.session.session import Session, Viewer
 from experiments.session.task_board import TaskBoard
-from experiments.session.viewer import Viewer
 from experiments.trials.replay.log_source import LogSource
 from mjsim.house.scene.scene import compose
 from mjsim.values.errors import ActionError, PhysicsError, StateError

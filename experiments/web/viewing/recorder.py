@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from experiments.session.viewer import Viewer
+from experiments.session.session import Viewer
 from hud.projection import CameraView
 from hud.state import HudState
 from mjsim.house.scene import avatar

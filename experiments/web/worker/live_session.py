@@ -20,7 +20,7 @@ from experiments.record.records import TOPDOWN, EventLog
 from experiments.record.run_directory import JOURNALS, is_run, run_directory
 from experiments.record.verify import checksum_mismatches
 from experiments.session.familiarise import Familiarisation
-from experiments.session.viewer import Viewer
+from experiments.session.session import Viewer
 from experiments.trials.replay.log_source import LogSource
 from experiments.trials.setup import (
     draw_person,

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from experiments.session.viewer import Viewer
+from experiments.session.session import Viewer
 from experiments.web.controls import act
 from experiments.web.protocol import View
 from experiments.web.state import Busy, Hud, Markers, Moment, Pictures, Reach, WireMessage
