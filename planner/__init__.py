@@ -1,6 +1,6 @@
-"""Where a person can walk, how far it is, and in which order to fetch objects: the routing problem and its planners.
+"""Navmesh, geodesic distances, and the routing problem of a task with its planners.
 
-It knows distances and names only, and serves sessions through `service` and `mjsim plan` through `solver`.
+The package works with distances and names only. Sessions use `Planner`, and `mjsim plan` uses `solver`.
 """
 
 from typing import TYPE_CHECKING
@@ -33,26 +33,24 @@ if TYPE_CHECKING:
     from planner.geodesics import Geodesics
     from planner.navmesh import NavMesh
     from planner.plan import Plan, Status, Visit, VisitKind
-    from planner.problem import RoutingProblem, Shipment
+    from planner.problem import RoutingProblem, Shipment, possible_next, tour_length
     from planner.regret import Regret, RegretEvaluator
     from planner.route import TaskState
     from planner.service import Mode, Planner
     from planner.solver_source import SolverSource
     from planner.solvers import SolveLimit, Solver, solver
-    from planner.tour import possible_next, tour_length
 else:  # hidden from type checkers, which would otherwise accept any name
     _MODULES = {
         "errors": ("PlannerError",),
         "geodesics": ("Geodesics",),
         "navmesh": ("NavMesh",),
         "plan": ("Plan", "Status", "Visit", "VisitKind"),
-        "problem": ("RoutingProblem", "Shipment"),
+        "problem": ("RoutingProblem", "Shipment", "possible_next", "tour_length"),
         "regret": ("Regret", "RegretEvaluator"),
         "route": ("TaskState",),
         "service": ("Mode", "Planner"),
         "solver_source": ("SolverSource",),
         "solvers": ("SolveLimit", "Solver", "solver"),
-        "tour": ("possible_next", "tour_length"),
     }
 
     def __getattr__(name):

@@ -1,44 +1,50 @@
-"""An independent check that a plan solves a problem; it shares no code with the solvers."""
+"""Independent checks of plans, which share no code with the solvers.
+
+`check` is fast enough for every plan. `verify_optimal` may take seconds. A certificate contains a bound on the rest
+of the task from every state. A shorter tour than claimed could only run through states whose cost so far plus bound
+is below the claim. `verify_optimal` visits all of these, layer by layer of picks. If none of them ends a tour, the
+claim holds.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE
-from planner.plan import Plan, Status, VisitKind
+from planner.plan import Certificate, Plan, Proof, Status, VisitKind
 from planner.problem import RoutingProblem
 from planner.relaxation_checker import Relaxation, closed
 
-FEW = 7  # objects whose tours are all tried
-MAX_ROWS = 1 << 16  # of a table that is computed anew: some 2 s
+EXHAUSTIVE_OBJECTS = 7  # up to this number of objects, all tours are tried
+CHECK_ROWS = 1 << 16  # largest table that `check` fills, in about 2 s
+VERIFY_ROWS = 1 << 20  # largest table that `verify_optimal` fills, in about 30 s
+MAX_STATES = 30_000_000  # largest number of states that `verify_optimal` visits
 
 # Location, objects left (bits), and the bins of what is carried.
 State = tuple[int, int, tuple[int, ...]]
 
 
 def check(problem: RoutingProblem, plan: Plan) -> float:
-    """Replay a plan against the constraints of equation 1 (PAPER section 2), then derive its lower bound anew.
+    """Replay a plan against the constraints of equation 1 (PAPER section 2), and derive a lower bound of all tours, m.
 
-    Up to seven objects every order of visits is tried, whatever the certificate. Beyond, a spanning tree is grown, or
-    a table (full, or relaxed with the certificate's groups and prices) filled up to 2^16 rows. A search is not
-    repeated: where the returned number is lower than `plan.lower_bound`, the rest was not checked.
-
-    Returns:
-        A lower bound of all tours that this check has derived by itself, m; 0 where it could derive none.
+    Up to seven objects, every order of visits is tried. Beyond, the bound follows from a spanning tree or from the
+    certificate's table if that has at most 2^16 rows. Otherwise it is 0. A solver's search is not repeated, so the
+    derived bound may be below `plan.lower_bound`.
 
     Raises:
-        ProblemError: A visit that is impossible or repeated, an object left over, a wrong cost, a lower bound
-            above the cost, OPTIMAL with a gap, or a certificate that claims more than it proves.
+        ProblemError: A visit is impossible or repeated, an object is left over, the cost is wrong, the lower bound
+            exceeds the cost, an optimal plan has a gap, or the certificate claims more than it proves.
     """
-    return derive(problem, plan, MAX_ROWS)[0]
+    return derive(problem, plan, CHECK_ROWS)[0]
 
 
 def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, Relaxation | None]:
-    """As `check`, with a limit on the rows; also the relaxation, where it was filled."""
+    """Do the same as `check` with tables of at most `max_rows`. Also return the relaxation if its table was filled."""
     _check_numbers(plan, replayed(problem, plan))
     rounding, certificate = allowance(problem, plan), plan.certificate
-    if len(problem.shipments) + len(problem.onboard) <= FEW:
+    if len(problem.shipments) + len(problem.onboard) <= EXHAUSTIVE_OBJECTS:
         shortest = shortest_tour(problem, plan.cost)
         optimum = plan.cost if shortest is None else min(plan.cost, shortest[0])
         _refuse(plan.lower_bound, optimum, rounding, "lower bound")
@@ -61,22 +67,23 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
 
 
 def allowance(problem: RoutingProblem, plan: Plan) -> float:
-    """By how much the claims of a plan may exceed the truth, m: rounding to the problem's resolution counts."""
+    """Return by how much the claims of a plan may exceed the truth because of rounding, m."""
     return problem.tolerance(plan.cost) + 2 * (problem.resolution or 0.0)
 
 
 def shortest_tour(
     problem: RoutingProblem, limit: float, max_states: float = np.inf
 ) -> tuple[float, int] | None:
-    """Length of the shortest tour below a limit, m, for any capacity and distances, infinite if there is none.
+    """Return the length of the shortest tour below a limit, m, and the number of visited states.
 
-    With it comes how many states were visited, sorted by number of visits made; None if they were too many.
+    The length is infinite if there is no such tour. The result is None if there are more than `max_states`. Works for
+    any capacity and any distances.
     """
     d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
 
-    def still(here: int, left: int, carried: tuple[int, ...]) -> float:
-        """The farthest single trip left."""
+    def farthest(here: int, left: int, carried: tuple[int, ...]) -> float:
+        """Return the longest single trip left, a lower bound of the rest."""
         trips = [direct[here][a] + direct[a][b] for k, (a, b) in enumerate(jobs) if left >> k & 1]
         return max([*trips, *(direct[here][j] for j in carried)], default=0.0)
 
@@ -94,7 +101,7 @@ def shortest_tour(
                 ]
             for option in options:
                 total = cost + d[here][option[0]]
-                if total < after.get(option, limit) and total + still(*option) < limit:
+                if total < after.get(option, limit) and total + farthest(*option) < limit:
                     after[option] = total
         layer = after
         states += len(layer)
@@ -104,18 +111,22 @@ def shortest_tour(
 
 
 def replayed(problem: RoutingProblem, plan: Plan) -> float:
-    """Length of the tour, m, every visit of which is feasible."""
+    """Return the length of a plan's tour, m.
+
+    Raises:
+        ProblemError: A visit is not feasible.
+    """
     n = len(problem.shipments)
     loose, held = set(range(n)), set(range(n, len(problem.names)))
     here, cost = problem.start, 0.0
     for k, visit in enumerate(plan.visits):
         where = f"visit {k} ({visit.kind.value} {visit.object})"
         if visit.object not in problem.number:
-            raise ProblemError(f"{where} is of no object of the problem; it has {list(problem.names)}")
+            raise ProblemError(f"{where} names an unknown object; the problem has {list(problem.names)}")
         index = problem.number[visit.object]
         if visit.kind is VisitKind.PICK:
             if index not in loose:
-                raise ProblemError(f"{where} picks an object that does not lie about")
+                raise ProblemError(f"{where} picks an object that is not loose")
             loose.remove(index)
             held.add(index)
             there = problem.shipments[index].pickup
@@ -153,7 +164,7 @@ def _refuse(claimed: float, derived: float, rounding: float, what: str) -> None:
 def _claim(
     problem: RoutingProblem, certificate: Certificate
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Group of each shipment in a table, (n,), and the price of picking it, m, (n,)."""
+    """Return the group of each shipment in the certificate's table, (n,), and the price of picking it, m, (n,)."""
     n = len(problem.shipments)
     if certificate.proof is Proof.FULL_TABLE:
         return np.arange(n), np.zeros(n)
@@ -170,7 +181,7 @@ def _claim(
 
 
 def _spanning_tree(problem: RoutingProblem) -> float:
-    """Total length of a minimum spanning tree of all locations of the tour (Prim)."""
+    """Return the length of a minimum spanning tree of all locations of the tour, m (Prim's algorithm)."""
     direct, total = closed(problem), 0.0
     apart = {j: direct[problem.start, j] for j in problem.used if j != problem.start}
     while apart:
@@ -178,3 +189,58 @@ def _spanning_tree(problem: RoutingProblem) -> float:
         total += float(apart.pop(nearest))
         apart = {j: min(length, direct[nearest, j]) for j, length in apart.items()}
     return total
+
+
+@dataclass(frozen=True)
+class Verified:
+    """Facts about a plan, found without trusting its solver."""
+
+    cost: float  # length of its feasible tour, m
+    lower_bound: float  # no tour is shorter than this, m
+    optimal: bool  # True if the bound is the length of the tour, to twice the tolerance of the problem
+    states: int  # number of states visited beyond the certificate's table
+    why: str = ""  # reason why a claim of the plan is not verified, empty if all are
+
+
+def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX_STATES) -> Verified:
+    """Verify the tour of a plan, and as far as possible its lower bound, from the problem and the certificate alone.
+
+    The search ends after `max_states`.
+
+    Raises:
+        ProblemError: The tour is not feasible or has another length, the certificate claims more than it proves, or
+            there is a tour shorter than the lower bound.
+    """
+    derived, relaxation = derive(problem, plan, VERIFY_ROWS)
+    rounding, proof = allowance(problem, plan), plan.certificate and plan.certificate.proof
+    wanted = plan.lower_bound - rounding
+    states, why = 0, ""
+    if derived >= wanted:
+        pass
+    elif proof is Proof.SPANNING_TREE:
+        why = "a spanning tree bounds the tour no better"
+    elif proof in (Proof.FULL_TABLE, Proof.RELAXATION) and problem.capacity <= 2 and relaxation is None:
+        why = f"the certificate's table has more than {VERIFY_ROWS} rows"
+    elif (found := _shorter(problem, relaxation, wanted, max_states)) is None:
+        states, why = max_states, f"more than {max_states} states may lead to a shorter tour"
+    elif found[0]:
+        raise ProblemError(f"the lower bound claims {plan.lower_bound} m, but there is a shorter tour")
+    else:
+        derived, states = wanted, found[1]
+    optimal = derived >= plan.cost - 2 * rounding
+    return Verified(plan.cost, min(derived, plan.cost), optimal, states, why)
+
+
+def _shorter(
+    problem: RoutingProblem, relaxation: Relaxation | None, limit: float, max_states: int
+) -> tuple[bool, int] | None:
+    """Return True if there is a tour shorter than a limit, m, and the number of visited states.
+
+    The result is None if there are too many states.
+    """
+    if relaxation is not None:
+        found = relaxation.shorter(limit, max_states)
+        if found is None or not found[0] or relaxation.exact:
+            return found  # otherwise the tour may use connections that are shorter than the given distances
+    shortest = shortest_tour(problem, limit, max_states // 30)
+    return None if shortest is None else (shortest[0] < limit, shortest[1])

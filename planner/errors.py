@@ -1,33 +1,31 @@
-"""Typed errors of the planner.
+"""Errors of the planner.
 
-    PlannerError
-    ├── NavMeshError        obstacles, bounds or sizes that make no navmesh
-    ├── NotNavigableError   no navigable point near a position
-    ├── UnreachableError    two positions lie on different islands of the navmesh
-    ├── ProblemError        a routing problem is malformed, or a plan does not solve it
-    └── InfeasibleError     a well-formed problem has no feasible plan
-
-Every message names the offending value and what to do about it.
+PlannerError
+├── NavMeshError        obstacles, bounds or sizes do not make a navmesh
+├── NotNavigableError   no navigable point is near a position
+├── UnreachableError    two positions are on different islands of the navmesh
+├── ProblemError        a routing problem is malformed, or a plan does not solve it
+└── InfeasibleError     a well-formed problem has no feasible plan
 """
 
 
 class PlannerError(Exception):
-    """Base of every error raised by :mod:`planner`."""
+    """Base class of all errors of :mod:`planner`."""
 
 
 class NavMeshError(PlannerError):
-    """Obstacles, bounds or sizes that make no navmesh."""
+    """Obstacles, bounds or sizes do not make a navmesh."""
 
 
 class NotNavigableError(PlannerError):
-    """No navigable point lies near a position."""
+    """No navigable point is near a position."""
 
 
 class UnreachableError(PlannerError):
-    """Positions lie on different islands of the navmesh.
+    """Two positions are on different islands of the navmesh.
 
     Attributes:
-        names: Names of the unreachable objects, where the caller speaks in names.
+        names: Names of the unreachable objects, if known.
     """
 
     def __init__(self, message: str, names: tuple[str, ...] = ()) -> None:

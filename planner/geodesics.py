@@ -1,7 +1,7 @@
 """Exact any-angle shortest paths on a navmesh.
 
-The path is the shortest among the inflated obstacle polygons, to the 0.1 mm of `navmesh.TOLERANCE`, not among
-grid cells: a grid overestimates distances by several percent.
+Paths are shortest among the inflated obstacle polygons, to 0.1 mm (`navmesh.TOLERANCE`). Paths on a grid would be
+several percent longer.
 """
 
 from dataclasses import dataclass, field
@@ -11,26 +11,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from planner.errors import UnreachableError
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.path_search import Views, distances, shortest_path
-from planner.visibility_graph import VisibilityGraph, direct_distances, visible_vertices
-
-MAX_REMEMBERED = (
-    4096  # points whose visible vertices are kept; bins and objects at rest are asked for again and again
+from planner.visibility_graph import (
+    Views,
+    VisibilityGraph,
+    direct_distances,
+    distances,
+    shortest_path,
+    visible_vertices,
 )
+
+MAX_CACHED = 4096  # points whose visible vertices are cached; queries often repeat bins and resting objects
 
 
 @dataclass(frozen=True, eq=False)
 class ShortestPath:
-    """A shortest path."""
+    """A shortest path and its length."""
 
-    # corners from one end to the other, (k, 2) with k >= 2, m. Ends are snapped if need be.
+    # corners including both ends, which may be snapped, (k, 2) with k >= 2, m
     points: NDArray[np.float64]
     geodesic_distance: float  # length, m
 
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Points on the navmesh, m, (m, 2), the island of each, (m,), and the vertices they see."""
+    """Points on the navmesh, m, (m, 2), the island of each, (m,), and the vertices that they see."""
 
     points: NDArray[np.float64]
     island: NDArray[np.int64]
@@ -41,8 +45,8 @@ class _Query:
 class Geodesics:
     """Shortest paths and distances between points of a navmesh.
 
-    A point that is not navigable stands for the nearest point of the largest island (`NavMesh.snap`); the gap
-    to it does not count as distance. A navigable point on a smaller island stays there.
+    A point that is not navigable is replaced by the nearest point of the largest island (`NavMesh.snap`). The distance
+    to that point does not count. A navigable point on a smaller island stays there.
 
     Example:
         >>> wall = np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 3.0], [2.0, 3.0]])
@@ -52,8 +56,8 @@ class Geodesics:
         True
     """
 
-    navmesh: NavMesh  # where one may walk
-    max_snap: float = 1.0  # how far away that nearest point may lie, m
+    navmesh: NavMesh  # walkable floor
+    max_snap: float = 1.0  # largest distance to the nearest navigable point, m
     _graph: VisibilityGraph = field(init=False, repr=False)
     _remembered: dict[tuple[float, float], tuple[NDArray[np.int32], NDArray[np.float64]]] = field(
         init=False, repr=False, default_factory=dict
@@ -63,7 +67,7 @@ class Geodesics:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
 
     def shortest_path(self, a: ArrayLike, b: ArrayLike) -> ShortestPath:
-        """The shortest path from a to b, each (2,), m; raises as `distances`."""
+        """Return the shortest path between two points, each (2,), m. Raises as `distances`."""
         points, islands = self._locate([np.asarray(a, np.float64), np.asarray(b, np.float64)])
         straight = float(direct_distances(points[:1], points[1:], self._graph.walls)[0, 0])
         if np.isfinite(straight) and islands[0] == islands[1]:
@@ -75,11 +79,11 @@ class Geodesics:
         return ShortestPath(path, length)
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Geodesic distances between all pairs of points (m, 2), m; (m, m), symmetric, zero diagonal, m.
+        """Return the geodesic distances between all pairs of points (m, 2), m: (m, m), symmetric, zero diagonal, m.
 
         Raises:
-            NotNavigableError: No navigable point lies within `max_snap` of a point.
-            UnreachableError: Two points lie on different islands.
+            NotNavigableError: There is no navigable point within `max_snap` of a point.
+            UnreachableError: Two points are on different islands.
         """
         query = self._query(*self._locate(points))
         result = self._between(query, query)
@@ -88,23 +92,23 @@ class Geodesics:
         return result
 
     def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Geodesic distances from one point (2,) to points (m, 2), m; (m,), m; raises as `distances`."""
+        """Return the geodesic distances from one point (2,) to points (m, 2), m: (m,), m. Raises as `distances`."""
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
         return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
-        """Geodesic distances from points (s, 2) to points (t, 2), m; (s, t), m; raises as `distances`."""
+        """Return the geodesic distances from points (s, 2) to points (t, 2), m: (s, t), m. Raises as `distances`."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
         return self._between(source, target)
 
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Points (m, 2), m, snapped where they are not navigable, and the island of each."""
+        """Return points (m, 2), m, snapped if they are not navigable, and the island of each."""
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
             islands[k] = self.navmesh.island_of(point) or 0
-            # Also where a point is navigable only by tolerance: no vertex is tangent to a line from inside an obstacle.
+            # Snap also points that are navigable only by tolerance: from inside an obstacle, no vertex is tangent.
             array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 
@@ -117,18 +121,18 @@ class Geodesics:
         return _Query(points, islands, Views(starts, seen, lengths))
 
     def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Vertices that a point, m, sees along tangents, and the distances to them, m."""
+        """Return the vertices that a point, m, sees along tangents, and the distances to them, m."""
         view = self._remembered.get((x, y))
         if view is None:
-            if len(self._remembered) >= MAX_REMEMBERED:
+            if len(self._remembered) >= MAX_CACHED:
                 self._remembered.clear()
             graph = self._graph
             view = visible_vertices(x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE)
-            self._remembered[x, y] = view  # another thread may clear it at once
+            self._remembered[x, y] = view  # another thread may clear the cache at once
         return view
 
     def _between(self, sources: _Query, targets: _Query) -> NDArray[np.float64]:
-        """Distances from sources to targets; typed errors instead of infinities."""
+        """Return the distances from sources to targets, m."""
         graph = self._graph
         apart = sources.island[:, None] != targets.island[None, :]
         if apart.any():
@@ -144,6 +148,6 @@ class Geodesics:
 
 def _unreachable(a: NDArray[np.float64], b: NDArray[np.float64]) -> UnreachableError:
     return UnreachableError(
-        f"no path from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they lie on different islands "
+        f"no path from ({a[0]:.3f}, {a[1]:.3f}) to ({b[0]:.3f}, {b[1]:.3f}): they are on different islands "
         "of the navmesh; move one, or build the navmesh with a smaller agent_radius"
     )

@@ -1,36 +1,33 @@
-"""The nearest possible visit first: a baseline, and a first answer before any other planner has one."""
+"""The nearest possible visit first: a baseline, and the first plan of other planners."""
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.certificate import Certificate, Proof
-from planner.plan import Plan, Visit
-from planner.problem import RoutingProblem
+from planner.plan import Certificate, Plan, Proof, Visit
+from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
 from planner.solvers import SolveLimit
-from planner.tour import make_plan, possible_next, spanning_bound
 
 
 @dataclass(frozen=True)
 class GreedySolver:
-    """Goes to the nearest possible visit, the first of equals."""
+    """Always makes the nearest possible visit."""
 
     name: str = "greedy"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan by nearest visit first, in milliseconds; seed and limit do not matter."""
+        """Plan in milliseconds. Seed and limit have no effect."""
         del seed, limit
         return _plan(problem, spanning_bound(problem))
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the one plan that there is."""
         yield self.solve(problem, seed=seed, limit=limit)
 
 
 def first_plan(problem: RoutingProblem) -> Plan:
-    """The nearest-first tour without any bound, which no planner could give sooner."""
+    """Return the nearest-first tour with the bound 0, which takes less time than any other plan."""
     return _plan(problem, 0)
 
 
@@ -41,7 +38,7 @@ def _plan(problem: RoutingProblem, bound: int) -> Plan:
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:
-    """A feasible tour that always goes to the nearest possible visit."""
+    """Return a feasible tour that always makes the nearest possible visit."""
     visits: list[Visit] = []
     here = problem.start
     while options := list(possible_next(problem, visits)):

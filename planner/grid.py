@@ -1,4 +1,4 @@
-"""A grid over the floor, and which of its cells a line segment crosses."""
+"""A grid over the floor, and the cells that line segments cross."""
 
 import math
 from typing import NamedTuple
@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-MARGIN = 1e-3  # m; a segment is listed in cells that it misses by less, so that rounding never loses a touch
+MARGIN = 1e-3  # m; a segment is also listed in cells that it misses by less, in case of rounding errors
 
 
-class Frame(NamedTuple):
-    """Where a grid's cells lie: row r, column c spans x_min + [c, c + 1] resolution, y_min + [r, r + 1] resolution."""
+class GridFrame(NamedTuple):
+    """Position of the cells of a grid.
+
+    The cell in row r, column c spans x_min + [c, c + 1] resolution and y_min + [r, r + 1] resolution.
+    """
 
     x_min: float  # corner of the first cell, m
     y_min: float
@@ -21,8 +24,8 @@ class Frame(NamedTuple):
     columns: int  # number of cells along x
 
     @classmethod
-    def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "Frame":
-        """The frame that covers bounds (x_min, y_min, x_max, y_max), m."""
+    def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "GridFrame":
+        """Return the frame that covers bounds (x_min, y_min, x_max, y_max), m."""
         x_min, y_min, x_max, y_max = bounds
         columns, rows = (
             max(1, math.ceil(side / resolution - 1e-9)) for side in (x_max - x_min, y_max - y_min)
@@ -30,13 +33,13 @@ class Frame(NamedTuple):
         return cls(float(x_min), float(y_min), float(resolution), rows, columns)
 
     def centres(self) -> NDArray[np.float64]:
-        """Centres of the cells, (rows, columns, 2), m."""
+        """Return the centres of the cells, (rows, columns, 2), m."""
         x = self.x_min + (np.arange(self.columns) + 0.5) * self.resolution
         y = self.y_min + (np.arange(self.rows) + 0.5) * self.resolution
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Column and row of each point (m, 2), m, or of the nearest cell outside the grid, (2, m)."""
+        """Return the columns and rows of points (m, 2), m, as (2, m). Points outside get the nearest cell."""
         steps = (points - (self.x_min, self.y_min)) / self.resolution
         cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
         return cells.T
@@ -45,14 +48,13 @@ class Frame(NamedTuple):
 class SegmentGrid(NamedTuple):
     """Line segments, listed by the cells that they cross."""
 
-    frame: Frame  # the grid
-    segments: NDArray[np.float64]  # x, y of one end and of the other, m, (s, 4)
+    frame: GridFrame
+    segments: NDArray[np.float64]  # x, y of both ends, m, (s, 4)
     starts: NDArray[np.int64]  # first entry of each cell in `listed`, row by row, (rows * columns + 1,)
     listed: NDArray[np.int64]  # numbers of the segments in each cell
 
     @classmethod
-    def build(cls, frame: Frame, segments: NDArray[np.float64]) -> "SegmentGrid":
-        """List segments (s, 4), m, by cell."""
+    def build(cls, frame: GridFrame, segments: NDArray[np.float64]) -> "SegmentGrid":
         cells, numbers = crossed_cells(frame, segments)
         starts = np.zeros(frame.rows * frame.columns + 1, np.int64)
         np.cumsum(np.bincount(cells, minlength=len(starts) - 1), out=starts[1:])
@@ -60,16 +62,16 @@ class SegmentGrid(NamedTuple):
 
 
 @kernel
-def row_span(ay: float, by: float, frame: Frame) -> tuple[int, int]:
-    """First and last row that a segment from y = a to y = b, m, comes near; the nearest row if it is outside."""
+def row_span(ay: float, by: float, frame: GridFrame) -> tuple[int, int]:
+    """Return the first and last row within `MARGIN` of a segment from y = `ay` to y = `by`, m, clipped to the grid."""
     first = math.floor((min(ay, by) - MARGIN - frame.y_min) / frame.resolution)
     last = math.floor((max(ay, by) + MARGIN - frame.y_min) / frame.resolution)
     return min(max(int(first), 0), frame.rows - 1), min(max(int(last), 0), frame.rows - 1)
 
 
 @kernel
-def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Frame) -> tuple[int, int]:
-    """First and last column that a segment from a to b, m, comes near in a row, the nearest if it is outside."""
+def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: GridFrame) -> tuple[int, int]:
+    """Return the first and last column in a row within `MARGIN` of a segment from a to b, m, clipped to the grid."""
     low = frame.y_min + row * frame.resolution - MARGIN
     high = low + frame.resolution + 2.0 * MARGIN
     start, end = 0.0, 1.0
@@ -83,8 +85,10 @@ def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Fra
 
 
 @kernel
-def crossed_cells(frame: Frame, segments: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cells within `MARGIN` of each segment (s, 4), m: cell numbers, row by row, and the segments' numbers."""
+def crossed_cells(
+    frame: GridFrame, segments: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the numbers, row by row, of cells within `MARGIN` of segments (s, 4), m, and of these segments."""
     cells, numbers = [0], [0]
     for k in range(len(segments)):
         ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
@@ -99,7 +103,7 @@ def crossed_cells(frame: Frame, segments: NDArray[np.float64]) -> tuple[NDArray[
 
 @kernel
 def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -> bool:
-    """Whether the closed segment from a to b, m, both on the grid, touches no wall."""
+    """Return True if the closed segment from a to b, m, both on the grid, touches no wall."""
     frame = walls.frame
     first, last = row_span(ay, by, frame)
     for row in range(first, last + 1):
@@ -113,7 +117,7 @@ def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -
 
 @kernel
 def touch(ax: float, ay: float, bx: float, by: float, wall: NDArray[np.float64]) -> bool:
-    """Whether the closed segment from a to b and a wall (4,) have a point in common."""
+    """Return True if the closed segment from a to b and a wall (4,) have a common point."""
     cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
     if max(cx, dx) < min(ax, bx) or min(cx, dx) > max(ax, bx):
         return False

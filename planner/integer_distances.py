@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TOLERANCE = 1e-9  # share of its length by which an optimal tour may exceed the shortest one
-FINE = 1 << 44  # units of the largest distance where no coarser unit is exact; 2^18 legs cannot overflow
-TIE = 1e-10  # share of the largest distance; tours closer than this may differ by rounding alone
-COARSE = 1 << 20  # units of the largest distance that leave tours of 40 objects within 32 bits
-ROUND = 1e-15  # share of the largest distance by which decimal fractions in binary are off
+TOLERANCE = 1e-9  # relative excess that an optimal tour may have over the shortest one
+FINE = 1 << 44  # largest distance in units, if no coarser unit is exact; 2^18 legs cannot overflow
+TIE = 1e-10  # difference of tours that may be due to rounding, as a share of the largest distance
+COARSE = 1 << 20  # largest distance in units with which tours of 40 objects fit into 32 bits
+ROUND = 1e-15  # error of decimal fractions in binary, as a share of the largest distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,23 +21,23 @@ class IntegerDistances:
     """Distances of a problem in whole units."""
 
     unit: float  # m per unit
-    tie: int  # tours that differ by no more than this are equal, units
-    rounding: float  # by how much a leg was rounded at most, units; 0 where the unit is exact
+    tie: int  # largest difference between tours that count as equal, units
+    rounding: float  # largest rounding of a leg, units; 0 if the unit is exact
     used: Sequence[int]  # locations that tours visit
-    # distances, rounded, symmetric; those of locations that no tour visits are 0, (k, k)
+    # rounded distances, symmetric, 0 for locations that no tour visits, (k, k)
     legs: NDArray[np.int64]
 
     @cached_property
     def metric(self) -> NDArray[np.int64]:
-        """The same, closed to a metric, (k, k).
+        """The distances closed to a metric, (k, k).
 
-        Rounding can break the triangle inequality by a unit, and solvers rely on it: closing restores it.
+        Rounding can violate the triangle inequality, on which solvers rely, by a unit. Closing restores it.
         """
         return shortest_connections(self.legs, self.used)
 
     @cached_property
     def is_metric(self) -> bool:
-        """Whether the distances keep the triangle inequality, to rounding."""
+        """True if the distances satisfy the triangle inequality, up to rounding."""
         return bool((self.legs - self.metric).max(initial=0) <= 2 * len(self.legs))
 
 
@@ -46,8 +46,8 @@ def integer_distances(
 ) -> IntegerDistances:
     """Round distances, m, (k, k), between the `used` locations to whole units.
 
-    The unit is the resolution where there is one. Otherwise it is a power of ten of which all distances are whole
-    multiples, or 2^-44 of the largest: so fine that rounding a whole tour changes it by less than `TOLERANCE`.
+    The unit is the resolution, if given. Otherwise it is a power of ten of which all distances are multiples, or 2^-44
+    of the largest distance. This is so fine that rounding changes a tour by less than `TOLERANCE`.
     """
     block = distances[np.ix_(used, used)]
     unit, tie = (resolution, 0) if resolution is not None else _unit(block)
@@ -59,7 +59,7 @@ def integer_distances(
 
 
 def _unit(block: NDArray[np.float64]) -> tuple[float, int]:
-    """Unit, m, and tie, units, for distances, m, (u, u)."""
+    """Return the unit, m, and the tie, units, for distances, m, (u, u)."""
     largest = float(block.max(initial=0.0))
     if largest == 0.0:
         return 1.0, 0
@@ -71,8 +71,8 @@ def _unit(block: NDArray[np.float64]) -> tuple[float, int]:
 
 
 def shortest_connections(distances: NDArray[Any], used: Sequence[int]) -> NDArray[Any]:
-    """Shortest connections over the `used` locations among symmetric distances, (k, k) as they are."""
+    """Return the shortest connections over the `used` locations, given symmetric distances (k, k)."""
     shortest = distances.copy()
-    for k in used:  # Floyd-Warshall; scipy's reads a distance of 0 as "no edge"
+    for k in used:  # Floyd-Warshall; SciPy's version treats a distance of 0 as a missing edge
         np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :], out=shortest)
     return shortest

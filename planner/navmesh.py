@@ -1,7 +1,7 @@
-"""Where a person can stand: free space outside the obstacles inflated by the person's radius.
+"""The floor where a person can stand: free space outside the obstacles inflated by the person's radius.
 
-An occupancy grid answers first. A cell that lies wholly on one island, or wholly off all of them, decides for
-all of its points; in a cell that an outline crosses, the exact polygons do.
+An occupancy grid answers most queries. A cell that is completely on one island, or off all of them, decides for all
+its points. In a cell that an outline crosses, the exact polygons decide.
 """
 
 import math
@@ -16,12 +16,12 @@ from scipy.ndimage import label
 from shapely.geometry import MultiPolygon, Polygon
 
 from planner.errors import NavMeshError, NotNavigableError
-from planner.grid import Frame, crossed_cells
+from planner.grid import GridFrame, crossed_cells
 
-TOLERANCE = 1e-4  # depth in m that may be cut off an inflated obstacle; far below what matters to a walker
-SNAP_CLEARANCE = 1e-6  # m; keeps a snapped point off the boundary in spite of rounding
-ARC_SEGMENTS = 8  # per quarter circle: paths 0.01 % longer or shorter than around true circles
-BLOCKED, MIXED = -1, -2  # cells that lie on no island, and cells that an outline crosses
+TOLERANCE = 1e-4  # depth by which a path may cut into an inflated obstacle, m
+SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary, in case of rounding errors, m
+ARC_SEGMENTS = 8  # segments per quarter circle; paths differ by 0.01 % from those around true circles
+BLOCKED, MIXED = -1, -2  # cells off all islands, and cells that an outline crosses
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,21 +33,21 @@ class NavMesh:
 
     Attributes:
         bounds: (x_min, y_min, x_max, y_max), m.
-        agent_radius: By how much obstacles are inflated, m.
-        frame: Where the grid's cells lie.
+        agent_radius: Inflation of the obstacles, m.
+        frame: Position of the grid's cells.
         islands: Connected polygons of free space, largest first.
-        solid: Inflated obstacles, shrunk by `TOLERANCE`: what a path may not touch.
-        cells: Island on which a whole cell lies, `BLOCKED` or `MIXED`, shape (rows, columns) int32.
+        solid: Inflated obstacles shrunk by `TOLERANCE`, which paths may not touch.
+        cells: Island that contains the whole cell, `BLOCKED` or `MIXED`, shape (rows, columns) int32.
     """
 
     bounds: tuple[float, float, float, float]
     agent_radius: float
-    frame: Frame
+    frame: GridFrame
     islands: tuple[Polygon, ...]
     solid: MultiPolygon
     cells: NDArray[np.int32]
-    _inner: NDArray[np.object_] = field(repr=False)  # islands less `SNAP_CLEARANCE`
-    _outer: NDArray[np.object_] = field(repr=False)  # islands and their tolerance
+    _inner: NDArray[np.object_] = field(repr=False)  # islands shrunk by `SNAP_CLEARANCE`
+    _outer: NDArray[np.object_] = field(repr=False)  # islands grown by their tolerance
 
     @classmethod
     def build(
@@ -61,13 +61,13 @@ class NavMesh:
         """Inflate obstacles and find the islands of free space.
 
         Args:
-            obstacles: Convex polygons, each (k, 2) vertices in m in any order (only their hull counts).
+            obstacles: Convex polygons, each with vertices (k, 2), m, in any order.
             bounds: (x_min, y_min, x_max, y_max), m.
-            agent_radius: m.
+            agent_radius: Inflation of the obstacles, m.
             resolution: Size of a grid cell, m.
 
         Raises:
-            NavMeshError: An obstacle, the bounds or a size is unusable.
+            NavMeshError: An obstacle, the bounds or a size is not valid.
             NotNavigableError: No free space is left.
         """
         box = _box(bounds)
@@ -86,7 +86,7 @@ class NavMesh:
         outer = shapely.buffer(islands, 0.5 * TOLERANCE, join_style="mitre")
         shapely.prepare(islands)
         shapely.prepare(outer)
-        frame = Frame.covering(box.bounds, resolution)
+        frame = GridFrame.covering(box.bounds, resolution)
         solid = MultiPolygon(_polygons(shapely.buffer(inflated, -TOLERANCE, join_style="mitre")))
         cells = _cells(frame, islands, outer)
         return cls(box.bounds, float(agent_radius), frame, tuple(islands), solid, cells, inner, outer)
@@ -98,11 +98,11 @@ class NavMesh:
 
     @cached_property
     def topdown_map(self) -> NDArray[np.int32]:
-        """The floor from above: island of each cell's centre, 0 for the largest, -1 off all islands.
+        """The floor from above: the island of each cell's centre, 0 for the largest, -1 off all islands.
 
-        Shape (rows, columns), read-only. Row r, column c is about the point (x_min + (c + 0.5) resolution,
-        y_min + (r + 0.5) resolution), so row 0 is at the smallest y: draw it with the origin at the lower left.
-        `frame` holds these numbers, and all centres as `frame.centres()`.
+        Shape (rows, columns), read-only. Row r, column c is centred on the point (x_min + (c + 0.5) resolution,
+        y_min + (r + 0.5) resolution). Row 0 has the smallest y, so draw the map with the origin at the lower left.
+        `frame` contains these numbers, and `frame.centres()` returns all centres.
         """
         islands = self.cells.copy()
         mixed = self.cells == MIXED
@@ -111,7 +111,7 @@ class NavMesh:
         return islands
 
     def island_of(self, point: ArrayLike) -> int | None:
-        """Index into `islands` of the island that holds a point (2,), m; None if it is not navigable."""
+        """Return the index into `islands` of the island that contains a point (2,), m, or None."""
         x, y = _point(point)
         island = self._cell(x, y)
         if island == MIXED:
@@ -119,20 +119,18 @@ class NavMesh:
         return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Whether a person can stand at a point (2,), m, on any island."""
+        """Return True if a person can stand at a point (2,), m, on any island."""
         return self.island_of(point) is not None
 
     def snap(self, point: ArrayLike, max_distance: float = 1.0, island: int = 0) -> NDArray[np.float64]:
-        """The nearest point of an island, by default the largest.
+        """Return the point of an island nearest to a point, (2,), m.
+
+        This is the point itself if it is on the island, without the tolerance of `is_navigable`.
 
         Args:
             point: (2,), m.
-            max_distance: How far away it may lie, m.
-            island: Index into `islands`.
-
-        Returns:
-            The point itself if it is on the island, else the nearest one that is, (2,), m. Here, the tolerance of
-            what is navigable is not added.
+            max_distance: Largest distance to the island, m.
+            island: Index into `islands`, by default the largest.
 
         Raises:
             NotNavigableError: The island is farther away than `max_distance`.
@@ -152,10 +150,13 @@ class NavMesh:
         return nearest
 
     def sample(self, rng: np.random.Generator, count: int | None = None) -> NDArray[np.float64]:
-        """Points drawn uniformly from the largest island, m: (2,), or (count, 2) as `count` calls would draw."""
+        """Draw a point, (2,), or `count` points, (count, 2), uniformly from the largest island, m.
+
+        Drawing `count` points at once gives the same points as `count` calls.
+        """
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
-        if count is None:  # without arrays: ten times as quick
+        if count is None:  # without arrays, which is ten times as fast
             while True:
                 x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
                 cell = self._cell(x, y)
@@ -163,7 +164,7 @@ class NavMesh:
                     return np.array([x, y])
         drawn = [np.empty((0, 2))]
         missing = count
-        while missing:  # rejection: ends, as the island has an area
+        while missing:  # rejection sampling
             points = rng.uniform((x_min, y_min), (x_max, y_max), (missing, 2))
             columns, rows = self.frame.columns_rows(points)
             cells = self.cells[rows, columns]
@@ -175,29 +176,29 @@ class NavMesh:
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:
-        """Edges of the navigable floor: x, y of one end and of the other, m, shape (e, 4).
+        """Edges of the navigable floor: x, y of both ends, m, shape (e, 4).
 
-        A point is navigable if a ray from it crosses an odd number of them.
+        A point is navigable if a ray from it crosses an odd number of edges.
         """
         return _outline(self._outer)
 
     def _cell(self, x: float, y: float) -> int:
-        """Entry of `cells` for a point, m; that of the nearest cell outside the grid."""
+        """Return the entry of `cells` for a point, m, or that of the nearest cell if the point is outside the grid."""
         x_min, y_min, size, rows, columns = self.frame
         row, column = int((y - y_min) / size), int((x - x_min) / size)
         return int(self.cells.item(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
 
 
 def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
-    """Polygons of free space, the largest first, as they are and less `SNAP_CLEARANCE`."""
+    """Return the polygons of free space, the largest first, and the same polygons shrunk by `SNAP_CLEARANCE`."""
     islands = np.array(sorted(_polygons(free), key=lambda p: -p.area), dtype=object)
     inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
     kept = shapely.area(inner) > 0
     return islands[kept], inner[kept]
 
 
-def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
-    """`NavMesh.cells`: neighbouring cells that no outline crosses lie on the same island, or on none."""
+def _cells(frame: GridFrame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
+    """Return `NavMesh.cells`. Adjacent cells that no outline crosses are on the same island, or off all islands."""
     crossed, _ = crossed_cells(frame, np.concatenate([_outline(islands), _outline(outer)]))
     mixed = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
     mixed.ravel()[crossed] = True
@@ -211,7 +212,7 @@ def _cells(frame: Frame, islands: NDArray[np.object_], outer: NDArray[np.object_
 
 
 def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Island of each point (m, 2), m, by the exact polygons; `BLOCKED` where there is none."""
+    """Return the island of each point (m, 2), m, by the exact polygons, or `BLOCKED`."""
     found = np.full(len(points), BLOCKED, dtype=np.int32)
     for index in reversed(range(len(outer))):
         found[shapely.intersects_xy(outer[index], points)] = index

@@ -9,18 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from ortools.constraint_solver import pywrapcp, routing_enums_pb2
 
-from planner.certificate import Certificate, Proof
 from planner.greedy_solver import GreedySolver, nearest_first
-from planner.plan import Plan, Visit
-from planner.problem import RoutingProblem
+from planner.plan import Certificate, Plan, Proof, Visit
+from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
 from planner.solvers import SolveLimit
-from planner.tour import make_plan, possible_next, spanning_bound
 
-FIRST_SOLUTIONS = (1, 10)  # of the anytime form
+FIRST_SOLUTIONS = (1, 10)  # limits of the first searches of `improve`
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
-MAX_INSERTED = 250  # nodes; inserting more takes longer than it is worth
-MAX_COUNTED = 1e9  # s that OR-Tools can count
-MAX_SECONDS = 60.0  # ends a search that is limited by work but finds no more solutions
+MAX_INSERTED = 250  # largest number of nodes for which insertion is worth its time
+MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, s
+MAX_SECONDS = 60.0  # time limit of a search that is limited by solutions but finds no more, s
 
 
 @dataclass(frozen=True)
@@ -33,9 +31,10 @@ class OrToolsSolver:
     name: str = "ortools"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan the rest of a task, within solutions or seconds, whichever comes first; the seed does not matter.
+        """Plan the rest of a task within solutions or seconds, whichever ends first. The seed has no effect.
 
-        FEASIBLE with a spanning-tree bound, or OPTIMAL where every tour was tried (up to three objects).
+        The plan is OPTIMAL up to three objects, for which all tours are tried. Otherwise it is FEASIBLE with the bound
+        of a spanning tree.
         """
         del seed
         started = time.perf_counter()
@@ -54,7 +53,7 @@ class OrToolsSolver:
     ) -> Iterator[Plan]:
         """Yield the nearest-first tour at once, then the tours of searches of 1 solution, 10, and all.
 
-        The search starts anew each time; the short ones cost little compared with the long one.
+        Each search starts again. The short ones cost little compared with the last.
         """
         started = time.perf_counter()
         best = GreedySolver().solve(problem)
@@ -71,13 +70,12 @@ class OrToolsSolver:
 
 
 def _with_budget(limit: SolveLimit | None) -> SolveLimit:
-    """The limit, by default on solutions."""
     limit = limit or SolveLimit()
     return replace(limit, work=DEFAULT_SOLUTIONS) if limit.work is limit.seconds is None else limit
 
 
 def best_of_all(problem: RoutingProblem, distances: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """The best tour and its length in integer distances (k, k), by trying all; for very few objects."""
+    """Return the best tour and its length in integer distances (k, k), by trying all tours. For few objects only."""
     best: list[Visit] = []
     best_length = math.inf
 
@@ -100,23 +98,21 @@ def _search(
     problem: RoutingProblem, distances: NDArray[np.int64], limit: SolveLimit, started: float
 ) -> list[Visit]:
     visit_of = _nodes(problem)
-    count = len(visit_of) + 1  # node 0 is both start and end: leading back costs nothing, so the tour is open
+    count = len(visit_of) + 1  # node 0 is both start and end; the leg back costs nothing, so the tour is open
     manager = pywrapcp.RoutingIndexManager(count, 1, 0)
     routing = pywrapcp.RoutingModel(manager)
     location = problem.stops(visit_of)
-    # 1 on every leg changes no comparison, and lets guided local search penalise legs of length 0.
+    # Adding 1 to every leg changes no comparison, and lets guided local search penalize legs of length 0.
     costs = distances[np.ix_(location, location)] + 1
     costs[:, 0] = 0
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
     if limit.stop is not None:
-        stopped = routing.solver().CustomLimit(
-            limit.stop.is_set
-        )  # the search also lets other threads run there
-        routing.AddSearchMonitor(stopped)
+        # The search also releases the interpreter lock here.
+        routing.AddSearchMonitor(routing.solver().CustomLimit(limit.stop.is_set))
     solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MAX_INSERTED else None
     if solution is None:
-        # Insertion places pairs before single nodes, which fails with full hands; or time ran out.
+        # Insertion fails with full hands, because it inserts pairs before single nodes. Otherwise, time ran out.
         greedy = nearest_first(problem)
         node = {visit: k + 1 for k, visit in enumerate(visit_of)}
         first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)
@@ -132,7 +128,7 @@ def _search(
 
 
 def _nodes(problem: RoutingProblem) -> list[Visit]:
-    """Visits of nodes 1, 2, ...: pickup and drop-off of each shipment in turn, then onboard objects."""
+    """Return the visits of nodes 1, 2, ...: pick and place of each shipment in turn, then places of onboard objects."""
     n = len(problem.shipments)
     nodes = [visit for k in range(n) for visit in (problem.pick(k), problem.place(k))]
     return nodes + [problem.place(k) for k in range(n, len(problem.names))]

@@ -1,4 +1,4 @@
-"""A plan: the order of visits, what it costs and how far from optimal it can be."""
+"""Plans: visits in order, their cost, and the certificate of their lower bound."""
 
 import enum
 import math
@@ -6,12 +6,41 @@ import numbers
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from planner.certificate import Certificate
 from planner.errors import ProblemError
 
 
+class Proof(enum.Enum):
+    """Kind of proof of a lower bound.
+
+    EXHAUSTIVE: Every order of visits was tried, or excluded because it cannot be shorter.
+    FULL_TABLE: The cost-to-go of every set of objects left was computed.
+    RELAXATION: The same for a relaxed problem that counts objects by groups, with a price on each pick. If the bound
+        exceeds that of the relaxation, a search excluded only states that cannot lead to a shorter tour.
+    SPANNING_TREE: A tour connects all its locations.
+    """
+
+    EXHAUSTIVE = "exhaustive"
+    FULL_TABLE = "full-table"
+    RELAXATION = "relaxation"
+    SPANNING_TREE = "spanning-tree"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A claim about the shortest tour, in whole units of length and in the metric of rounded distances."""
+
+    proof: Proof
+    unit: float  # m per unit
+    # bound without a search, units: the optimum of the table or of all tours, the relaxation at the start, or the
+    # length of the spanning tree. A higher lower bound of the plan depends on a complete search by the solver.
+    root: int
+    # groups of shipments that the relaxation counts together, each shipment in one group
+    groups: tuple[tuple[int, ...], ...] = ()
+    multipliers: tuple[int, ...] = ()  # price of picking each shipment, units
+
+
 class Status(enum.Enum):
-    """How much is known of a plan."""
+    """Quality of a plan."""
 
     OPTIMAL = "optimal"
     FEASIBLE = "feasible"
@@ -19,7 +48,7 @@ class Status(enum.Enum):
 
 
 class VisitKind(enum.StrEnum):
-    """What is done at a visit."""
+    """Kind of a visit."""
 
     PICK = "pick"
     PLACE = "place"
@@ -28,8 +57,8 @@ class VisitKind(enum.StrEnum):
 class Visit(NamedTuple):
     """One step of a task."""
 
-    kind: VisitKind  # whether the object is picked, or placed where it belongs
-    object: str  # name of the object
+    kind: VisitKind
+    object: str  # name
 
 
 @dataclass(frozen=True)
@@ -37,15 +66,15 @@ class Plan:
     """A feasible order of all remaining visits.
 
     Attributes:
-        visits: In order, without the start.
+        visits: Visits in order.
         cost: Length of the open tour, m.
-        lower_bound: No feasible tour is shorter than this, m.
-        status: OPTIMAL exactly when cost equals lower_bound up to rounding.
-        seconds: Wall time it took to find; never used in anything that must repeat.
-        certificate: What proves the lower bound; None for a plan that was read from a record.
+        lower_bound: Lower bound of all feasible tours, m.
+        status: OPTIMAL if and only if cost equals lower_bound up to rounding.
+        seconds: Wall time of the search. Nothing reproducible may depend on it.
+        certificate: Proof of the lower bound, or None for a plan read from a record.
 
     Raises:
-        ProblemError: A value is of another kind, or no finite number.
+        ProblemError: A value has the wrong type or is not finite.
     """
 
     visits: tuple[Visit, ...]
@@ -66,6 +95,6 @@ class Plan:
             raise ProblemError(f"Plan.status must be a Status, got {self.status!r}")
 
     def improves_on(self, other: "Plan") -> bool:
-        """Whether it is shorter, or known to be closer to the shortest, by more than rounding."""
+        """Return True if this plan is shorter, or known to be closer to the shortest, by more than rounding."""
         shorter = self.cost < other.cost - 1e-9
         return shorter or self.lower_bound > other.lower_bound + 1e-9 or self.status is not other.status

@@ -1,24 +1,26 @@
-"""The routing problem of equation 1: capacitated pickup and delivery with an open tour."""
+"""The routing problem of equation 1 (capacitated pickup and delivery with an open tour), and its tours."""
 
 import math
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
-from planner.plan import Visit, VisitKind
+from planner.plan import Certificate, Plan, Status, Visit, VisitKind
 
-MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # m; lengths and units of tours in between are ordinary floats
-ASYMMETRY = 1e-12  # share by which a distance may differ between both ways: rounding alone
+MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # m; range within which lengths and units of tours are normal floats
+ASYMMETRY = 1e-12  # relative difference of a distance between both directions that counts as rounding
 
 
 @dataclass(frozen=True)
 class Shipment:
-    """An object to fetch: indices into the distance matrix."""
+    """An object to fetch, by indices into the distance matrix."""
 
     pickup: int
     delivery: int
@@ -26,23 +28,23 @@ class Shipment:
 
 @dataclass(frozen=True, eq=False)
 class RoutingProblem:
-    """What is left to do from any state of the task (PAPER section 2).
+    """The rest of a task from any state (PAPER section 2).
 
-    Objects are numbered: first the shipments, then what is onboard.
+    Objects are numbered: first the shipments, then the onboard objects.
 
     Attributes:
         distances: Geodesic distances between locations, m, shape (k, k), symmetric, zero diagonal.
-        start: Location index where the person is now.
-        shipments: Objects that still lie about; several may share a pickup or a delivery.
-        onboard: Delivery index of each object that is carried now.
-        capacity: How many objects may be carried at once.
-        names: Of the objects, in the order of their numbers; by default the numbers themselves.
-        resolution: Precision of the distances, m: they are rounded to it, and tours are equal that differ by the
-            rounding of their legs. None: distances are exact, and tours compared to 1e-9 of their length.
+        start: Index of the person's location.
+        shipments: Loose objects. Several may share a pickup or a delivery.
+        onboard: Index of the delivery of each carried object.
+        capacity: Largest number of objects that can be carried.
+        names: Names of the objects, in the order of their numbers, which are the default names.
+        resolution: Precision of the distances, m. They are rounded to it, and tours count as equal if they differ only
+            by the rounding of their legs. None if distances are exact. Tours are then compared to 1e-9 of their length.
 
     Raises:
-        ProblemError: Not square, negative, not finite, of a scale beyond computing, asymmetric, an index out of range,
-            more onboard than the capacity, or names that are too few, too many or not unique.
+        ProblemError: Distances are not square, negative, not finite, too large, too small or asymmetric, an index is
+            out of range, more is onboard than the capacity, or names are not unique or not one per object.
 
     Example:
         >>> distances = np.array([[0.0, 3.0, 5.0], [3.0, 0.0, 4.0], [5.0, 4.0, 0.0]])
@@ -72,7 +74,7 @@ class RoutingProblem:
 
     @cached_property
     def used(self) -> list[int]:
-        """The locations that every tour visits, ascending: indices into the distances."""
+        """Indices of the locations that every tour visits, ascending."""
         places = {self.start, *self.onboard}
         return sorted(places.union(*((s.pickup, s.delivery) for s in self.shipments)))
 
@@ -82,26 +84,26 @@ class RoutingProblem:
         return integer_distances(self.distances, self.used, self.resolution)
 
     def tolerance(self, length: float) -> float:
-        """Tours of about this length, m, are equal if they differ by no more than this, m."""
+        """Return the largest difference between tours of about this length that count as equal, m."""
         if self.resolution is None:
             return TOLERANCE * length
         return 2 * self.resolution * (len(self.shipments) + len(self.names))
 
     @cached_property
     def number(self) -> dict[str, int]:
-        """Name -> number of each object."""
+        """Number of each object, by name."""
         return {name: k for k, name in enumerate(self.names)}
 
     def pick(self, shipment: int) -> Visit:
-        """The visit that picks a shipment, by its number."""
+        """Return the visit that picks a shipment."""
         return Visit(VisitKind.PICK, self.names[shipment])
 
     def place(self, number: int) -> Visit:
-        """The visit that places a shipment or an object onboard, by its number."""
+        """Return the visit that places a shipment or an onboard object."""
         return Visit(VisitKind.PLACE, self.names[number])
 
     def location(self, visit: Visit) -> int:
-        """Index into the distances of where a visit happens."""
+        """Return the index of a visit's location."""
         number, n = self.number[visit.object], len(self.shipments)
         if number >= n:
             return self.onboard[number - n]
@@ -109,7 +111,7 @@ class RoutingProblem:
         return shipment.pickup if visit.kind is VisitKind.PICK else shipment.delivery
 
     def stops(self, visits: Iterable[Visit]) -> list[int]:
-        """The start and the location of each visit: indices into the distances."""
+        """Return the indices of the start and of the location of each visit."""
         return [self.start, *map(self.location, visits)]
 
     def _check_distances(self) -> None:
@@ -135,7 +137,7 @@ class RoutingProblem:
             )
 
     def _check_scale(self) -> None:
-        """Refuse distances on the tour whose sums, or whose smallest parts, floats could not hold."""
+        """Reject distances whose sums or smallest parts do not fit into floats."""
         distances = self.distances[np.ix_(self.used, self.used)]
         if not self.used or not distances.any():
             return
@@ -161,3 +163,74 @@ class RoutingProblem:
         for what, index in indices:
             if not 0 <= index < len(self.distances):
                 raise ProblemError(f"{what} {index} is out of range for {len(self.distances)} locations")
+
+
+def possible_next(problem: RoutingProblem, visits: Sequence[Visit] = ()) -> Iterator[Visit]:
+    """Yield the visits that capacity and precedence allow after the given ones."""
+    done, n = set(visits), len(problem.shipments)
+    load = len(problem.onboard)
+    for visit in visits:
+        load += 1 if visit.kind is VisitKind.PICK else -1
+    for k in range(n, len(problem.names)):
+        if problem.place(k) not in done:
+            yield problem.place(k)
+    for k in range(n):
+        if problem.pick(k) not in done:
+            if load < problem.capacity:
+                yield problem.pick(k)
+        elif problem.place(k) not in done:
+            yield problem.place(k)
+
+
+def tour_length(
+    problem: RoutingProblem, visits: Iterable[Visit], distances: NDArray[Any] | None = None
+) -> float:
+    """Return the length of an open tour.
+
+    `distances`, (k, k), replace the problem's own. With integers below 2^53 the result is exact.
+    """
+    stops = problem.stops(visits)
+    return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
+
+
+def spanning_bound(problem: RoutingProblem) -> int:
+    """Return the length of the minimum spanning tree of a tour's locations, units, as a lower bound of tours."""
+    from scipy.sparse.csgraph import minimum_spanning_tree  # imported late, because it is slow to import
+
+    used = problem.used
+    if len(used) == 1:
+        return 0
+    # A stored 0 would mean a missing edge, so add 1 to every edge and subtract it again from the tree.
+    tree = minimum_spanning_tree(problem.integers.legs[np.ix_(used, used)] + 1)
+    return int(tree.sum()) - (len(used) - 1)
+
+
+def make_plan(
+    problem: RoutingProblem,
+    metric: NDArray[np.int64],
+    visits: Sequence[Visit],
+    bound: int,
+    started: float,
+    certificate: Certificate,
+) -> Plan:
+    """Make a plan whose lower bound also holds for the given distances, which are not in whole units.
+
+    The plan is OPTIMAL if the tour meets the bound in the integer distances, and in the given ones to the problem's
+    tolerance. The latter fails only if the distances are not a metric.
+
+    Args:
+        problem: The problem.
+        metric: Integer distances in which the problem was solved, (k, k).
+        visits: Visits in order.
+        bound: Lower bound of all tours in these distances.
+        started: `time.perf_counter()` at the start of solving.
+        certificate: Proof of the bound.
+    """
+    integers, cost = problem.integers, tour_length(problem, visits)
+    lower = certificate.unit * (bound - integers.rounding * len(visits))  # legs may have been rounded up
+    met = tour_length(problem, visits, metric) <= bound + integers.tie
+    rounding = (problem.resolution or 0.0) * len(visits) / 2
+    optimal = met and cost - lower <= problem.tolerance(cost) + rounding
+    status = Status.OPTIMAL if optimal else Status.FEASIBLE
+    lower = cost if optimal else max(0.0, min(cost, lower))
+    return Plan(tuple(visits), cost, lower, status, time.perf_counter() - started, certificate)

@@ -1,4 +1,4 @@
-"""Routing problems, plans and what proves them as JSON: what `mjsim plan` reads and writes."""
+"""Routing problems, plans and certificates as JSON, for `mjsim plan`."""
 
 import json
 from typing import Annotated, Any, Literal, TypeVar
@@ -8,13 +8,12 @@ import numpy as np
 from msgspec import Meta, Struct
 
 from mjsim.support.files import read_json
-from planner.certificate import Certificate, Proof
 from planner.errors import ProblemError
-from planner.plan import Plan, Status, Visit, VisitKind
+from planner.plan import Certificate, Plan, Proof, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
 FORMAT = 2
-EXACT = 1 << 53  # whole numbers up to here are exact as floats
+EXACT = 1 << 53  # largest integer up to which all integers are exact as floats
 PROBLEM = (
     'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
     'and if need be "start": 0, "onboard": [1], "capacity": 2'
@@ -57,14 +56,14 @@ class _Claim(Struct, forbid_unknown_fields=True):
 
 
 def problem_from_json(text: str | bytes) -> RoutingProblem:
-    """Read a problem: capacity, start, distances, shipments (`{"pickup": i, "delivery": j}`), onboard (`[j, ...]`).
+    """Read a problem: distances, shipments (`{"pickup": i, "delivery": j}`), start, onboard (`[j, ...]`), capacity.
 
-    `capacity` defaults to 2, `start` to 0, `onboard` to nothing. Indices count the rows of `distances`, in metres;
-    `onboard` holds the delivery of each carried object.
+    `start` is 0 by default, `onboard` empty and `capacity` 2. Indices count the rows of `distances`, which are in
+    metres. `onboard` contains the delivery of each carried object.
 
     Raises:
-        ProblemError: Not JSON, a field is missing, unknown or ill-typed, or the problem is malformed; one line that
-            names the fault.
+        ProblemError: The text is not JSON, a field is missing, unknown or of the wrong type, or the problem is
+            malformed. The message is one line.
     """
     raw = _decode(text, _Problem, PROBLEM)
     rows = raw.distances
@@ -77,7 +76,7 @@ def problem_from_json(text: str | bytes) -> RoutingProblem:
 
 
 def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
-    """Write the visits (location indices), cost, lower bound (m), status and seconds of a plan."""
+    """Write the visits (location indices), cost and lower bound (m), status and seconds of a plan."""
     return json.dumps(
         {
             "visits": [problem.location(visit) for visit in plan.visits],
@@ -92,8 +91,8 @@ def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
 def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
     """Write a plan of a problem with its certificate.
 
-    A visit is `["pick", k]` or `["place", k]` of shipment k, or `["place onboard", k]` of what was carried at the
-    start, k counting from 0 as in the problem.
+    A visit is `["pick", k]` or `["place", k]` of shipment k, or `["place onboard", k]` of an object carried at the
+    start. k counts from 0 as in the problem.
     """
     fields = {name: getattr(plan, name) for name in ("cost", "lower_bound", "status", "certificate")}
     visits = [_action(problem, visit) for visit in plan.visits]
@@ -102,11 +101,11 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
-    """Read what `claim_to_json` wrote about a plan of this problem; nothing of it is checked yet.
+    """Read the output of `claim_to_json` for a plan of this problem. Its claims are not checked.
 
     Raises:
-        ProblemError: Not JSON, a field is missing, unknown or ill-typed, or a visit is of no object of the problem; one
-            line that names the fault.
+        ProblemError: The text is not JSON, a field is missing, unknown or of the wrong type, or a visit names an
+            unknown object. The message is one line.
     """
     raw = _decode(text, _Claim, CLAIM)
     proof = raw.certificate
@@ -115,7 +114,7 @@ def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
     return Plan(visits, raw.cost, raw.lower_bound, raw.status, seconds=0.0, certificate=certificate)
 
 
-def _decode(text: str | bytes, kind: type[T], remedy: str) -> T:
+def _decode(text: str | bytes, kind: type[T], hint: str) -> T:
     try:
         if isinstance(text, bytes):
             text = text.decode("utf-8-sig")
@@ -123,11 +122,11 @@ def _decode(text: str | bytes, kind: type[T], remedy: str) -> T:
         read_json(text)
         return found
     except UnicodeError as error:
-        raise ProblemError(f"not UTF-8 ({error}); {remedy}") from error
-    except ValueError as error:  # names the path of the value, what was expected and what came
-        raise ProblemError(f"{error}; {remedy}") from error
+        raise ProblemError(f"not UTF-8 ({error}); {hint}") from error
+    except ValueError as error:  # contains the path of the value, and the expected and the given type
+        raise ProblemError(f"{error}; {hint}") from error
     except RecursionError as error:
-        raise ProblemError(f"nested too deeply; {remedy}") from error
+        raise ProblemError(f"nested too deeply; {hint}") from error
 
 
 def _action(problem: RoutingProblem, visit: Visit) -> tuple[Action, int]:
@@ -141,7 +140,7 @@ def _visit(problem: RoutingProblem, k: int, action: Action, number: int) -> Visi
     n = len(problem.shipments)
     count = len(problem.onboard) if action == "place onboard" else n
     if not 0 <= number < count:
-        raise ProblemError(f"visits[{k}] is of number {number}, but the problem has {count} to {action}")
+        raise ProblemError(f"visits[{k}] has the number {number}, but the problem has {count} to {action}")
     return (
         problem.pick(number) if action == "pick" else problem.place(number + n * (action == "place onboard"))
     )

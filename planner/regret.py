@@ -1,10 +1,9 @@
-"""What each possible next visit costs compared with the best one."""
+"""Regrets: costs of possible next visits compared with the best one."""
 
 import math
 from dataclasses import dataclass, replace
 
 from planner.errors import ProblemError
-from planner.exact.deadline import Deadline
 from planner.exact.instance import make_instance
 from planner.exact.multipliers import first_bound, grown, warm_bound
 from planner.exact.solver import ExactSolver
@@ -13,35 +12,38 @@ from planner.exact.task_table import TaskTable
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
-from planner.problem import RoutingProblem
+from planner.problem import RoutingProblem, possible_next, tour_length
 from planner.route import TaskState
-from planner.solvers import SolveLimit, Solver
+from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
-from planner.tour import possible_next, tour_length
 
 RADIUS = 1.0  # m
-MIN_RADIUS = 0.1  # m; below this a pass is not tried again
-MAX_ROWS = 1 << 14  # of the table of the bound of the pass
-MAX_STATES = 3_000_000  # of the pass: some 200 MB
+MIN_RADIUS = 0.1  # m; no pass is tried with a smaller radius
+MAX_ROWS = 1 << 14  # largest table of the bound of a pass
+MAX_STATES = 3_000_000  # largest number of states of a pass, in about 200 MB
 SAME = 1e-6  # m
 
 
 @dataclass(frozen=True)
 class Regret:
-    """A possible next visit."""
+    """The regret of a possible next visit."""
 
-    visit: Visit  # the visit
-    cost: float  # length of the rest of the task if it is done next and the rest is as short as possible, m
-    regret: float  # by how much that exceeds the least such cost, m
-    proven: bool  # whether the numbers are exact; where `capped`, whether they are true lower bounds
-    capped: bool = False  # whether cost and regret are only known to be at least this
+    visit: Visit
+    cost: float  # length of the rest of the task if this visit is next, m
+    regret: float  # excess of that over the least such cost, m
+    proven: bool  # True if the numbers are exact, or if `capped`, true lower bounds
+    capped: bool = False  # True if cost and regret are only lower bounds
 
 
 class RegretEvaluator:
-    """Evaluates possible and actual visits of a task, always with the exact planner; results repeat bit for bit.
+    """Evaluates possible and actual visits of a task with the exact planner. Results are bit-identical.
 
-    `limit` is that of each search, beyond 18 objects left; None for the planner's own budget of work. `all` gives
-    regrets up to `radius` exactly, m.
+    Args:
+        geodesics: Distances of the house.
+        solver: The exact planner.
+        capacity: Largest number of objects that can be carried.
+        limit: Limit of each search beyond 18 objects left, or None for the planner's own budget.
+        radius: `all` finds regrets up to this value exactly, m.
     """
 
     def __init__(
@@ -61,16 +63,18 @@ class RegretEvaluator:
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
 
     def limited(self, limit: SolveLimit) -> "RegretEvaluator":
-        """A new evaluator like this one, for use in a thread, with a limit of each search."""
+        """Return a new evaluator like this one with a limit for each search, for use in a thread."""
         return RegretEvaluator(
             self._geodesics, solver=self._solver, capacity=self._capacity, limit=limit, radius=self._radius
         )
 
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
-        """The cost of each possible next visit compared with the best one, the best first.
+        """Return the regret of each possible next visit, the best visit first.
 
-        `plan` is that for this state or one before; if it is proven and of this state, no other is searched.
-        `UnreachableError` names the objects that cannot be fetched or delivered.
+        `plan` is the plan for this state or an earlier one. If it is proven and for this state, the search is skipped.
+
+        Raises:
+            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
         """
         if self._last is None or not same_state(self._last[0], state):
             problem = self._problems.problem(state)
@@ -84,9 +88,9 @@ class RegretEvaluator:
         return dict(self._last[1])
 
     def of(self, state: TaskState, visit: Visit, plan: Plan | None = None) -> float | None:
-        """By how much a visit makes the rest of the task longer than the best one does, m, however large.
+        """Return the exact regret of a visit, m, or None if the visit is not possible or nothing is proven.
 
-        None where the visit is not possible or nothing is proven. Arguments and errors as in `all`.
+        Arguments and errors are those of `all`.
         """
         if self._last is not None and same_state(self._last[0], state):
             known = self._last[1].get(visit)
@@ -100,7 +104,7 @@ class RegretEvaluator:
             return next(regret.regret for regret in _ranked(problem, *costs) if regret.visit == visit)
         before = plan if plan is not None and _is_best(plan, problem) else None
         before = before or self._solver.solve(problem, limit=self._limit)
-        warm = NOTHING_KNOWN.updated(problem, before)  # halves the work
+        warm = NOTHING_KNOWN.updated(problem, before)  # halves the time
         *_, rest = self._solver.improve(after(problem, visit), limit=self._limit, warm=warm)
         if not before.status is rest.status is Status.OPTIMAL:
             return None
@@ -109,7 +113,7 @@ class RegretEvaluator:
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:
-    """Whether the person and all objects are at the same place in both states."""
+    """Return True if the person and all objects are at the same places in both states."""
     return one is other or (one.position, one.carried, one.loose) == (
         other.position,
         other.carried,
@@ -118,7 +122,11 @@ def same_state(one: TaskState, other: TaskState) -> bool:
 
 
 def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
-    """The rest of the task after a visit; shipments and onboard keep their order. `ProblemError` if impossible."""
+    """Return the rest of the task after a visit. Shipments and onboard objects keep their order.
+
+    Raises:
+        ProblemError: The visit is not possible.
+    """
     if visit not in possible_next(problem):
         raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
     shipments, onboard = list(problem.shipments), list(problem.onboard)
@@ -143,20 +151,19 @@ def regrets(
     radius: float = RADIUS,
     plan: Plan | None = None,
 ) -> tuple[Regret, ...]:
-    """What each possible next visit costs, the best visit first.
+    """Return the regrets of all possible next visits, the best visit first.
 
-    The exact planner answers for all visits at once: from its full table where that fits (18 objects), else by one
-    pass over all tours that are at most `radius` longer than the best. Beyond that radius, regrets are lower bounds,
-    at least the radius, and `capped`. Where the pass grows too large, the radius is halved, down to 0.1 m;
-    where even that is too much or the best tour was not proven, and for other capacities and solvers, the rest of
-    the task is solved after each visit.
+    The exact planner evaluates all visits at once: from its full table if that fits (18 objects), else by one pass over
+    all tours at most `radius` longer than the best. Larger regrets are lower bounds of at least the radius, and
+    `capped`. If the pass grows too large, the radius is halved, down to 0.1 m. If even that is too much, if the best
+    tour is not proven, and for other capacities and solvers, the rest of the task is solved after each visit.
 
     Args:
-        problem: What is left to do.
-        solver: Plans the rest; with the exact one, regrets are exact where `proven` and not `capped`.
-        limit: Handed to the solver, for each problem that it solves.
-        radius: Regrets up to here are wanted exactly, m.
-        plan: A plan of this problem, if there is one: if it is proven it need not be found again.
+        problem: The rest of the task.
+        solver: Planner. With the exact one, regrets that are `proven` and not `capped` are exact.
+        limit: Limit for each problem that the planner solves.
+        radius: Regrets up to this value are found exactly, m.
+        plan: A plan of this problem, or None. If it is proven, the search for it is skipped.
 
     Raises:
         ProblemError: The radius is negative.
@@ -172,14 +179,14 @@ def regrets(
 def one_by_one(
     problem: RoutingProblem, solver: Solver, *, limit: SolveLimit | None = None
 ) -> tuple[Regret, ...]:
-    """Solve the rest of the task after each possible next visit; with any solver, for any problem."""
+    """Solve the rest of the task after each possible next visit, with any solver."""
     found = []
     for visit in possible_next(problem):
         plan = solver.solve(after(problem, visit), limit=limit)
         cost = float(problem.distances[problem.start, problem.location(visit)]) + plan.cost
         found.append((cost, visit, plan.status is Status.OPTIMAL))
     least = min((cost for cost, _, _ in found), default=0.0)
-    proven = all(proven for _, _, proven in found)  # a regret is only as good as the least cost
+    proven = all(proven for _, _, proven in found)  # every regret depends on the least cost
     found.sort(key=lambda entry: entry[0])
     return tuple(Regret(visit, cost, cost - least, proven) for cost, visit, _ in found)
 
@@ -191,7 +198,7 @@ def _ranked(
     longest: float = math.inf,
     least: Costs | None = None,
 ) -> tuple[Regret, ...]:
-    """Regrets from costs in units of `unit` m, the best first; `least` bounds those that are above `longest`."""
+    """Return regrets from costs in units of `unit` m, the best first. `least` bounds costs above `longest`."""
     found = []
     for visit in possible_next(problem):
         cost, capped = costs[visit], costs[visit] > longest
@@ -215,7 +222,10 @@ def _beyond_table(
 def _around_best(
     problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...] | None:
-    """Regrets within the radius of a proven plan, from one pass; None if that is too much or there is no such plan."""
+    """Return the regrets within the radius of a proven plan, from one pass.
+
+    None if the pass is too large or there is no proven plan.
+    """
     metric, unit = problem.integers.metric, problem.integers.unit
     if plan is None or plan.status is not Status.OPTIMAL:
         plan = solver.solve(problem, limit=limit)
@@ -242,7 +252,7 @@ def _around_best(
 
 
 def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
-    """Whether a plan is proven and of this problem, not of an earlier state of the task."""
+    """Return True if a plan is proven, and for this problem rather than an earlier state of the task."""
     visits = {problem.place(k) for k in range(len(problem.names))}
     visits |= {problem.pick(k) for k in range(len(problem.shipments))}
     if plan.status is not Status.OPTIMAL or set(plan.visits) != visits:

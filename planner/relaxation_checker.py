@@ -1,4 +1,4 @@
-"""The relaxation of a certificate in plain numpy: its table, and every state that its bound cannot leave out."""
+"""The relaxation of a certificate in plain NumPy: its table, and all states that its bound cannot exclude."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planner.errors import ProblemError
 from planner.problem import RoutingProblem
 
-MAX_PRICES = 100  # times the longest tour; beyond it, rounding would matter
+MAX_PRICES = 100  # largest sum of prices in lengths of the longest tour; beyond it, rounding would matter
 
 Lengths = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -17,30 +17,35 @@ Field = NDArray[Any]
 
 
 def closed(problem: RoutingProblem) -> Lengths:
-    """Shortest connections through locations of the tour, m, (k, k); no tour is shorter in the given distances."""
+    """Return the shortest connections through locations of the tour, m, (k, k)."""
     shortest: Lengths = np.minimum(problem.distances, problem.distances.T)
     for k in problem.used:
         shortest = np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :])
     return shortest
 
 
-class States(NamedTuple):
+class StateArrays(NamedTuple):
     """States of a task, each field (states,)."""
 
     left: Field  # objects left, as bits
-    place: Field  # bin b, or m + i at object i, just picked, or m + n at the start
-    held: Field  # bin of the object in hand, m for none
+    place: Field  # bin b, or m + i at object i that was just picked, or m + n at the start
+    held: Field  # bin of the object in hand, or m for an empty hand
     cost: Field  # length so far with the prices of picks, m
 
 
 class Relaxation:
     """Shortest relaxed rest of a task from every state, for capacity one or two, in floats.
 
-    A row of the table tells how many of each group of objects are left; any of a group may be picked, though none
-    twice in a row, each at a price, m. Every real tour is a relaxed one that pays each price once. An object whose bin
-    is here is left here: in a metric that is never wrong. Sums are rounded by far less than 1e-9 of a tour; prices so
-    large that this would not hold are a `ProblemError`. `exact` says whether the table holds for the distances as they
-    are given, not only for shortest connections; no tour is shorter than `root`, m.
+    A row of the table stands for numbers of objects left per group. Any object of a group may be picked, but none twice
+    in a row, each at a price, m. Every real tour is a relaxed tour that pays each price once. An object is left
+    whenever its bin is reached, which is always right in a metric.
+
+    Attributes:
+        exact: True if the table holds for the given distances, not only for shortest connections.
+        root: Lower bound of all tours, m.
+
+    Raises:
+        ProblemError: Prices are so large that rounding could exceed 1e-9 of a tour.
     """
 
     def __init__(self, problem: RoutingProblem, group: Whole, prices: Lengths) -> None:
@@ -59,7 +64,7 @@ class Relaxation:
         self._prices = prices
         size = np.bincount(group, minlength=1)
         strides = np.concatenate([[1], np.cumprod(size + 1)])
-        self._stride = strides[group]  # by how many rows picking an object goes down
+        self._stride = strides[group]  # difference of rows before and after a pick
         rows = np.arange(strides[-1])
         self._rest = self._filled(group, [rows // s % (k + 1) for s, k in zip(strides, size, strict=False)])
         here, after = self._begin()
@@ -67,10 +72,13 @@ class Relaxation:
         self.root = min(first) - float(prices.sum()) if places[:-1] else 0.0
 
     def _filled(self, group: Whole, left: list[Whole]) -> Lengths:
-        """The table: column b m + c is at bin b with an object for bin c (c = b: none), m m + i at object i."""
+        """Return the filled table.
+
+        Column b m + c is at bin b with an object for bin c (c = b: empty hands), and column m m + i is at object i.
+        """
         n, m, home, total = len(self._home), self._bins, self._home, np.sum(left, axis=0)
         leave, to_bin, between = self._d[:m, :m], self._d[m:-1, :m], self._d[m:-1, m:-1].copy()
-        np.fill_diagonal(between, np.inf)  # no object follows itself
+        np.fill_diagonal(between, np.inf)  # no object is picked twice in a row
         if self._hands == 1:
             between[:] = np.inf
         own = to_bin[np.arange(n), home]
@@ -97,9 +105,10 @@ class Relaxation:
         return table
 
     def shorter(self, limit: float, max_states: int) -> tuple[bool, int] | None:
-        """Whether a tour shorter than a limit, m, exists, and how many states were visited; None if too many.
+        """Return True if there is a tour shorter than a limit, m, and the number of visited states.
 
-        Layer by layer of picks, all states are visited whose cost so far plus bound stays below the limit.
+        All states whose cost so far plus bound is below the limit are visited, layer by layer of picks. The result is
+        None if there are more than `max_states`.
         """
         limit += float(self._prices.sum())
         here, after = self._begin()
@@ -117,42 +126,42 @@ class Relaxation:
             )
         return False, states
 
-    def _begin(self) -> tuple[States, States]:
-        """States after the first leg: those with all objects left, and those with one picked."""
+    def _begin(self) -> tuple[StateArrays, StateArrays]:
+        """Return the states after the first leg: those with all objects left, and those after one pick."""
         n, m, held = len(self._home), self._bins, self._carried
         everything = (1 << n) - 1
         if len(held) == 2:
             pairs = [(b, c if c != b else m) for b, c in (held, held[::-1])]
             legs = [self._d[-1, b] for b, _ in pairs]
             at, other = np.array(pairs, np.int64).T
-            return States(np.full(2, everything), at, other, np.array(legs)), NONE
+            return StateArrays(np.full(2, everything), at, other, np.array(legs)), NONE
         all_left, place, bin_held = np.array([[everything], [m + n], held or [m]], np.int64)
-        start = States(all_left, place, bin_held, np.zeros(1))
+        start = StateArrays(all_left, place, bin_held, np.zeros(1))
         return self._placed(start), _joined([NONE, *self._picked(start)])
 
-    def _placed(self, states: States) -> States:
-        """Where a leg to the bin of the one object in hand leads."""
+    def _placed(self, states: StateArrays) -> StateArrays:
+        """Return the states after a leg to the bin of the object in hand."""
         left, place, held, cost = (field[states.held < self._bins] for field in states)
-        return States(left, held, np.full_like(held, self._bins), cost + self._d[place, held])
+        return StateArrays(left, held, np.full_like(held, self._bins), cost + self._d[place, held])
 
-    def _picked(self, states: States) -> Iterator[States]:
-        """Where a leg to an object leads, and with two in hand the leg to either bin."""
+    def _picked(self, states: StateArrays) -> Iterator[StateArrays]:
+        """Yield the states after a leg to an object and, with two objects in hand, a leg to either bin."""
         m = self._bins
         for j, c in enumerate(self._home.tolist()):
             left, place, held, cost = (field[(states.left >> j & 1).astype(bool)] for field in states)
             left, cost = left ^ 1 << j, cost + self._d[place, m + j] + self._prices[j]
             empty, full = held == m, (held < m) & (self._hands == 2)
             only = left[empty]
-            yield States(only, np.full_like(only, m + j), np.full_like(only, c), cost[empty])
+            yield StateArrays(only, np.full_like(only, m + j), np.full_like(only, c), cost[empty])
             left, first, cost = left[full], held[full], cost[full]
             kept = np.where(first == c, m, c)
-            yield States(left, first, kept, cost + self._d[m + j, first])
-            yield States(
+            yield StateArrays(left, first, kept, cost + self._d[m + j, first])
+            yield StateArrays(
                 left, np.full_like(first, c), np.where(first == c, m, first), cost + self._d[m + j, c]
             )
 
-    def _rest_of(self, states: States) -> Lengths:
-        """Lower bounds of the cost-to-go, prices included, m, (states,)."""
+    def _rest_of(self, states: StateArrays) -> Lengths:
+        """Return lower bounds of the cost-to-go, including prices, m, (states,)."""
         m, row = self._bins, np.zeros(len(states.left), np.int64)
         for j, stride in enumerate(self._stride.tolist()):
             row += stride * (states.left >> j & 1)
@@ -161,20 +170,20 @@ class Relaxation:
         rest: Lengths = self._rest[row, column]
         return rest
 
-    def _best(self, parts: list[States], limit: float) -> States:
-        """The shortest path to each state, of those from which a tour shorter than the limit may exist."""
+    def _best(self, parts: list[StateArrays], limit: float) -> StateArrays:
+        """Return the shortest path to each state from which a tour shorter than the limit may exist."""
         states = _joined(parts)
         kept = states.cost + self._rest_of(states) < limit
-        states = States(*(field[kept] for field in states))
+        states = StateArrays(*(field[kept] for field in states))
         order = np.lexsort((states.cost, states.held, states.place, states.left))
-        states = States(*(field[order] for field in states))
+        states = StateArrays(*(field[order] for field in states))
         first = np.ones(len(order), bool)
         first[1:] = np.any([field[1:] != field[:-1] for field in states[:3]], axis=0)
-        return States(*(field[first] for field in states))
+        return StateArrays(*(field[first] for field in states))
 
 
-NONE = States(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
+NONE = StateArrays(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))
 
 
-def _joined(parts: list[States]) -> States:
-    return States(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+def _joined(parts: list[StateArrays]) -> StateArrays:
+    return StateArrays(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))

@@ -1,4 +1,4 @@
-"""The state of a task, the route through what is left of it, and where routes come from."""
+"""The state of a task, routes through the rest of it, and the interface of plan sources."""
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
@@ -15,13 +15,14 @@ class TaskState:
     """The state of a task in progress.
 
     Attributes:
-        position: Where the person is, m.
-        loose: Where each object lies that is neither carried nor delivered, by name, m.
-        carried: Names of the objects that are carried.
-        deliveries: Where a person stands to deliver each loose or carried object, by name, m; may hold more names.
+        position: Position of the person, m.
+        loose: Position of each object that is neither carried nor delivered, by name, m.
+        carried: Names of the carried objects.
+        deliveries: Place where a person stands to deliver each loose or carried object, by name, m. May contain more
+            names.
 
     Raises:
-        ProblemError: An object is both loose and carried, carried twice, or has no delivery.
+        ProblemError: An object is both loose and carried, is carried twice, or has no delivery.
     """
 
     position: XY
@@ -42,19 +43,19 @@ class TaskState:
 
 @dataclass(frozen=True)
 class Route:
-    """The visits that are left, in order."""
+    """The remaining visits in order."""
 
-    visits: tuple[Visit, ...]  # remaining visits
-    plan: Plan  # the plan as it was made, visits included that are done by now
+    visits: tuple[Visit, ...]
+    plan: Plan  # the original plan, including visits that are done by now
 
     @property
     def next(self) -> Visit | None:
-        """The next visit, or None when everything is done."""
+        """The next visit, or None if everything is done."""
         return self.visits[0] if self.visits else None
 
 
 def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
-    """The visits that are still to be done if those done are the first ones, else None."""
+    """Return the visits still to be done if the done ones are the first ones, else None."""
     loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
     carried = {visit.object for visit in visits} - loose
     done = 0
@@ -72,30 +73,34 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
 
 
 class PlanSource(abc.ABC):
-    """Gives the planner its routes."""
+    """A source of routes for the planner."""
 
-    # runs a search for better plans in the background; None where each plan is final
+    # starts a search for better plans in the background; None if each plan is final
     start: Callable[[Callable[[], None]], object] | None = None
 
     @abc.abstractmethod
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """The visits that are left of a route, or None if another plan is due."""
+        """Return the remaining visits of a route, or None if another plan is due."""
 
     @abc.abstractmethod
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
-        """A new route; see `Planner.ask`. `route` is the one before."""
+        """Return a new route (see `Planner.ask`). `route` is the previous one."""
 
-    def check(self, state: TaskState) -> None:  # noqa: B027 - a source may have nothing to check
-        """Raise UnreachableError if an object cannot be fetched or delivered; `names` lists them."""
+    def check(self, state: TaskState) -> None:  # noqa: B027 - optional
+        """Check that every object can be fetched and delivered.
+
+        Raises:
+            UnreachableError: Objects cannot be. `names` lists them.
+        """
 
     @property
     def pending(self) -> bool:
-        """Whether `better` has to be called."""
+        """True if `better` has to be called."""
         return False
 
     def better(self, state: TaskState, route: Route) -> Route | None:  # noqa: ARG002 - each plan is final
-        """A better route for the same task than the present one, or the same with a better bound, if there is one."""
+        """Return a route for the same task that is better or has a better bound, or None."""
         return None
 
-    def close(self) -> None:  # noqa: B027 - a source may have nothing to stop
+    def close(self) -> None:  # noqa: B027 - optional
         """Stop searching."""

@@ -1,4 +1,4 @@
-"""What to do next in a task, and what the alternatives cost: at once, from a thread, or live for a person."""
+"""The planner of a session, which answers immediately, from a thread, or live for a person."""
 
 import contextlib
 import enum
@@ -16,31 +16,31 @@ from planner.route import PlanSource, Route, TaskState
 from planner.solvers import SolveLimit
 
 T = TypeVar("T")
-REGRET_SECONDS = 5.0  # s of wall time for the regrets of one state, live
+REGRET_SECONDS = 5.0  # limit on the wall time for the regrets of one state in live mode, s
 
 
 class Mode(enum.Enum):
-    """How a planner answers, and in how many threads it works at most."""
+    """Mode of a planner. The value is the largest number of threads."""
 
-    INLINE = 0  # when it is asked
-    THREAD = 1  # the same, from a thread in the order of the questions; callers wait for what they need
-    LIVE = 32  # a first plan when it is asked, better plans and regrets from threads
+    INLINE = 0  # answers immediately
+    THREAD = 1  # gives the same answers from a thread, in order; callers wait for those that they need
+    LIVE = 32  # gives a first plan immediately, and better plans and regrets from threads
 
 
 class Planner:
-    """Keeps the route of a task, and knows what alternatives to its next visit cost.
+    """Keeps the route of a task, and finds the regrets of its alternatives.
 
-    A route is kept while what was done are its first visits and no object was pushed far; else there is a new plan
-    (PAPER section 2). In the modes `INLINE` and `THREAD` answers repeat, as budgets count work. In `LIVE` the caller
-    never waits for a proof, and answers depend on the machine's speed.
+    A route is kept while the done visits are its first ones and no object was pushed far. Otherwise there is a new plan
+    (PAPER section 2). In the modes `INLINE` and `THREAD`, answers are reproducible, because budgets count work. In
+    `LIVE`, the caller never waits for a proof, and answers depend on the machine's speed.
 
     Args:
-        source: Where plans come from.
-        evaluator: Finds regrets.
-        mode: How it answers.
+        source: Makes the plans.
+        evaluator: Finds the regrets.
+        mode: Mode of the planner.
 
     Attributes:
-        replans: How often a new plan was made because the route no longer fitted.
+        replans: Number of new plans made because the route no longer fitted.
     """
 
     def __init__(self, source: PlanSource, evaluator: RegretEvaluator, mode: Mode = Mode.INLINE) -> None:
@@ -53,23 +53,23 @@ class Planner:
         self._task: tuple[TaskState, Plan] | None = None  # the last state, and its plan
         self._asked = False
         self._running: list[Future[Any]] = []
-        self._latest: Future[None] | None = None  # the last job in the thread
-        self._regrets: Future[Mapping[Visit, Regret]] | None = None  # live, of that state
-        self._stop = threading.Event()  # stops looking for these
+        self._latest: Future[None] | None = None  # last job in the thread
+        self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of that state in live mode
+        self._stop = threading.Event()  # stops the search for these regrets
         self._late: list[tuple[Any, TaskState, Visit, Plan]] = []  # visits to judge after the task
         self.use(source)
 
     def use(self, source: PlanSource) -> None:
-        """Take plans from this source from now on; the route stays."""
+        """Make plans with this source from now on. The route stays."""
         self._source = source
         source.start = self._start if self.mode is Mode.LIVE else None
 
     @property
     def route(self) -> Route | None:
-        """The route for the last state that was asked about; None before the first.
+        """The route for the last requested state, or None before the first request.
 
         Raises:
-            PlannerError: There is none.
+            PlannerError: Planning failed.
         """
         if self._latest is not None:
             self._latest.result()
@@ -77,7 +77,7 @@ class Planner:
 
     @property
     def next(self) -> Visit | None:
-        """The next visit; None before the first plan, or when everything is done."""
+        """The next visit, or None before the first plan and when everything is done."""
         route = self.route
         return None if route is None else route.next
 
@@ -86,10 +86,10 @@ class Planner:
 
         Args:
             state: The state.
-            seconds: Live: longest wait for the proof. Then the first regrets are found, which loads the kernels.
+            seconds: Longest wait for the proof in live mode. Finding the first regrets then loads the kernels.
 
         Raises:
-            PlannerError: As `ask`.
+            PlannerError: See `ask`.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -106,23 +106,23 @@ class Planner:
         shown: bool = True,
         then: Callable[[Route, bool], None] = lambda _route, _new: None,
     ) -> None:
-        """Ask what to do next.
+        """Request the next visits.
 
         Args:
             state: The task as it is now.
-            shown: Whether the plan is shown. It then depends on this state alone. One that is not shown starts from
-                earlier ones: several times quicker, but of equally short tours it may be another.
-            then: Is called with the route, and with whether it is of a new plan.
+            shown: True if the plan is shown. It then depends only on this state. A plan that is not shown starts from
+                earlier ones, which is several times faster, but may result in another one of equally short tours.
+            then: Called with the route, and with True if its plan is new.
 
         Raises:
-            UnreachableError: Objects that cannot be fetched or delivered; `names` lists them.
-            ProblemError: More is carried than the capacity allows.
+            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
+            ProblemError: More objects are carried than the capacity allows.
         """
 
         def answer(before: Route | None) -> None:
             first, self._asked = not self._asked, True
             if before is not None and first and state != self._prepared:
-                before = None  # prepared for another start
+                before = None  # the plan was prepared for another start
             rest = None if before is None else self._source.rest(before, state)
             if before is None or rest is None:
                 self.replans += not first
@@ -133,14 +133,14 @@ class Planner:
             then(route, first or rest is None)
 
         if self.mode is Mode.THREAD:
-            self._source.check(state)  # at once, so that a session ends when it happens
+            self._source.check(state)  # here, so that the error ends the session at the right time
         self.do(answer)
 
     def do(self, job: Callable[[Route | None], None]) -> None:
-        """Call a function with the route for the last state that was asked about, when that is known.
+        """Call a function with the route for the last requested state, once it is known.
 
         Raises:
-            PlannerError: There is none; in a thread, the next question raises it.
+            PlannerError: Planning failed. In thread mode, the next request raises it.
         """
         before = self._latest
 
@@ -156,21 +156,21 @@ class Planner:
 
     @property
     def pending(self) -> bool:
-        """Whether `improve` has to be called."""
+        """True if `improve` has to be called."""
         return self._source.pending
 
     def improve(self, state: TaskState) -> Route | None:
-        """A better route for the same task, or the same with a better bound, if one was found since; else None.
+        """Return a route for the same task that is better or has a better bound, if one was found since, else None.
 
         Raises:
-            PlannerError: As `ask`.
+            PlannerError: See `ask`.
         """
         better = None if self._route is None else self._source.better(state, self._route)
         self._route = better or self._route
         return better
 
     def regrets(self) -> Mapping[Visit, Regret]:
-        """Of all possible next visits, the best first; empty as long as they are not known."""
+        """Return the regrets of all possible next visits, the best first, or nothing until they are known."""
         if self.route is None or self._task is None:
             return {}
         if self.mode is not Mode.LIVE:
@@ -181,11 +181,14 @@ class Planner:
         return self._regrets.result() if self._regrets.done() else {}
 
     def regret(self, visit: Visit) -> float | None:
-        """Regret of one visit, m, however large; None where it is not possible or nothing is proven. May take long."""
+        """Return the exact regret of a visit, m, or None if it is not possible or not proven. May take long."""
         return None if self._task is None else self._evaluator.of(self._task[0], visit, self._task[1])
 
     def judge(self, visit: Visit, label: Any) -> float | None:
-        """Regret of a visit that was made; live it is None, and `finish` gives it with the label."""
+        """Return the regret of a visit that was made.
+
+        In live mode return None, and let `finish` return it with its label.
+        """
         if self.mode is not Mode.LIVE:
             return self.regret(visit)
         if self._task is not None:
@@ -193,7 +196,7 @@ class Planner:
         return None
 
     def finish(self) -> list[tuple[Any, float | None]]:
-        """The task is over; returns the labels and regrets that were left for now.
+        """End the task. Return the labels and regrets of visits that `judge` has postponed.
 
         Raises:
             PlannerError: Planning failed.
@@ -205,17 +208,17 @@ class Planner:
         return [(label, self._evaluator.of(state, visit, plan)) for label, state, visit, plan in late]
 
     def settle(self) -> None:
-        """Wait for all answers of a thread; from now on they come when they are asked for."""
+        """In thread mode, wait for all answers and change to inline mode."""
         if self.mode is Mode.THREAD:
             self.wait()
             self.mode = Mode.INLINE
 
     def wait(self, seconds: float | None = None) -> None:
-        """Wait for the threads, at most this long."""
+        """Wait for the threads, for a limited time if `seconds` is given."""
         futures.wait(self._running, seconds)
 
     def close(self) -> None:
-        """Wait for all answers, and stop looking for better ones."""
+        """Wait for all answers, and stop searching for better ones."""
         self.settle()
         self._source.close()
         self._forget_regrets()
@@ -233,7 +236,7 @@ class Planner:
         return self._route
 
     def _set_task(self, state: TaskState, plan: Plan) -> None:
-        """The task is in this state; a new plan for the same state does not start over with its regrets."""
+        """Set the state of the task. A new plan for the same state keeps its regrets."""
         if self._task is not None and same_state(self._task[0], state):
             state = self._task[0]
         else:
@@ -245,7 +248,7 @@ class Planner:
         self._regrets = None
 
     def _find_regrets(self, state: TaskState, plan: Plan, stop: threading.Event) -> Mapping[Visit, Regret]:
-        """Those of a state, in a thread; none where it was told to stop. An impossible task is reported by `ask`."""
+        """Find the regrets of a state in a thread. An impossible task has none, because `ask` reports it."""
         with contextlib.suppress(PlannerError):
             found = self._evaluator.limited(SolveLimit(seconds=REGRET_SECONDS, stop=stop)).all(state, plan)
             return {} if stop.is_set() else found

@@ -1,4 +1,4 @@
-"""Routes from a solver: one final plan, or a first plan at once and better ones from a search in the background."""
+"""Routes from a solver: final plans, or first plans at once and better ones from a search in the background."""
 
 import math
 import queue
@@ -11,26 +11,25 @@ from planner.exact.task_table import TaskTable
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.geodesics import Geodesics
 from planner.plan import Plan, Status, Visit, VisitKind
-from planner.problem import RoutingProblem
+from planner.problem import RoutingProblem, tour_length
 from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
-from planner.tour import tour_length
 
-MOVED = 0.3  # m; an object that was pushed farther than this since it was planned for asks for a new plan
-TIE = 0.01  # m; tours closer than this are equal: rounding to 0.1 mm alone can add up to it
+MOVED = 0.3  # m; an object pushed farther than this since the last plan requires a new plan
+TIE = 0.01  # m; tours that differ by less count as equal, because rounding to 0.1 mm can add up to this
 PROOF_LIMIT = SolveLimit(seconds=20.0)
 
 
 @dataclass(eq=False)
-class _Search:
-    """A search for something better than the visits on show."""
+class _BackgroundSearch:
+    """A search for a plan better than the shown visits."""
 
-    problem: RoutingProblem  # the problem that is solved
-    plans: Iterator[Plan]  # better and better plans of it
-    stop: threading.Event  # set to stop it
-    shown: tuple[Visit, ...] = ()  # the visits on show, from the state of the problem on
-    # plans not yet looked at, or the exception that ended the search
+    problem: RoutingProblem
+    plans: Iterator[Plan]  # better and better plans
+    stop: threading.Event  # set to stop the search
+    shown: tuple[Visit, ...] = ()  # the shown visits from the state of the problem on
+    # new plans, or the exception that ended the search
     found: "queue.SimpleQueue[Plan | Exception]" = field(default_factory=queue.SimpleQueue)
 
     def run(self) -> None:
@@ -44,7 +43,7 @@ class _Search:
             self.found.put(error)
 
     def drain(self) -> list[Plan]:
-        """Plans since the last call; raises the exception that ended the search."""
+        """Return the plans found since the last call, or raise the exception that ended the search."""
         plans: list[Plan] = []
         while not self.found.empty():
             result = self.found.get()
@@ -54,7 +53,7 @@ class _Search:
         return plans
 
     def bounded(self, other: Plan) -> Plan:
-        """The plan of the shown visits, with the bound of another plan of the same problem."""
+        """Return the plan of the shown visits, with the bound of another plan of the same problem."""
         cost = tour_length(self.problem, self.shown)
         optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + self.problem.tolerance(cost)
         lower = cost if optimal else min(other.lower_bound, cost)
@@ -63,14 +62,14 @@ class _Search:
 
 
 class SolverSource(PlanSource):
-    """Plans the successive states of a task with a solver; positions are snapped to the largest island of the navmesh.
+    """Plans the successive states of a task with a solver. Positions are snapped to the largest island of the navmesh.
 
-    With the exact planner, plans that are not shown start from earlier ones: a full table where that is small enough,
-    else the multipliers of the bound. The same sequence of states gives the same plans.
+    With the exact planner, plans that are not shown start from earlier ones: from a full table if that is small enough,
+    else from the multipliers of the bound. The same sequence of states gives the same plans.
 
-    With `start`, `plan` gives a first plan within some 50 ms, and a search for a better one starts, by default for
-    20 s. It knows from earlier ones, by name of the object, the multipliers of the bound and the order of the route.
-    Results depend on the machine's speed. Only the exact planner's kernels run without the interpreter's lock.
+    If `start` is set, `plan` returns a first plan within about 50 ms and starts a search for a better one, by default
+    for 20 s. The search uses the multipliers of earlier bounds and the order of the route, by object name. Results
+    depend on the machine's speed. Only kernels of the exact planner run without the interpreter lock.
     """
 
     def __init__(
@@ -86,19 +85,17 @@ class SolverSource(PlanSource):
         self._solver, self._seed, self._limit = solver, seed, limit
         self._table = TaskTable(solver) if isinstance(solver, ExactSolver) else None
         self._warm = NOTHING_KNOWN
-        self._planned: dict[str, XY] = {}  # where the loose objects of the route lay when it was planned
-        self._search: _Search | None = None
+        self._planned: dict[str, XY] = {}  # positions of the loose objects in the plan
+        self._search: _BackgroundSearch | None = None
 
     def check(self, state: TaskState) -> None:
-        """See `PlanSource`."""
         self.problems.check(state)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """The visits left if those done are the first of the route and no object was pushed far, else None."""
+        """Return the remaining visits if the done ones are the first and no object was pushed far, else None."""
         return None if self._moved(state, state.loose) else remaining(route.visits, state)
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
-        """See `PlanSource`."""
         if self.start is None:
             plan = self._solve(self.problems.problem(state), shown=shown)
             return self._follow(state, plan.visits, plan)
@@ -109,7 +106,7 @@ class SolverSource(PlanSource):
         return self._follow(state, plan.visits, plan)
 
     def adopt(self, state: TaskState) -> None:
-        """Take the present route, of another source, for one that was planned in this state."""
+        """Treat the present route, of another source, as planned in this state."""
         self._planned = dict(state.loose)
 
     def _follow(self, state: TaskState, visits: tuple[Visit, ...], plan: Plan) -> Route:
@@ -118,24 +115,24 @@ class SolverSource(PlanSource):
 
     @property
     def pending(self) -> bool:
-        """Whether the search has found something since the last call of `better`."""
+        """True if the search has found something since the last call of `better`."""
         return self._search is not None and not self._search.found.empty()
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """The route stays unless another is shorter by more than rounding, from where the person is now.
+        """Return another route only if it is shorter by more than rounding, from where the person is now.
 
-        So among equals the suggestion does not switch. Costs nothing if the search has found nothing.
+        So the suggestion does not alternate between equal tours.
         """
         search = self._search
         plans = search.drain() if search is not None else []
         rest = self.rest(route, state) if plans else None
         if search is None or rest is None:
-            return None  # nothing new, or another plan is due
+            return None
         for plan in plans:
             self._warm = self._warm.updated(search.problem, plan)
         best = plans[-1]
         new = remaining(best.visits, state)
-        if new is None:  # its first visits are not those done since: search anew, from here
+        if new is None:  # its first visits were not made, so search again from here
             self._show(self._new_search(state, route), rest)
             return None
         if self.problems.length(state, new) < self.problems.length(state, rest) - TIE:
@@ -145,13 +142,13 @@ class SolverSource(PlanSource):
         return Route(rest, bounded) if bounded.improves_on(route.plan) else None
 
     def close(self) -> None:
-        """Stop the search; it ends with its current layer, a fraction of a second later."""
+        """Stop the search, which ends with its present layer after a fraction of a second."""
         if self._search is not None:
             self._search.stop.set()
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        """A final plan; one that is shown depends on this problem alone."""
+        """Return a final plan. If it is shown, it depends only on this problem."""
         if shown or self._table is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
         plan = self._table.plan(problem)
@@ -162,8 +159,8 @@ class SolverSource(PlanSource):
         self._warm = self._warm.updated(problem, plan)
         return plan
 
-    def _new_search(self, state: TaskState, route: Route | None) -> _Search:
-        """A search that starts from what is known of earlier ones."""
+    def _new_search(self, state: TaskState, route: Route | None) -> _BackgroundSearch:
+        """Return a search that starts from the results of earlier ones."""
         self.close()
         problem, stop = self.problems.problem(state), threading.Event()
         picks = () if route is None else (v.object for v in route.visits if v.kind is VisitKind.PICK)
@@ -171,10 +168,10 @@ class SolverSource(PlanSource):
         moved = self._moved(state, order)
         self._warm = replace(self._warm, order=tuple(name for name in order if name not in moved))
         limit = replace(self._limit or PROOF_LIMIT, stop=stop)
-        return _Search(problem, self._improving(problem, limit), stop)
+        return _BackgroundSearch(problem, self._improving(problem, limit), stop)
 
-    def _show(self, search: _Search, shown: tuple[Visit, ...]) -> None:
-        """Start a search for something better than these visits."""
+    def _show(self, search: _BackgroundSearch, shown: tuple[Visit, ...]) -> None:
+        """Start a search for a plan better than these visits."""
         self._search, search.shown = search, shown
         assert self.start is not None  # noqa: S101 - for the type checker
         self.start(search.run)
@@ -185,7 +182,7 @@ class SolverSource(PlanSource):
         return self._solver.improve(problem, seed=self._seed, limit=limit)
 
     def _moved(self, state: TaskState, names: Iterable[str]) -> set[str]:
-        """Those of some loose objects that were pushed farther than `MOVED` since the plan was made, or are new."""
+        """Return the loose objects that are new or were pushed farther than `MOVED` since the plan was made."""
         return {
             name
             for name in names

@@ -1,9 +1,10 @@
-"""The interface of all solvers, and their names."""
+"""The interface of solvers, their limits, and their names."""
 
 import importlib
 import math
 import pkgutil
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, cast
@@ -26,12 +27,12 @@ PATIENT_WORK = 60_000_000  # states of the exact search, for offline use: about 
 
 @dataclass(frozen=True)
 class SolveLimit:
-    """When to stop looking for something better.
+    """Limit of a search.
 
     Attributes:
-        work: Amount of work in the solver's own unit: results repeat bit for bit on every machine.
-        seconds: Wall time, for live use; results then depend on the machine.
-        stop: Stops the solver soon after it is set, from another thread; for live use too.
+        work: Amount of work in the solver's own unit. Results are bit-identical on every machine.
+        seconds: Wall time. Results depend on the machine.
+        stop: Event that stops the solver soon, set by another thread.
     """
 
     work: int | None = None
@@ -45,34 +46,49 @@ class SolveLimit:
 
     @property
     def stopped(self) -> bool:
-        """Whether `stop` is set."""
         return self.stop is not None and self.stop.is_set()
 
 
+@dataclass(frozen=True)
+class Deadline:
+    """A point in time of `time.perf_counter()` (None means never), or an event that another thread sets."""
+
+    at: float | None
+    stop: threading.Event | None = None
+
+    def over(self) -> bool:
+        stopped = self.stop is not None and self.stop.is_set()
+        return stopped or (self.at is not None and time.perf_counter() >= self.at)
+
+
+NEVER = Deadline(None)
+
+
 class Solver(Protocol):
-    """Finds a tour for a routing problem."""
+    """A planner for routing problems."""
 
     @property
     def name(self) -> str:
         """Name in run records."""
 
     def solve(self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None) -> "Plan":
-        """Find a plan; the same arguments with a limit on work (or none) give the same visits."""
+        """Return a plan. Without a limit on time, the same arguments give the same visits."""
 
     def improve(
         self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None
     ) -> "Iterator[Plan]":
-        """Yield a first plan at once, then each that is shorter or has a better bound.
+        """Yield a first plan at once, then each plan that is shorter or has a better bound.
 
-        The last is what `solve` returns for the same arguments, but for limits on time. Leave the iteration
-        whenever the plan in hand is good enough.
+        The last plan is the result of `solve` for the same arguments, except with limits on time. The caller may stop
+        the iteration at any time.
         """
 
 
 def solver(name: str) -> Solver:
-    """The planner of this name, or one by `package.module:attribute`: a class, or a function without arguments.
+    """Return the planner of this name, or of `package.module:attribute`: a class, or a function without arguments.
 
-    `PlannerError` where none has this name, or it cannot be made.
+    Raises:
+        PlannerError: There is no such planner, or it cannot be made.
 
     Example:
         >>> import numpy as np
@@ -91,10 +107,10 @@ def solver(name: str) -> Solver:
         )
     try:
         found = pkgutil.resolve_name(name)()
-    except (Exception, SystemExit) as error:  # whatever the module does when it is imported
+    except (Exception, SystemExit) as error:  # user code may raise anything on import
         raise PlannerError(
             f"cannot make the planner {name!r}: {type(error).__name__}: {error}; "
-            "modules are looked for in the current folder and among those installed"
+            "modules are searched for in the current folder and among those installed"
         ) from error
     if not callable(getattr(found, "solve", None)):
         raise PlannerError(f"planner {name!r} makes a {type(found).__name__}, which has no method solve")

@@ -1,4 +1,4 @@
-"""Routing problems from states of a task; each position is replaced by the nearest navigable point."""
+"""Routing problems of the states of a task. Positions are replaced by the nearest navigable points."""
 
 import math
 from collections.abc import Sequence
@@ -12,23 +12,25 @@ from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.route import XY, TaskState
 
-RESOLUTION = 1e-4  # m; that of geodesics, and far below where a person stands
+RESOLUTION = 1e-4  # m; precision of geodesics
 
 
 class TaskProblems:
-    """Makes the routing problems of the successive states of a task; keeps distances between them."""
+    """Makes the routing problems of the successive states of a task, and caches distances."""
 
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
         self._capacity = capacity
-        self._snapped: dict[XY, XY] = {}  # places of visits
-        self._row: dict[XY, int] = {}  # of each place in the distances of the last problem
+        self._snapped: dict[XY, XY] = {}  # snapped place of each visit
+        self._row: dict[XY, int] = {}  # row of each place in the distances of the last problem
         self._distances: NDArray[np.float64] = np.zeros((0, 0))
 
     def problem(self, state: TaskState) -> RoutingProblem:
-        """The routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
+        """Return the routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
 
-        `UnreachableError` names objects that cannot be fetched or delivered; `ProblemError` if too many are carried.
+        Raises:
+            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
+            ProblemError: More objects are carried than the capacity allows.
         """
         at = self._places(state)
         places = list(dict.fromkeys(at.values()))
@@ -52,11 +54,15 @@ class TaskProblems:
         )
 
     def check(self, state: TaskState) -> None:
-        """Make sure that every object left can be fetched and delivered; `UnreachableError` names those that cannot."""
+        """Check that every object left can be fetched and delivered.
+
+        Raises:
+            UnreachableError: Objects cannot be. `names` lists them.
+        """
         self._places(state)
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
-        """Length of an open tour from the state's position, m; raises as `check`."""
+        """Return the length of an open tour from the state's position, m. Raises as `check`."""
         at = self._places(state)
         stops = [at[visit] for visit in visits]
         if not stops:
@@ -71,7 +77,7 @@ class TaskProblems:
         return float(x), float(y)
 
     def _places(self, state: TaskState) -> dict[Visit, XY]:
-        """Navigable position of each visit that may be left."""
+        """Return the navigable position of each visit that may be left."""
         wanted = {Visit(VisitKind.PICK, name): at for name, at in state.loose.items()}
         for name in (*state.loose, *state.carried):
             wanted[Visit(VisitKind.PLACE, name)] = state.deliveries[name]
@@ -90,7 +96,7 @@ class TaskProblems:
         return places
 
     def _between(self, places: list[XY]) -> NDArray[np.float64]:
-        """Distances between places; only rows of places that are new since the last call are computed."""
+        """Return distances between places. Only rows of places that are new since the last call are computed."""
         old = [p for p in places if p in self._row]
         new = [p for p in places if p not in self._row]
         order = {p: k for k, p in enumerate([*old, *new])}

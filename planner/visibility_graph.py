@@ -1,10 +1,12 @@
-"""Visibility graph over the reflex vertices of free space: the exact part of a shortest-path search.
+"""Visibility graph over the reflex vertices of free space, and shortest paths in it.
 
 A shortest path among polygons bends only at reflex vertices of free space and is tangent to the obstacle at
 each, so only tangent sight lines are edges (de Berg et al., Computational Geometry, chapter 15).
 """
 
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -15,23 +17,47 @@ from shapely.geometry.polygon import orient
 from mjsim.support.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
-from planner.path_search import Edges
+
+SLACK = 1e-9  # m; rounding errors of lengths are smaller
+REPEATED = 1e-9  # m; corners nearer to each other count as one
+
+
+class Edges(NamedTuple):
+    """A graph in the plane, in the format of a `csr_array`."""
+
+    vertices: NDArray[np.float64]  # x and y of each vertex, m, and further columns, (v, 2 or more)
+    starts: NDArray[np.int32]  # first edge of each vertex, (v + 1,)
+    ends: NDArray[np.int32]  # vertex that each edge leads to, (e,)
+    lengths: NDArray[np.float64]  # of the edges, m, (e,)
+
+
+class Views(NamedTuple):
+    """The vertices that some points see."""
+
+    starts: NDArray[np.int32]  # first entry of each of m points in the other arrays, (m + 1,)
+    seen: NDArray[np.int32]  # seen vertices, grouped by point, (k,)
+    lengths: NDArray[np.float64]  # distances to them, m, (k,)
+
+
+class Paths(NamedTuple):
+    """Length of the shortest known path to each vertex, m, (v,), and its previous vertex, or -1, (v,)."""
+
+    over: NDArray[np.float64]
+    before: NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
 class VisibilityGraph:
-    """Static part of the shortest-path search; built once per navmesh."""
+    """Static part of the shortest-path search, built once per navmesh."""
 
-    vertices: NDArray[
-        np.float64
-    ]  # reflex vertices, (v, 6): x, y, then the ring's previous and next vertex, m
-    island: NDArray[np.int64]  # island of each vertex, (v,) int64
+    # x, y of each reflex vertex, then of the ring's previous and next vertex, m, (v, 6)
+    vertices: NDArray[np.float64]
+    island: NDArray[np.int64]  # island of each vertex, (v,)
     walls: SegmentGrid  # edges of the solid obstacles
-    edges: Edges  # which vertices see each other
+    edges: Edges  # pairs of vertices that see each other
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
-        """Find the reflex vertices of a navmesh and which of them see each other."""
         found = [_reflex_vertices(island) for island in navmesh.islands]
         vertices = np.concatenate([np.empty((0, 6)), *found])
         island = np.repeat(np.arange(len(found)), [len(f) for f in found])
@@ -51,7 +77,7 @@ class VisibilityGraph:
 
 
 def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
-    """Rings of all polygons without the repeated last vertex; the polygon lies to the left of each."""
+    """Return the rings of all polygons without the repeated last vertex. The polygon is to the left of each ring."""
     rings = []
     for polygon in map(orient, shapely.get_parts(geometry)):
         for ring in (polygon.exterior, *polygon.interiors):
@@ -76,7 +102,10 @@ def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
 
 @kernel
 def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
-    """Whether a line from (x, y) passes a vertex, (6,), with both of its neighbours on one side; all m."""
+    """Return True if a line from (x, y) passes a vertex, (6,), with both of its neighbours on one side.
+
+    All are in m.
+    """
     ux, uy = vertex[0] - x, vertex[1] - y
     before = ux * (vertex[3] - vertex[1]) - uy * (vertex[2] - vertex[0])
     after = ux * (vertex[5] - vertex[1]) - uy * (vertex[4] - vertex[0])
@@ -89,9 +118,10 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 def vertex_pairs(
     vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs i < j of vertices (v, 6) that see each other along a line tangent at both; i and j, each (pairs,).
+    """Return the numbers i < j of vertices (v, 6) that see each other along a line tangent at both, each (pairs,).
 
-    `island` is that of each vertex, (v,), `walls` the edges of the solid obstacles, `slack` the tolerance, m.
+    `island` is that of each vertex, (v,), `walls` are the edges of the solid obstacles, and `slack` is the tolerance,
+    m.
     """
     rows, columns = [0], [0]
     for i in range(vertices.shape[0]):
@@ -116,7 +146,7 @@ def visible_vertices(
     walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Usable (v,) vertices (v, 6) that a point sees along tangents, and distances to them, m, each (seen,)."""
+    """Return the usable vertices, of (v, 6), that a point sees along tangents, and their distances, m, each (seen,)."""
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]
@@ -130,10 +160,113 @@ def visible_vertices(
 def direct_distances(
     a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
 ) -> NDArray[np.float64]:
-    """Straight distances from points a (s, 2) to points b (t, 2), infinite where a wall is between, (s, t); all m."""
+    """Return straight distances from points a (s, 2) to b (t, 2), infinite if a wall is between, (s, t).
+
+    All are in m.
+    """
     result = np.full((a.shape[0], b.shape[0]), np.inf)
     for i in range(a.shape[0]):
         for j in range(b.shape[0]):
             if is_visible(a[i, 0], a[i, 1], b[j, 0], b[j, 1], walls):
                 result[i, j] = np.hypot(b[j, 0] - a[i, 0], b[j, 1] - a[i, 1])
+    return result
+
+
+@kernel
+def search_from(
+    graph: Edges, views: Views, point: int, goal: NDArray[np.float64], rest: NDArray[np.float64]
+) -> tuple[Paths, int]:
+    """Find shortest paths from a point, nearest to the goal first (A*; Hart, Nilsson and Raphael 1968).
+
+    Among equally short paths it finds that of Dijkstra's algorithm, with the earlier last corners.
+
+    Args:
+        graph: The graph.
+        views: Vertices that points see.
+        point: Number of the start in `views`.
+        goal: End of the path, m, (2,), or empty to find the paths to all vertices.
+        rest: Length of the last leg from each vertex to the goal, infinite if it is not seen, m, (v,).
+
+    Returns:
+        The paths, and the last vertex of the shortest path to the goal, or -1 without a path.
+    """
+    size = len(graph.vertices)
+    paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))
+    last, best = -1, np.inf
+    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # key and vertex; this entry stays last
+    for k in range(views.starts[point], views.starts[point + 1]):
+        vertex = views.seen[k]
+        paths.over[vertex] = views.lengths[k]
+        heappush(heap, (views.lengths[k] + at_least(graph, vertex, goal), vertex))
+    while heap[0][1] >= 0 and heap[0][0] <= best + SLACK:
+        key, vertex = heappop(heap)
+        length = paths.over[vertex]
+        if key > length + at_least(graph, vertex, goal):
+            continue  # the vertex was pushed again with a shorter path
+        total = length + rest[vertex]
+        if total < best or (total == best and vertex < last):
+            best, last = total, vertex
+        for edge in range(graph.starts[vertex], graph.starts[vertex + 1]):
+            end, total = graph.ends[edge], length + graph.lengths[edge]
+            if total < paths.over[end]:
+                paths.over[end], paths.before[end] = total, vertex
+                heappush(heap, (total + at_least(graph, end, goal), end))
+            elif total == paths.over[end] and length < earlier(paths, end):
+                paths.before[end] = vertex
+    return paths, last
+
+
+@kernel
+def earlier(paths: Paths, vertex: int) -> float:
+    """Return the length of the path to the vertex before a vertex, m, or 0 if that is the start."""
+    before = paths.before[vertex]
+    return float(paths.over[before]) if before >= 0 else 0.0
+
+
+@kernel
+def at_least(graph: Edges, vertex: int, goal: NDArray[np.float64]) -> float:
+    """Return the straight distance from a vertex to the goal (2,), m, or 0 without a goal."""
+    if goal.size == 0:
+        return 0.0
+    return float(np.hypot(graph.vertices[vertex, 0] - goal[0], graph.vertices[vertex, 1] - goal[1]))
+
+
+@kernel
+def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tuple[float, NDArray[np.float64]]:
+    """Return the shortest path between two points (2, 2), m, over vertices, given the views of both.
+
+    The result is its length, m, which is infinite without a path, and its points, m, (k, 2).
+    """
+    rest = np.full(len(graph.vertices), np.inf)
+    for k in range(views.starts[1], views.starts[2]):
+        rest[views.seen[k]] = views.lengths[k]
+    paths, vertex = search_from(graph, views, 0, ends[1], rest)
+    if vertex < 0:
+        return np.inf, ends
+    length, corners = paths.over[vertex] + rest[vertex], [vertex]
+    while paths.before[vertex] >= 0:
+        vertex = paths.before[vertex]
+        corners.append(vertex)
+    points = np.empty((len(corners) + 2, 2))
+    points[0], kept = ends[0], 1
+    for vertex in corners[::-1]:
+        corner = graph.vertices[vertex, :2]
+        if np.hypot(corner[0] - points[kept - 1, 0], corner[1] - points[kept - 1, 1]) > REPEATED:
+            points[kept] = corner
+            kept += 1
+    points[kept] = ends[1]
+    return length, points[: kept + 1].copy()
+
+
+@kernel
+def distances(graph: Edges, sources: Views, targets: Views) -> NDArray[np.float64]:
+    """Return the distances over vertices between points, m, (s, t), infinite without a path."""
+    count, points = len(sources.starts) - 1, len(targets.starts) - 1
+    result = np.full((count, points), np.inf)
+    nowhere, rest = np.empty(0), np.full(len(graph.vertices), np.inf)
+    for s in range(count):
+        paths, _ = search_from(graph, sources, s, nowhere, rest)
+        for t in range(points):
+            for k in range(targets.starts[t], targets.starts[t + 1]):
+                result[s, t] = min(result[s, t], paths.over[targets.seen[k]] + targets.lengths[k])
     return result

@@ -205,7 +205,7 @@ def _check(problem_name: str, claim_name: str) -> int:
     """Check a claim about a problem; 1 where it does not hold."""
     if problem_name == claim_name == "-":
         raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
-    from planner.verifier import verify_optimal  # loaded only where it is needed
+    from planner.checker import verify_optimal  # loaded only where it is needed
 
     problem = _read(problem_name, problem_from_json)
     plan = _read(claim_name, lambda text: claim_from_json(text, problem))

@@ -44,7 +44,7 @@ class Assistant:
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
         shows_plan: True if the condition shows the plan or its next step.
-        shows_own: True if the condition is user code.
+        is_custom: True if the condition is user code.
     """
 
     def __init__(
@@ -66,9 +66,7 @@ class Assistant:
         )
         self._deliveries = deliveries(self._house, self._episode)
         self._paths = PathsToNext(self._house.geodesics)
-        self._path_from: Observation | None = (
-            None  # start of the paths to the next visit, which are not computed yet
-        )
+        self._path_from: Observation | None = None  # start of paths that are still to be computed
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
         self.is_custom = is_own(self._show)

@@ -1,4 +1,4 @@
-"""A good tour quickly: simulated annealing over the order of picks, with the best places to leave objects for each."""
+"""A good first tour, by simulated annealing over the order of picks with optimal places to leave objects."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,12 @@ from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
 from planner.exact.warm_start import Start
 
-HOT, COLD = 0.5, 0.01  # temperature at both ends, in mean legs
+HOT, COLD = 0.5, 0.01  # first and last temperature, in mean leg lengths
 
 
 @inlined
 def uniform(state: NDArray[np.uint64]) -> float:
-    """Next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014); the state is (1,)."""
+    """Return the next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014). The state is (1,)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -24,9 +24,10 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 @kernel
 def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """What may be left before the next pick: up to four (bin, then bin, still held), m for none.
+    """Return up to four ways to leave objects before the next pick: a bin, a second bin, and the bin of what is still
+    held.
 
-    `held` and `other` are the bins of what is in hand, of m bins, m for none.
+    `held` and `other` are the bins of the objects in hand, of `m` bins. `m` stands for no bin, or an empty hand.
     """
     never = (m, m, -1)
     if held == m:
@@ -40,7 +41,7 @@ def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
 
 @kernel
 def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
-    """From object i (-1: the root) over up to two bins (m: none) to object x (-1: the end)."""
+    """Return the length from object i (-1: the root) over up to two bins (m: none) to object x (-1: the end)."""
     m = inst.bins.shape[0]
     if b == m:
         if x < 0:
@@ -55,10 +56,10 @@ def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
 
 @kernel
 def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
-    """Least length of a tour that picks in a given order (n,).
+    """Return the least length of a tour that picks in a given order (n,).
 
-    Row t of `costs`, entry d, is that at pick t with another object for bin d in hand (m: none), (n + 1, m + 1); row n
-    is the end. Rows before `start` are valid already.
+    Entry d of row t of `costs`, (n + 1, m + 1), becomes the least cost at pick t with an object for bin d in the other
+    hand (m: none). Row n is the end. Rows before `start` must be valid.
     """
     n, m = inst.to_bin.shape
     if start == 0:
@@ -80,7 +81,7 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
 
 @inlined
 def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
-    """From pick i to pick x: row `after` from row `before`."""
+    """Compute the row `after` of pick x from the row `before` of pick i."""
     m = inst.bins.shape[0]
     c = inst.home[i]
     from_i, from_x, between = inst.to_bin[i], inst.to_bin[x], inst.bins[c]
@@ -89,7 +90,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
     nothing = before[m] + over_c
     for d in range(m):
         after[d] = before[d] + over_c
-        if d != c:  # the other object is for another bin: at bin c both would be left
+        if d != c:  # otherwise both objects would be left at bin c
             keep_own = min(keep_own, before[d] + from_i[d] + from_x[d])
         both = between[d] + min(from_i[d] + from_x[c], from_i[c] + from_x[d])
         nothing = min(nothing, before[d] + both)
@@ -99,7 +100,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
 
 @inlined
 def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
-    """Least length of a tour whose last pick is i."""
+    """Return the least length of a tour whose last pick is i."""
     m = inst.bins.shape[0]
     c = inst.home[i]
     best = before[m] + inst.to_bin[i, c]
@@ -110,7 +111,10 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
 
 @kernel
 def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Actions (k >= 0 picks object k, -1 - b goes to bin b) of a shortest tour that picks in a given order (n,)."""
+    """Return the actions of a shortest tour that picks in a given order (n,).
+
+    An action k >= 0 picks object k, and -1 - b goes to bin b.
+    """
     n, m = inst.to_bin.shape
     costs = np.empty((n + 1, m + 1), np.int64)
     decode(inst, order, 0, costs)
@@ -148,9 +152,9 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @inlined
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
-    """Write a neighbour of an order (n,): two objects swapped, some in a row reversed, or one moved.
+    """Write a neighbour of an order (n,): swap two objects, reverse a section, or move an object.
 
-    `state` is that of `uniform`. Returns the first position that may have changed.
+    `state` is that of `uniform`. Return the first position that may have changed.
     """
     n = order.size
     i = int(uniform(state) * n)
@@ -178,7 +182,7 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
 
 
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    """Simulated annealing from the order of the indices; length and order (n,), see `anneal_from`."""
+    """Anneal from the order of the indices. Return the length and the order (n,) of the best tour."""
     return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
 
 
@@ -186,9 +190,9 @@ def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64
 def anneal_from(
     inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
 ) -> tuple[int, NDArray[np.int64]]:
-    """Simulated annealing from an order of picks (n,), with temperatures in mean legs at the beginning and the end.
+    """Anneal from an order of picks (n,), with the first and last temperature in mean leg lengths.
 
-    Returns the length of the best tour, and its order of picks (n,).
+    Return the length of the best tour and its order of picks (n,).
     """
     n, m = inst.to_bin.shape
     state = np.array([seed], np.uint64)
@@ -222,7 +226,7 @@ def anneal_from(
 
 
 def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
-    """The order of a start, each missing object put where it lengthens the tour least, (n,) int64."""
+    """Return the order of a warm start, (n,), with missing objects inserted where they lengthen the tour least."""
     n = len(instance.home)
     order = [*start.order, *start.missing]
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)

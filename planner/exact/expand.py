@@ -1,9 +1,9 @@
 """Kernels that expand a layer of the search: states by number of picks, pruned by a lower bound of the cost-to-go.
 
-A node is a state (U, place, carried) with the length of the shortest known path to it; layer k holds states with
-k objects picked. A state is coded as U 2^12 + place, where place b m + d means at bin b with an object for d,
-b m + b at bin b with empty hands, and m m + i at object i with only that in hand. Arriving at a second object
-is no state of its own: the next stop is one of two bins.
+A node is a state (U, place, carried) with the length of the shortest known path to it. Layer k contains states with
+k picked objects. The code of a state is U 2^12 + place. Place b m + d means at bin b with an object for d,
+b m + b at bin b with empty hands, and m m + i at object i with only that object in hand. Reaching a second object
+is not a state, because the next stop is one of two bins.
 """
 
 from typing import NamedTuple
@@ -12,30 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.support.kernels import inlined, kernel
-from planner.exact.deadline import Deadline
 from planner.exact.instance import Instance
 from planner.exact.nodes import NO_PARENT, Nodes, offer, with_room, with_room_among
-from planner.exact.table import INFINITE, Table
+from planner.exact.table import INFINITE, CostTable
+from planner.solvers import Deadline
 
 PLACE_BITS = 12
-SLICE = 1 << 12  # states that are expanded between looks at the clock: some 5 ms
-CARRYING, EMPTY = range(2)  # stages of a layer: states that carry something, states that do not
-STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # progress in a layer
+SLICE = 1 << 12  # states expanded between two checks of the deadline, in about 5 ms
+CARRYING, EMPTY = range(2)  # stages of a layer: states with an object in hand, states with empty hands
+STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices of the progress in a layer
 
 
 class Expanded(NamedTuple):
-    """The result of expanding a layer."""
+    """Result of the expansion of a layer."""
 
-    here: Nodes  # the layer, with states reached by leaving an object in its bin
+    here: Nodes  # the layer, including states reached by leaving an object in its bin
     after: Nodes  # the next layer
-    smallest: int  # smallest total left out of the next layer to save memory, `INFINITE` if none was
-    states: int  # how many were expanded
-    end: int  # index of the end of the shortest complete tour, -1 if there is none
+    smallest: int  # smallest total dropped from the next layer to save memory, or `INFINITE`
+    states: int  # number of expanded states
+    end: int  # index of the end of the shortest complete tour, or -1
 
 
 @kernel
-def row_of(table: Table, left: int) -> int:
-    """Row of the bound's table for the set of objects left."""
+def row_of(table: CostTable, left: int) -> int:
+    """Return the row of the bound's table for a set of objects left."""
     row = 0
     for j in range(table.stride.size):
         if left >> j & 1:
@@ -43,8 +43,8 @@ def row_of(table: Table, left: int) -> int:
     return row
 
 
-class Arrival(NamedTuple):
-    """The end of a leg: objects left as bits, their row of the table, length so far with multipliers, parent."""
+class LegEnd(NamedTuple):
+    """The end of a leg: objects left (bits), their row of the table, length so far with multipliers, and parent."""
 
     left: int
     row: int
@@ -54,9 +54,9 @@ class Arrival(NamedTuple):
 
 @inlined
 def offer_bin(
-    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, b: int, d: int, limit: int
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, b: int, d: int, limit: int
 ) -> None:
-    """Offer the state at bin b carrying one for d (d = b: nothing), unless its total reaches the limit."""
+    """Offer the state at bin b with an object for d (d = b: none), unless its total reaches the limit."""
     total = arrival.cost + table.bin[arrival.row, b, d]
     if total < limit:
         place = b * inst.bins.shape[0] + d
@@ -65,22 +65,22 @@ def offer_bin(
 
 @inlined
 def offer_second(
-    inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, j: int, d: int, limit: int
+    inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, j: int, d: int, limit: int
 ) -> None:
-    """Pick j with one for d in hand, and offer the state at either bin; the arrival is at j, before the pick."""
+    """Pick j with an object for d in hand, and offer the states at both bins. The leg ends at j, before the pick."""
     c = inst.home[j]
     left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
     cost = arrival.cost + table.multipliers[j]
-    first = Arrival(left, row, cost + inst.to_bin[j, d], arrival.parent)
+    first = LegEnd(left, row, cost + inst.to_bin[j, d], arrival.parent)
     offer_bin(inst, table, nodes, first, d, c, limit)
     if c != d:
-        second = Arrival(left, row, cost + inst.to_bin[j, c], arrival.parent)
+        second = LegEnd(left, row, cost + inst.to_bin[j, c], arrival.parent)
         offer_bin(inst, table, nodes, second, c, d, limit)
 
 
 @inlined
-def offer_only(inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, i: int, limit: int) -> None:
-    """Pick i with empty hands, and offer the state there; the arrival is at i, before the pick."""
+def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, i: int, limit: int) -> None:
+    """Pick i with empty hands, and offer the state there. The leg ends at i, before the pick."""
     cost = arrival.cost + table.multipliers[i]
     total = cost + table.object[arrival.row - table.stride[i], i]
     if total < limit:
@@ -89,30 +89,28 @@ def offer_only(inst: Instance, table: Table, nodes: Nodes, arrival: Arrival, i: 
 
 
 @kernel
-def offer_roots(inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int) -> None:
-    """Put the states that can follow the root into the first two layers."""
+def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int) -> None:
+    """Add the successors of the root to the first two layers."""
     n = inst.home.size
     left, row = (1 << n) - 1, table.bin.shape[0] - 1
     if inst.carried.size == 0:
         for i in range(n):
-            arrival = Arrival(left, row, int(inst.root[i]), NO_PARENT)
+            arrival = LegEnd(left, row, int(inst.root[i]), NO_PARENT)
             offer_only(inst, table, after, arrival, i, limit)
         return
     d, other = inst.carried[0], inst.carried[inst.carried.size - 1]
-    offer_bin(inst, table, here, Arrival(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
+    offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[d]), NO_PARENT), d, other, limit)
     if inst.carried.size == 2:
-        offer_bin(
-            inst, table, here, Arrival(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit
-        )
+        offer_bin(inst, table, here, LegEnd(left, row, int(inst.root_bin[other]), NO_PARENT), other, d, limit)
         return
     for j in range(n):
-        offer_second(inst, table, after, Arrival(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
+        offer_second(inst, table, after, LegEnd(left, row, int(inst.root[j]), NO_PARENT), j, d, limit)
 
 
 def expand(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
-    """Offer all successors of a layer's states; None if the deadline was over before that was done."""
+    """Offer all successors of a layer's states. Return None if the deadline passed before that was done."""
     progress = np.array([0, 0, 0, INFINITE, 0, -1])
     while True:
         here, after = expand_some(inst, table, here, after, limit, width, progress)
@@ -125,17 +123,17 @@ def expand(
 @kernel
 def expand_some(
     inst: Instance,
-    table: Table,
+    table: CostTable,
     here: Nodes,
     after: Nodes,
     limit: int,
     width: int,
     progress: NDArray[np.int64],
 ) -> tuple[Nodes, Nodes]:
-    """Expand one slice of a layer, first states that carry something, then those that do not.
+    """Expand a slice of a layer: first states with an object in hand, then states with empty hands.
 
-    `progress`, (6,), has the stage, how many of its states are done, how many there are, and the last three fields of
-    `Expanded`. Totals to offer are below `limit`; of the next layer, `width` states will be kept.
+    `progress`, (6,), contains the stage, the numbers of expanded states and of all states of the stage, and the last
+    three fields of `Expanded`. Offered totals are below `limit`. `width` states of the next layer will be kept.
     """
     if progress[STAGE] == CARRYING and progress[DONE] == 0:
         progress[OF] = here.size[0]
@@ -161,11 +159,11 @@ def expand_some(
 
 @kernel
 def expand_carrying(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int]:
-    """Offer what follows states with one in hand, numbers `first` to `last`; there must be room in this layer.
+    """Offer the successors of states `first` to `last` with an object in hand. This layer must have enough space.
 
-    Returns the next layer, the smallest total left out of it, and how many states were expanded.
+    Return the next layer, the smallest total dropped from it, and the number of expanded states.
     """
     n, m = inst.to_bin.shape
     smallest, expanded = INFINITE, 0
@@ -182,7 +180,7 @@ def expand_carrying(
             home_leg = inst.bins[b, d]
         left = here.key[k] >> PLACE_BITS
         row = row_of(table, left)
-        arrival = Arrival(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
+        arrival = LegEnd(left, row, int(here.cost[k] + home_leg), 2 * k + 1)
         offer_bin(inst, table, here, arrival, d, d, limit)
         if after.size[0] + 2 * n > after.key.size:
             after, dropped = with_room_among(after, 2 * n, width)
@@ -191,16 +189,19 @@ def expand_carrying(
             if not left >> j & 1:
                 continue
             leg = inst.between[i, j] if i >= 0 else inst.from_bin[b, j]
-            arrival = Arrival(left, row, int(here.cost[k] + leg), 2 * k)
+            arrival = LegEnd(left, row, int(here.cost[k] + leg), 2 * k)
             offer_second(inst, table, after, arrival, j, d, limit)
     return after, smallest, expanded
 
 
 @kernel
 def expand_empty(
-    inst: Instance, table: Table, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
+    inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int, int]:
-    """The same for states with empty hands; returns the index of the end of the shortest complete tour, too."""
+    """Offer the successors of states `first` to `last` with empty hands.
+
+    Return the same as `expand_carrying`, and the index of the end of the shortest complete tour, or -1.
+    """
     n, m = inst.to_bin.shape
     smallest, expanded, end = INFINITE, 0, -1
     for k in range(first, last):
@@ -218,6 +219,6 @@ def expand_empty(
             smallest = min(smallest, dropped)
         for i in range(n):
             if left >> i & 1:
-                arrival = Arrival(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
+                arrival = LegEnd(left, row, int(here.cost[k] + inst.from_bin[b, i]), 2 * k)
                 offer_only(inst, table, after, arrival, i, limit)
     return after, smallest, expanded, end

@@ -1,6 +1,6 @@
-"""The full table, which holds every subset of the objects: it is filled, and a shortest tour followed in it.
+"""The full table, which contains every subset of the objects, and a shortest tour in it.
 
-Small tables are filled by numpy where numba, which takes 0.5 s to load, is not loaded.
+Small tables are filled by NumPy if numba, which takes 0.5 s to load, is not loaded.
 """
 
 import sys
@@ -8,32 +8,30 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate, Proof
 from planner.exact.instance import Instance
-from planner.exact.table import Solution, Table, fill_layers, new_table, walk
+from planner.exact.table import CostTable, Solution, fill_layers, new_table, walk
+from planner.plan import Certificate, Proof
 
 COMPILER = "numba"
-SMALL_TABLE = 1 << 23  # bytes, 14 objects and 6 bins: filled in 10 ms by kernels, in 50 by numpy
+SMALL_TABLE = 1 << 23  # bytes: 14 objects and 6 bins, filled in 10 ms by kernels and in 50 ms by NumPy
 
 
 def full_table_bytes(inst: Instance) -> int:
-    """Memory of the full table in int32, about."""
+    """Return the approximate memory of the full table in int32."""
     n, m = inst.to_bin.shape
     return int(8 * (m * m + n) << n)
 
 
 def by_table(inst: Instance) -> Solution:
-    """Fill the full table and follow a shortest tour."""
     table = filled_table(inst)
     length, actions = follow(inst, table, len(table.bin) - 1)
     return Solution(actions, length, Certificate(Proof.FULL_TABLE, inst.unit, length))
 
 
-def filled_table(inst: Instance) -> Table:
-    """The full table."""
+def filled_table(inst: Instance) -> CostTable:
     table = new_table(inst, np.arange(len(inst.home)))
     if COMPILER in sys.modules or full_table_bytes(inst) > SMALL_TABLE:
-        from planner.exact.table_kernels import fill  # loaded only where it is needed
+        from planner.exact.table_kernels import fill  # imported late, because it loads numba
 
         fill(inst, table)
     else:
@@ -41,11 +39,14 @@ def filled_table(inst: Instance) -> Table:
     return table
 
 
-def follow(inst: Instance, table: Table, row: int) -> tuple[int, list[int]]:
-    """Length of a shortest tour by a full table, and its actions as in `Solution`; `row` is that of the root."""
+def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
+    """Return the length of a shortest tour by a full table, and its actions as in `Solution`.
+
+    `row` is the table row of the objects left at the root.
+    """
     actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
     if COMPILER in sys.modules:
-        from planner.exact.table_kernels import walk as compiled_walk  # loaded only where it is needed
+        from planner.exact.table_kernels import walk as compiled_walk
 
         length, count = compiled_walk(inst, table, row, actions)
     else:

@@ -1,4 +1,4 @@
-"""A routing problem for one or two hands as the flat arrays that the exact kernels work on."""
+"""A routing problem for one or two hands as the flat arrays that the kernels use."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,28 +13,28 @@ FAR = 1 << 59  # longer than any tour
 
 
 class Instance(NamedTuple):
-    """n objects, m bins and the root (where the person is); distances in integer units, int64.
+    """A problem with n objects, m bins and the root (the person's position), with distances in integer units.
 
-    A leg that full hands do not allow is `FAR`. So one hand needs no kernels of its own: with it, every leg from an
-    object to another one is.
+    A leg that full hands do not allow is `FAR`. So one hand needs no separate kernels: all legs between objects are
+    `FAR`.
     """
 
     between: NDArray[np.int64]  # object to object, (n, n); `FAR` from an object to itself
     to_bin: NDArray[np.int64]  # object to bin, (n, m)
     from_bin: NDArray[np.int64]  # bin to object, (m, n)
     bins: NDArray[np.int64]  # bin to bin, (m, m)
-    home: NDArray[np.int64]  # bin of each object, (n,) int64
+    home: NDArray[np.int64]  # bin of each object, (n,)
     root: NDArray[np.int64]  # root to object, (n,)
     root_bin: NDArray[np.int64]  # root to bin, (m,)
-    carried: NDArray[np.int64]  # bins of the objects carried at the root, (0..2,) int64
-    tie: int  # tours that differ by no more than this are equal, units
+    carried: NDArray[np.int64]  # bins of the objects carried at the root, (0..2,)
+    tie: int  # largest difference between tours that count as equal, units
     unit: float  # m per unit
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
-    """Flatten a problem of capacity one or two, with its integer distances, closed to a metric, (k, k).
+    """Convert a problem of capacity one or two, with its integer distances closed to a metric, (k, k).
 
-    Objects are its shipments, bins its delivery locations in ascending order.
+    Objects are the shipments, and bins the delivery locations in ascending order.
     """
     pickups = [s.pickup for s in problem.shipments]
     places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
@@ -66,7 +66,7 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
 def to_visits(
     instance: Instance, actions: Sequence[int], names: Sequence[str], carried: Sequence[str]
 ) -> list[Visit]:
-    """Turn actions (k >= 0 picks object k, -1 - b leaves all that belongs in bin b) into visits, by name."""
+    """Convert actions (k >= 0 picks object k, -1 - b leaves all objects of bin b there) to visits."""
     held = list(zip(instance.carried.tolist(), carried, strict=True))
     visits: list[Visit] = []
     for action in actions:

@@ -1,4 +1,4 @@
-"""Lagrangian multipliers that make the relaxed tour pick each object about once."""
+"""Lagrangian multipliers with which the relaxed tour picks each object about once."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, cast
@@ -7,64 +7,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
-from planner.exact.deadline import NEVER, Deadline
 from planner.exact.instance import Instance
-from planner.exact.table import Table, new_table, rows_of
+from planner.exact.table import CostTable, new_table, rows_of
 from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
+from planner.solvers import NEVER, Deadline
 
-DECAY = 0.97  # of the record of violations, from one step to the next
+DECAY = 0.97  # share of the violation kept from one step to the next
 MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
-STEP_ROWS = 60_000  # rows filled by one fit of a large table, about
-SLICE = 1 << 13  # rows that are filled between looks at the clock: some 3 ms
-
-
-STEP, ROW, BEST = range(3)  # progress of an ascent
+STEP_ROWS = 60_000  # approximate number of rows filled by one fit of a large table
+SLICE = 1 << 13  # rows filled between two checks of the deadline, in about 3 ms
+STEP, ROW, BEST = range(3)  # indices of the progress of an ascent
 
 
 class Ascent(NamedTuple):
-    """Subgradient ascent of multipliers, as far as it has got."""
+    """State of a subgradient ascent of multipliers."""
 
     current: NDArray[np.float64]  # multipliers, (n,)
     direction: NDArray[np.float64]  # their last change, (n,)
-    violation: NDArray[np.float64]  # as in `Bound`, (n,)
-    best: NDArray[np.int64]  # the multipliers with the best bound, (n,) int64
-    sizes: NDArray[np.float64]  # length of each step, as a share of what would close the gap, (steps,)
-    progress: NDArray[
-        np.int64
-    ]  # steps taken, rows filled for the next one, and the best bound, units; (3,) int64
+    violation: NDArray[np.float64]  # see `Bound`, (n,)
+    best: NDArray[np.int64]  # the multipliers with the best bound, (n,)
+    sizes: NDArray[np.float64]  # length of each step as a share of the gap, (steps,)
+    progress: NDArray[np.int64]  # steps taken, rows filled for the next step, and best bound, units; (3,)
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
     """A lower bound of the cost-to-go from every state of an instance."""
 
-    instance: Instance  # the instance
-    table: Table  # relaxed cost-to-go
+    instance: Instance
+    table: CostTable  # relaxed cost-to-go
     root: int  # bound at the root, units
-    # how far relaxed tours were from picking each object once, recent ones most, (n,)
+    # deviation of relaxed tours from one pick per object, weighted towards recent tours, (n,)
     violation: NDArray[np.float64]
 
     @property
     def prices(self) -> int:
-        """Sum of all multipliers."""
         return int(self.table.multipliers.sum())
 
 
 def first_bound(instance: Instance, upper: int) -> Bound:
-    """Fit multipliers with all objects in one group, some 10 ms; `upper` is the length of a known tour, units."""
+    """Fit multipliers with all objects in one group, in about 10 ms. `upper` is the length of a known tour, units."""
     n = len(instance.home)
     table = new_table(instance, np.zeros(n, np.int64))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
-    return cast(Bound, bound)  # it never runs out of time
+    return cast(Bound, bound)  # without a deadline it is not None
 
 
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
-    """The bound that the groups and multipliers of a warm start give, by one filling of a table.
+    """Return the bound that the groups and multipliers of a warm start give, by filling one table.
 
-    The last groups are merged with the first if the table would have more than `max_rows`.
+    The last groups are merged with the first one if the table would have more than `max_rows`.
     """
     n, group = len(instance.home), start.group.copy()
     while rows_of(group) > max_rows and group.max(initial=0) > 0:
@@ -77,11 +72,11 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
 
 
 def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
-    """Split the groups and fit again, until the gap closes, the table has reached its size, or time is over.
+    """Split the groups and fit again until the gap closes, the table has reached its size, or the deadline has passed.
 
-    Each time the object with the largest violation gets a group of its own.
+    Each split gives the object with the largest violation a group of its own.
     """
-    warm = not bound.violation.any()  # a warm start: first see how good its multipliers are here
+    warm = not bound.violation.any()  # after a warm start, fit its groups first
     while bound.root < upper - bound.instance.tie:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
@@ -102,7 +97,7 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
 def _one_apart(
     group: NDArray[np.int64], violation: NDArray[np.float64], max_rows: int
 ) -> NDArray[np.int64] | None:
-    """Give the object with the largest violation a group of its own; None if all have one, or it takes more rows."""
+    """Return the groups with one more, or None if every object has one already or the table would be too large."""
     size = np.bincount(group)[group] if len(group) else group
     if size.max(initial=1) == 1:
         return None
@@ -114,8 +109,8 @@ def _one_apart(
 def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     """Group the objects by bin if that gives a better bound.
 
-    Where bins are far apart, much of a tour's length is in how often it visits each bin. A small table counts that
-    only with these groups.
+    If bins are far apart, much of a tour's length depends on the number of visits to each bin. A small table counts
+    these only with such groups.
     """
     group = np.unique(bound.instance.home, return_inverse=True)[1]
     if bound.root >= upper - bound.instance.tie or rows_of(group) > max_rows:
@@ -134,17 +129,17 @@ def _refitted(
 
 def fit(
     instance: Instance,
-    table: Table,
+    table: CostTable,
     multipliers: NDArray[np.float64],
     upper: int,
     steps: int,
     step_sizes: tuple[float, float],
     deadline: Deadline,
 ) -> Bound | None:
-    """Subgradient ascent with momentum (Held, Wolfe and Crowder 1974) from some multipliers (n,).
+    """Fit multipliers by subgradient ascent with momentum (Held, Wolfe and Crowder 1974), starting from some (n,).
 
-    `table` receives the best table. The first and the last of the steps have the given sizes, as a share of what would
-    close the gap to `upper`, the length of a known tour. None if the deadline was over before the first.
+    `table` receives the best table. `step_sizes` are those of the first and the last step, as shares of the gap to
+    `upper`, the length of a known tour. Return None if the deadline passed before the end.
     """
     n, first_size, last_size = len(instance.home), *step_sizes
     ascent = Ascent(
@@ -162,11 +157,11 @@ def fit(
 
 
 @kernel
-def climb(inst: Instance, table: Table, ascent: Ascent, upper: int, rows: int) -> bool:
-    """Continue an ascent, in place, until `rows` rows were filled; whether it is finished.
+def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
+    """Continue an ascent in place until `rows` rows were filled. Return True if it is finished.
 
-    Then the table holds the best multipliers, and is filled for them. All is one kernel: a thread that returns to
-    Python after each table would wait for others there.
+    The table then contains the best multipliers and is filled for them. Everything is in one kernel, because a thread
+    that returned to Python after each table would wait for the interpreter lock.
     """
     n, progress = inst.home.size, ascent.progress
     actions = np.empty(2 * n + 2, np.int64)
@@ -187,10 +182,12 @@ def climb(inst: Instance, table: Table, ascent: Ascent, upper: int, rows: int) -
 
 
 @kernel
-def _stepped(inst: Instance, table: Table, ascent: Ascent, upper: int, actions: NDArray[np.int64]) -> bool:
-    """With a filled table, take a step, or go back to the best multipliers for good; False if they are in the table.
+def _stepped(
+    inst: Instance, table: CostTable, ascent: Ascent, upper: int, actions: NDArray[np.int64]
+) -> bool:
+    """Take a step with a filled table, or return to the best multipliers at the end.
 
-    `actions`, shape (2 n + 2,), is room for those of a tour.
+    Return False if the table already contains the best ones. `actions`, (2 n + 2,), is scratch space.
     """
     progress, k = ascent.progress, ascent.progress[STEP]
     total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
@@ -222,9 +219,9 @@ def step(
     direction: NDArray[np.float64],
     violation: NDArray[np.float64],
 ) -> bool:
-    """Raise the prices of objects that a relaxed tour picks too often; False if it picks each once.
+    """Raise the prices of objects that a relaxed tour picks too often. Return False if it picks each object once.
 
-    `gap` is what the bound lacks, units, and `step_size` a share of it; the other arrays are those of `Ascent`.
+    `gap` is the gap of the bound, units, and `step_size` a share of it. The other arrays are those of `Ascent`.
     """
     n = current.size
     surplus = np.full(n, -1.0)

@@ -1,4 +1,4 @@
-"""The states of one layer of the search: added one by one, then reduced to the most promising."""
+"""The states of a layer of the search."""
 
 from typing import NamedTuple
 
@@ -9,24 +9,24 @@ from mjsim.support.kernels import inlined, kernel
 from planner.exact.table import INFINITE
 
 NO_PARENT = -1
-FIRST_ROOM = 1 << 12  # states of a new layer
+FIRST_ROOM = 1 << 12  # capacity of a new layer, in states
 
 
 class Nodes(NamedTuple):
-    """States of one layer with a hash index; the arrays have room to grow."""
+    """States of a layer with a hash index. The arrays have spare entries at the end."""
 
-    size: NDArray[np.int64]  # number of states, (1,) int64
-    key: NDArray[np.int64]  # code of each state, int64
-    cost: NDArray[np.int64]  # length of the shortest known path to it, int64
-    total: NDArray[np.int64]  # cost plus bound of the cost-to-go, int64
-    # 2 x index of the state before + (1 if that is in the same layer), or `NO_PARENT`, int64
+    size: NDArray[np.int64]  # number of states, (1,)
+    key: NDArray[np.int64]  # code of each state
+    cost: NDArray[np.int64]  # length of the shortest known path to it
+    total: NDArray[np.int64]  # cost plus bound of the cost-to-go
+    # 2 x index of the previous state + (1 if that is in the same layer), or `NO_PARENT`
     parent: NDArray[np.int64]
-    slots: NDArray[np.int32]  # hash table of indices, -1 where empty, a power of two long, int32
+    slots: NDArray[np.int32]  # hash table of indices, -1 if empty; its length is a power of two
 
 
 @kernel
 def new_nodes(room: int) -> Nodes:
-    """An empty layer with room for a number of states, a power of two."""
+    """Return an empty layer with space for a number of states, which is a power of two."""
     return Nodes(
         np.zeros(1, np.int64),
         np.empty(room, np.int64),
@@ -39,7 +39,7 @@ def new_nodes(room: int) -> Nodes:
 
 @inlined
 def slot_of(nodes: Nodes, key: int) -> int:
-    """Slot that holds a key, or the empty one where it belongs."""
+    """Return the slot of a key, or the empty slot where it belongs."""
     mask = nodes.slots.size - 1
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     slot = int(mixed >> np.uint64(29)) & mask
@@ -50,7 +50,7 @@ def slot_of(nodes: Nodes, key: int) -> int:
 
 @kernel
 def with_room(nodes: Nodes, more: int) -> Nodes:
-    """The same layer with room for more states."""
+    """Return the layer with space for more states."""
     size = nodes.size[0]
     room = nodes.key.size
     if size + more <= room:
@@ -70,7 +70,7 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
 
 @inlined
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
-    """Add a state, or a shorter path to it; there must be room."""
+    """Add a state, or a shorter path to it. There must be space."""
     slot = slot_of(nodes, key)
     k = nodes.slots[slot]
     if k < 0:
@@ -87,7 +87,7 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 @kernel
 def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
-    """Least number that at least `count` of the first `size` values, shape (room,), do not exceed, by bisection."""
+    """Return the least number not exceeded by at least `count` of the first `size` values, (room,), by bisection."""
     low, high = INFINITE, -INFINITE
     for k in range(size):
         low, high = min(low, values[k]), max(high, values[k])
@@ -105,7 +105,7 @@ def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
 
 @kernel
 def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
-    """Only the most promising states, and the smallest total left out (`INFINITE` if none was)."""
+    """Return the `width` most promising states, and the smallest total dropped (`INFINITE` if none was)."""
     size = nodes.size[0]
     if size <= width:
         return nodes, INFINITE
@@ -130,7 +130,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 
 @kernel
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
-    """Make room, if need be by leaving out states that cannot be among the best `width` later."""
+    """Make space for more states, if necessary by dropping states that cannot be among the best `width` later."""
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
         nodes, smallest = keep_best(nodes, 2 * width)

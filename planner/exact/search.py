@@ -1,4 +1,4 @@
-"""Annealing, then a layered search that widens from pass to pass until the tour is proven or the budget is spent."""
+"""Annealing, then a layered search that widens until the tour is proven or the budget is spent."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -6,20 +6,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate, Proof
 from planner.exact.annealing import anneal, anneal_from, tour_actions, warm_order
-from planner.exact.deadline import NEVER, Deadline
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound, counted_by_bin, first_bound, grown, warm_bound
 from planner.exact.nodes import FIRST_ROOM, NO_PARENT, keep_best, new_nodes
 from planner.exact.table import BIN_ROWS, INFINITE, Solution
 from planner.exact.warm_start import Start
+from planner.plan import Certificate, Proof
+from planner.solvers import NEVER, Deadline
 
 ANNEALING_MOVES = 10_000
-# A first plan from a warm start: some 20 ms.
+# A first plan from a warm start, in about 20 ms.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # mean legs
+WARM_TEMPERATURES = (0.1, 0.02)  # in mean leg lengths
 
 
 def improving_tours(
@@ -32,23 +32,29 @@ def improving_tours(
 ) -> Iterator[Solution]:
     """Yield a first tour and bound, then those after each pass of the search.
 
-    `work` is how many states may be expanded, `seed` that of the annealing; `passes` are those of `ExactSolver`. There
-    is always a first tour; no pass begins after the deadline.
+    Args:
+        instance: The problem.
+        seed: Seed of the annealing.
+        work: Largest number of states to expand.
+        deadline: No pass begins after it. The first tour is always found.
+        passes: Passes of `ExactSolver`.
+        start: Warm start, or None.
     """
     bound, upper, lower, actions = _first_tour(instance, seed, work, start)
     yield Solution(actions, min(lower, upper), _certificate(bound))
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
-        # A pass that is given up proves nothing, and one hardly wider than the last proves little more.
+        # An unfinished pass proves nothing, and one hardly wider than the last proves little more.
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS and not by_bin:  # once: later, the bound has outgrown so few rows
+        if rows >= BIN_ROWS and not by_bin:  # only once, because later tables are larger
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
         work -= result.expanded
-        done, rate = width, max(1, -(-result.expanded // width))  # a wider pass expands fewer per width
+        # A wider pass expands fewer states per unit of width.
+        done, rate = width, max(1, -(-result.expanded // width))
         lower = max(lower, bound.root, result.lower)
         if result.actions is not None:
             upper, actions = result.upper, result.actions
@@ -58,7 +64,7 @@ def improving_tours(
 def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None
 ) -> tuple[Bound, int, int, list[int]]:
-    """A bound, the length of a first tour, a lower bound of all tours, and the actions of the first."""
+    """Return a bound, the length of a first tour, a lower bound of all tours, and the actions of the first tour."""
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -86,7 +92,7 @@ def _certificate(bound: Bound) -> Certificate:
 
 
 class Pass(NamedTuple):
-    """The result of a pass: length of the best tour known, its actions if it is new, and a lower bound, units."""
+    """Result of a pass: length of the best known tour, its actions if it is new, a lower bound, and expanded states."""
 
     upper: int
     actions: list[int] | None
@@ -95,10 +101,10 @@ class Pass(NamedTuple):
 
 
 def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: Deadline) -> Pass:
-    """Search all layers once for tours shorter than `upper` by more than a tie, keeping `width` states of each.
+    """Search all layers once for tours shorter than `upper` by more than a tie, and keep `width` states of each layer.
 
-    It gives up when more than `max_states` were expanded or the deadline is over; the lower bound is then that of the
-    root.
+    The pass ends early if more than `max_states` were expanded or the deadline has passed. The lower bound is then that
+    of the root.
     """
     n, prices = len(bound.instance.home), bound.prices
     limit = upper - bound.instance.tie + prices
@@ -129,7 +135,7 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
 def _actions(
     bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
 ) -> list[int]:
-    """The actions of a tour, found by following the parents back from its end."""
+    """Return the actions of a tour by following the parents back from its end."""
     keys = []
     k = end
     while True:

@@ -1,35 +1,33 @@
-"""The exact planner: for one person with one or two hands, up to 40 objects; OR-Tools for everything else."""
+"""The exact planner for one or two hands and up to 40 objects. It passes other problems to OR-Tools."""
 
 import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from planner.exact.deadline import Deadline
 from planner.exact.full_table import SMALL_TABLE, by_table, full_table_bytes
 from planner.exact.instance import Instance, make_instance, to_visits
 from planner.exact.table import BIN_ROWS, Solution
 from planner.exact.warm_start import Start, WarmStart
 from planner.plan import Plan
-from planner.problem import RoutingProblem
-from planner.solvers import SolveLimit
-from planner.tour import make_plan
+from planner.problem import RoutingProblem, make_plan
+from planner.solvers import Deadline, SolveLimit
 
-TABLE_RATE = 500e6  # bytes of a full table filled per second, roughly
-DEFAULT_WORK = 4_000_000  # states: some 4 s with the tables; for sessions, which plan often
+TABLE_RATE = 500e6  # approximate speed at which a full table is filled, bytes/s
+DEFAULT_WORK = 4_000_000  # states, expanded in about 4 s including tables; suits sessions, which plan often
 MAX_OBJECTS = 40
 
 
 @dataclass(frozen=True)
 class ExactSolver:
-    """Full table, or annealing and a widening layered search, until proven or out of budget.
+    """Uses the full table, or annealing and a widening search, until the plan is proven or the budget is spent.
 
-    A limit on work counts expanded states of the search; the full table is always finished.
+    A limit on work counts expanded states of the search. The full table is always finished.
 
     Attributes:
         name: Name in run records.
-        table_bytes: Largest full table; 0 always searches.
-        passes: Rows of the bound's table and states kept of each layer, at most, from pass to pass.
+        table_bytes: Size of the largest full table. 0 always searches.
+        passes: Largest number of rows of the bound's table and of states kept per layer, for each pass.
     """
 
     name: str = "exact"
@@ -46,20 +44,17 @@ class ExactSolver:
     )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan the rest of a task.
+        """Plan the rest of a task. The plan is OPTIMAL if proven, else FEASIBLE with the best bound so far.
 
         Args:
-            problem: What is left to do.
-            seed: Of the annealing.
-            limit: States or seconds; by default 4 million states. OR-Tools counts other work, so limits on work are
-                not passed on to it.
-
-        Returns:
-            OPTIMAL where proven, else FEASIBLE with the best bound so far.
+            problem: The rest of the task.
+            seed: Seed of the annealing.
+            limit: States or seconds, by default 4 million states. A limit on states is not passed to OR-Tools, which
+                counts other work.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+            from planner.ortools_solver import OrToolsSolver  # imported late, because it is slow to import
 
             return OrToolsSolver().solve(problem, limit=replace(limit, work=None))
         *_, best = self._plans(problem, seed, limit, table_at_once=True)
@@ -76,15 +71,15 @@ class ExactSolver:
         """Yield the annealed tour with a first bound, then each shorter tour or better bound.
 
         Args:
-            problem: What is left to do.
-            seed: Of the annealing.
-            limit: As in `solve`.
-            warm: What is known from similar problems. The first plan is then that of a narrow search with it,
-                which is better; the last may differ from that of `solve` where it is not proven, or ties.
+            problem: The rest of the task.
+            seed: Seed of the annealing.
+            limit: See `solve`.
+            warm: Results for similar problems. The first plan then comes from a narrow search and is better. The last
+                plan may differ from that of `solve` if it is not proven, or is one of several optimal plans.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver  # loaded only where it is needed
+            from planner.ortools_solver import OrToolsSolver
 
             yield from OrToolsSolver().improve(problem, limit=replace(limit, work=None))
             return
@@ -95,11 +90,11 @@ class ExactSolver:
                 yield plan
 
     def applies(self, problem: RoutingProblem) -> bool:
-        """Whether table and search apply; OR-Tools plans all other problems."""
+        """Return True if table and search apply. OR-Tools plans all other problems."""
         return not self.why_not(problem)
 
     def why_not(self, problem: RoutingProblem) -> str:
-        """Why table and search do not apply, empty where they do."""
+        """Return the reason why table and search do not apply, or an empty text if they do."""
         if problem.capacity > 2:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
@@ -107,7 +102,6 @@ class ExactSolver:
         return "" if problem.integers.is_metric else "the distances break the triangle inequality"
 
     def table_fits(self, instance: Instance) -> bool:
-        """Whether the full table is small enough."""
         return full_table_bytes(instance) <= self.table_bytes
 
     def _plans(
@@ -119,7 +113,7 @@ class ExactSolver:
         table_at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Better and better plans; only one where a table is filled at once."""
+        """Yield better and better plans, or only one if a table is filled at once."""
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
@@ -146,10 +140,8 @@ class ExactSolver:
         tabled: bool,
         start: Start | None,
     ) -> Iterator[Solution]:
-        """Better and better tours and bounds: annealed, then by the full table or by passes of the search."""
-        from planner.exact.search import (
-            improving_tours,  # brings the compiled kernels, which take 0.5 s to load
-        )
+        """Yield better and better tours and bounds: annealed, then by the full table or the search."""
+        from planner.exact.search import improving_tours  # imported late: kernels take 0.5 s to load
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         passes = () if tabled else self.passes

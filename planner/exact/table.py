@@ -1,4 +1,4 @@
-"""Cost-to-go tables over subsets: exact ones, and relaxed ones that bound it from below.
+"""Cost-to-go tables over subsets: exact tables, and relaxed tables that bound them from below.
 
 States, with U the objects not yet picked and c_j the bin of j: E(U, b) at bin b with empty hands; V(U, b, d) at
 bin b carrying one object for d, with V(U, d, d) = E(U, d); Y(U, i) at object i holding only it; W(U, j, d) at
@@ -9,12 +9,12 @@ object j holding it and one for d. Leaving what belongs here is free and always 
     Y(U, i)    = min( D(i, c_i) + E(U, c_i),   min_{j in U} D(i, j) + W(U - j, j, c_i) )
     E(U, b)    = min_{i in U} D(b, i) + Y(U - i, i);    E({}, b) = 0
 
-The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups and keeps of each group only how
-many are left; any of a group may then be picked, though none twice in a row. Each pick of j costs a multiplier
-more; subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers and
-groups. With each object in a group of its own and no multipliers the table is exact.
+The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups and counts how many of each group are
+left. Any object of a group may then be picked, but none twice in a row. Each pick of j costs an additional
+multiplier. Subtracting the multipliers of U gives a lower bound of the cost-to-go from every U, for any multipliers
+and groups. If each object is its own group and there are no multipliers, the table is exact.
 
-This module needs numpy alone; `planner.exact.table_kernels` fills in the same numbers.
+This module needs only NumPy. `planner.exact.table_kernels` computes the same numbers.
 """
 
 import math
@@ -24,53 +24,53 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate
 from planner.exact.instance import FAR, Instance
+from planner.plan import Certificate
 
-BIN_ROWS = 50_000  # of a table that counts objects by bin: 30 objects and 6 bins
-SPARE = 8  # entries behind the last row: kernels read eight at a time
-# Units of the longest leg, and of a price, with which tours of 40 objects fit in int32, and in int64.
+BIN_ROWS = 50_000  # largest table that counts objects by bin, enough for 30 objects and 6 bins
+SPARE = 8  # entries after the last row, because kernels read eight at a time
+# Largest leg and price, in units, with which tours of 40 objects fit into int32, and largest price for int64.
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
 INFINITE = 1 << 60  # longer than any sum of lengths
 
 
-class Table(NamedTuple):
-    """Cost-to-go of the relaxed problem, multipliers of picks included; a row for each way to be left of the groups.
+class CostTable(NamedTuple):
+    """Cost-to-go of the relaxed problem, including multipliers. There is a row for each combination of numbers left.
 
-    Row r has r / (number of rows of all groups before) mod (size + 1) of a group left. Where every object is a group
-    of its own, the row is the subset of the objects left. Entries are int32 where all sums fit in, else int64.
+    In row r, r / (number of rows of all groups before) mod (size + 1) objects of a group are left. If every object is
+    its own group, the row number is the set of the objects left. Entries are int32 if all sums fit, else int64.
     """
 
-    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,) int64
-    size: NDArray[np.int64]  # how many objects each group has, (groups,) int64
-    stride: NDArray[np.int64]  # by how many rows picking an object goes down, (n,) int64
-    # of each row, V(., b, d) and then V(., d, b) for all d, for one b after the other, then Y; flat, with `SPARE`
-    # more at the end
+    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,)
+    size: NDArray[np.int64]  # number of objects of each group, (groups,)
+    stride: NDArray[np.int64]  # difference of rows before and after a pick of each object, (n,)
+    # rows one after the other, flat: for each b, V(., b, d) for all d, then V(., d, b) for all d; then Y; at the
+    # end, `SPARE` entries
     entries: NDArray[np.integer[Any]]
     bin: NDArray[np.integer[Any]]  # E and V, (rows, m, m), entry [b, d]; a view of the entries
-    # Y, (rows, n), a view of the entries; only where not all of the group of object i are left
+    # Y, (rows, n), a view of the entries, valid only if not all objects of the group of i are left
     object: NDArray[np.integer[Any]]
-    multipliers: NDArray[np.int64]  # price of a pick, (n,) int64
-    dearest: int  # the largest multiplier, and minus it the smallest, that the entries have room for
+    multipliers: NDArray[np.int64]  # price of a pick, (n,)
+    dearest: int  # largest absolute value of a multiplier that fits the type of the entries
 
 
 @dataclass(frozen=True)
 class Solution:
     """A tour and a bound."""
 
-    # a tour: k >= 0 picks object k, -1 - b goes to bin b and leaves all that belongs there
+    # the tour: k >= 0 picks object k, -1 - b goes to bin b and leaves all objects that belong there
     actions: list[int]
     bound: int  # no tour is shorter than this, units
-    certificate: Certificate  # what proves the bound
+    certificate: Certificate  # proof of the bound
 
 
 def rows_of(group: NDArray[np.int64]) -> int:
-    """How many rows the table has, by the group of each object, (n,)."""
+    """Return the number of rows of a table, given the group of each object, (n,)."""
     return math.prod(int(k) + 1 for k in np.bincount(group))
 
 
-def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
-    """An unfilled table with no multipliers, by the group of each object, numbered from 0, (n,)."""
+def new_table(inst: Instance, group: NDArray[np.int64]) -> CostTable:
+    """Return an unfilled table without multipliers, given the group of each object, numbered from 0, (n,)."""
     n, m = inst.to_bin.shape
     size = np.bincount(group).astype(np.int64)
     below = np.ones(len(size) + 1, np.int64)
@@ -78,7 +78,7 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
     rows, width, narrow = int(below[-1]), 2 * m * m + n, _longest(inst) <= LONGEST_32
     entries = np.empty(rows * width + SPARE, np.int32 if narrow else np.int64)
     table = entries[: rows * width].reshape(rows, width)
-    return Table(
+    return CostTable(
         group,
         size,
         below[:-1][group] if n else group,
@@ -91,13 +91,12 @@ def new_table(inst: Instance, group: NDArray[np.int64]) -> Table:
 
 
 def _longest(inst: Instance) -> int:
-    """The longest leg between objects and bins, units."""
     longest = max(legs.max(initial=0) for legs in (inst.to_bin, inst.from_bin, inst.bins))
     return int(np.where(inst.between < FAR, inst.between, 0).max(initial=longest))
 
 
-def fill_layers(inst: Instance, table: Table) -> None:
-    """Compute all rows in numpy, by how many objects are left; each object must be a group of its own."""
+def fill_layers(inst: Instance, table: CostTable) -> None:
+    """Fill all rows with NumPy, by number of objects left. Each object must be its own group."""
     n, m = inst.to_bin.shape
     bins, objects = np.arange(m), np.arange(n)
     there = (np.arange(1 << n)[:, None] >> objects & 1).astype(bool)
@@ -118,11 +117,11 @@ def fill_layers(inst: Instance, table: Table) -> None:
         table.bin[rows], table.object[rows] = carrying, np.minimum(alone, drop + empty[:, inst.home])
 
 
-def walk(inst: Instance, table: Table, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
-    """Follow a best (relaxed) tour from the root, in plain Python; `table_kernels` compiles it.
+def walk(inst: Instance, table: CostTable, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
+    """Follow a best (relaxed) tour from the root. `table_kernels` compiles this function.
 
-    `row` is that of the objects left at the root; `actions` receives those of `Solution`, at least (2 n + 2,).
-    Returns the length of the tour with multipliers, and the number of actions.
+    `row` is the row of the objects left at the root. `actions`, (2 n + 2,) or larger, receives the actions of
+    `Solution`. Return the length of the tour with multipliers, and the number of actions.
     """
     to_object, to_bin, at = inst.root, inst.root_bin, -1
     first = inst.carried[0] if inst.carried.size > 0 else -1  # bins of what is in hand, -1 for none

@@ -1,4 +1,4 @@
-"""Cost of the rest of a task after each possible next visit: all from one full table, or one exhaustive pass."""
+"""Costs of the rest of a task after each possible next visit, from one full table or one exhaustive pass."""
 
 from collections.abc import Sequence
 
@@ -6,25 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
-from planner.exact.deadline import Deadline
 from planner.exact.expand import PLACE_BITS, expand, offer_roots
 from planner.exact.instance import Instance
 from planner.exact.multipliers import Bound
 from planner.exact.nodes import FIRST_ROOM, Nodes, new_nodes, slot_of
-from planner.exact.table import INFINITE, Table
+from planner.exact.table import INFINITE, CostTable
 from planner.plan import Visit, VisitKind
+from planner.solvers import Deadline
 
-UNLIMITED = 1 << 40  # states of a layer
+UNLIMITED = 1 << 40  # width of a pass that keeps all states
 
 Costs = dict[Visit, int]  # length of the rest of the task, units, by next visit
 
 
 def costs_in(
-    instance: Instance, table: Table, row: int, names: Sequence[str], carried: Sequence[str]
+    instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Costs of all next visits by a filled table; with a relaxed one these are lower bounds, prices included.
+    """Return the costs of all next visits by a filled table. A relaxed table gives lower bounds, including prices.
 
-    `row` is that of the objects left at the root; `names` and `carried` are those of the instance's objects.
+    `row` is the row of the objects left at the root. `names` and `carried` are those of the instance's objects.
     """
     held, home = instance.carried.tolist(), instance.home
     costs = {}
@@ -47,11 +47,20 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Costs of all next visits, exact where at most `longest`, else some number greater than it.
+    """Return the costs of all next visits. Those up to `longest`, units, are exact, and others are some larger number.
 
-    Every state on a tour of at most that length, units, is visited, layer by layer; a sweep back finds the shortest
-    rest of the task from each. `visits` are those possible next: places of what is carried, then picks. None if there
-    are more than `max_states` or the deadline is over.
+    Every state on a tour of at most that length is visited, layer by layer. A sweep back then finds the shortest rest
+    of the task from each state.
+
+    Args:
+        bound: Bound of the cost-to-go.
+        visits: Possible next visits: places of carried objects, then picks.
+        longest: Length up to which costs are exact, units.
+        max_states: Largest number of states.
+        deadline: End of the search.
+
+    Returns:
+        Costs in units, or None if there are too many states or the deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
@@ -77,13 +86,16 @@ def costs_by_pass(
         rest[k] = sweep(instance, layers[k], after, after_rest)
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    # With one hand that is full, `found` ends with the picks that `visits` lacks.
+    # If the only hand is full, `found` ends with picks that are not in `visits`.
     return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}
 
 
 @kernel
 def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
-    """Length of the rest of the task from a state, by `rest` of all nodes, (states,); `INFINITE` if it is no node."""
+    """Return the length of the rest from a state, given `rest` of all nodes, (states,).
+
+    `INFINITE` if it is not a node.
+    """
     k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
     return int(rest[k]) if k >= 0 else INFINITE
 
@@ -92,7 +104,10 @@ def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int
 def after_second(
     inst: Instance, after: Nodes, after_rest: NDArray[np.int64], left: int, j: int, d: int
 ) -> int:
-    """Length of the rest from object j, just picked (`left` no longer has it), with one for d in hand too."""
+    """Return the length of the rest from object j, just picked, with an object for d in the other hand.
+
+    `left` does not contain j.
+    """
     m = inst.bins.shape[0]
     c = inst.home[j]
     first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
@@ -102,7 +117,7 @@ def after_second(
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Length of the rest of the task from each state of a layer, (states,), given those of the next layer."""
+    """Return the length of the rest from each state of a layer, (states,), given those of the next layer."""
     n, m = inst.to_bin.shape
     size = here.size[0]
     rest = np.full(size, INFINITE, np.int64)
@@ -116,7 +131,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
             if (left >> i) & 1:
                 best = min(best, inst.from_bin[b, i] + look_up(after, after_rest, left ^ (1 << i), m * m + i))
         rest[k] = best
-    for k in range(size):  # with one in hand: drop it, or pick another
+    for k in range(size):  # with an object in hand: leave it, or pick another
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         i, b, d = place - m * m, place // m, place % m
         left = here.key[k] >> PLACE_BITS
@@ -138,7 +153,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
 def root_costs(
     inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Length of the task by next action, (actions,): places of what is carried, then picks."""
+    """Return the length of the task by next action, (actions,): places of carried objects, then picks."""
     n, m = inst.to_bin.shape
     count = inst.carried.size
     everything = (1 << n) - 1

@@ -1,7 +1,7 @@
-"""A full table of costs-to-go for the successive states of one task.
+"""A full table for the successive states of a task.
 
-A table holds for every later state in which nothing was moved, for any position and anything carried. So it is filled
-once for a task, when 18 objects are left, and looked up from then on.
+The table remains valid for every later state in which no object was moved, for any position of the person and any
+carried objects. It is filled once 18 objects are left.
 """
 
 import time
@@ -11,27 +11,25 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Certificate, Proof
 from planner.exact.full_table import filled_table, follow
 from planner.exact.instance import FAR, Instance, make_instance, to_visits
-from planner.exact.table import Table
-from planner.plan import Plan, Visit
-from planner.problem import RoutingProblem
-from planner.tour import make_plan
+from planner.exact.table import CostTable
+from planner.plan import Certificate, Plan, Proof, Visit
+from planner.problem import RoutingProblem, make_plan
 
 if TYPE_CHECKING:
     from planner.exact.solver import ExactSolver
 
 
 class TableState(NamedTuple):
-    """A state of a task as a row of a full table; the instance has the present root.
+    """A state of a task as a row of a full table. The instance has the present root.
 
-    `metric` is the integer distances between the locations of the present problem, consistent with the table, (k, k),
-    in `unit`, m.
+    `metric`, (k, k), contains the integer distances between the locations of the present problem, consistent with the
+    table, in `unit`, m.
     """
 
     instance: Instance
-    table: Table
+    table: CostTable
     row: int
     names: tuple[str, ...]
     metric: NDArray[np.int64]
@@ -42,18 +40,18 @@ class TableState(NamedTuple):
 class _Filled:
     problem: RoutingProblem
     instance: Instance
-    table: Table
+    table: CostTable
 
 
 class TaskTable:
-    """Fills a full table where the solver finds it small enough, and keeps it until an object was moved."""
+    """Fills a full table if the solver finds it small enough, and keeps it until an object was moved."""
 
     def __init__(self, solver: "ExactSolver") -> None:
         self._solver = solver
         self._filled: _Filled | None = None
 
     def plan(self, problem: RoutingProblem) -> Plan | None:
-        """A proven plan; None if the table would be too large, or does not apply."""
+        """Return a proven plan, or None if the table would be too large or does not apply."""
         started = time.perf_counter()
         state = self._at(problem)
         if state is None:
@@ -64,8 +62,11 @@ class TaskTable:
         return make_plan(problem, state.metric, visits, length, started, certificate)
 
     def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
-        """Length of the rest of the task, units, and the unit, m, by possible next visit; None as for `plan`."""
-        from planner.exact.table_regret import costs_in  # brings the compiled kernels
+        """Return the length of the rest of the task by possible next visit, units, and the unit, m.
+
+        None if the table would be too large or does not apply.
+        """
+        from planner.exact.table_regret import costs_in  # imported late, because it loads the kernels
 
         state = self._at(problem)
         if state is None:
@@ -74,7 +75,7 @@ class TaskTable:
         return costs_in(state.instance, state.table, state.row, state.names, carried), state.unit
 
     def _at(self, problem: RoutingProblem) -> TableState | None:
-        """The state of a problem in the table that is there, or in a new one."""
+        """Return the state of a problem in the present table, or in a new one."""
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
@@ -88,19 +89,19 @@ class TaskTable:
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
-    """A problem's state in a table that was filled for another one; None if it is not among its states."""
+    """Return a problem's state in a table filled for another problem, or None if it is not one of its states."""
     before, n = filled.problem, len(problem.shipments)
     same_kind = (problem.capacity, problem.resolution) == (before.capacity, before.resolution)
     if not same_kind or not set(problem.names) <= set(before.names):
         return None
     left = [before.number[name] for name in problem.names[:n]]
     if any(k >= len(before.shipments) for k in left):
-        return None  # carried when the table was filled, and lying about now
+        return None  # an object that was carried when the table was filled is loose now
     places = [problem.place(k) for k in range(len(problem.names))]
     visits = [*map(problem.pick, range(n)), *places]
     here, there = problem.stops(visits)[1:], before.stops(visits)[1:]
     if not np.array_equal(problem.distances[np.ix_(here, here)], before.distances[np.ix_(there, there)]):
-        return None  # something was moved
+        return None  # an object was moved
     metric = _metric(filled, problem, here, there)
     bins = sorted({s.delivery for s in before.shipments} | set(before.onboard))
     bin_of = [bins.index(before.location(visit)) for visit in places]
@@ -119,7 +120,7 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
 
 
 def _metric(filled: _Filled, problem: RoutingProblem, here: list[int], there: list[int]) -> NDArray[np.int64]:
-    """The metric of the table between locations of the present problem, with the present start."""
+    """Return the table's metric between locations of the present problem, with the present start."""
     metric = np.zeros(problem.distances.shape, np.int64)
     metric[np.ix_(here, here)] = filled.problem.integers.metric[np.ix_(there, there)]
     if here and problem.start not in here:

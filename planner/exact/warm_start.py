@@ -1,7 +1,7 @@
-"""Warm starts: what plans of similar problems tell about the next one.
+"""Warm starts: results of plans for similar problems.
 
-Any multipliers give a lower bound, for any objects left, wherever they lie. So those of one state of a task serve all
-later ones; only the table has to be filled anew, with the objects that are left.
+Any multipliers give a lower bound, for any objects left at any places. So those of one state of a task serve all
+later ones, and only the table has to be filled again for the objects left.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,30 +11,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.certificate import Proof
-from planner.plan import Plan, VisitKind
+from planner.plan import Plan, Proof, VisitKind
 from planner.problem import RoutingProblem
 
 
 class Start(NamedTuple):
-    """A warm start in the numbering of one instance."""
+    """A warm start in the numbering of an instance."""
 
-    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,) int64
-    multipliers: NDArray[np.int64]  # price of picking each object, units, (n,) int64
+    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,)
+    multipliers: NDArray[np.int64]  # price of picking each object, units, (n,)
     order: list[int]  # numbers of objects in the order of a good tour
     missing: list[int]  # numbers of the objects that are not in the order
 
 
 @dataclass(frozen=True)
 class WarmStart:
-    """What earlier plans tell about objects, by name."""
+    """Results of earlier plans, by object name."""
 
     multipliers: Mapping[str, float]  # price of picking an object in the relaxation, m
     groups: tuple[tuple[str, ...], ...] = ()  # objects that the relaxation counts together
     order: tuple[str, ...] = ()  # objects in the order in which a good tour may pick them
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
-        """With the results of one more plan; multipliers of objects that it is not about stay."""
+        """Return this warm start with the results of one more plan. Multipliers of other objects stay."""
         order = tuple(name for kind, name in plan.visits if kind is VisitKind.PICK)
         certificate = plan.certificate
         if certificate is None or certificate.proof is not Proof.RELAXATION:
@@ -45,9 +44,9 @@ class WarmStart:
         return WarmStart({**self.multipliers, **new}, groups, order)
 
     def numbered(self, names: Sequence[str], unit: float) -> Start | None:
-        """Renumbered for an instance of the objects of these names in its order, in its unit, m.
+        """Return the warm start for an instance with objects of these names, in its unit, m.
 
-        None where no multiplier of them is known. An object that is new costs the average and joins the first group.
+        None if no multiplier of these objects is known. A new object gets the mean price and joins the first group.
         """
         prices = {name: round(price / unit) for name, price in self.multipliers.items()}
         found = [prices[name] for name in names if name in prices]

@@ -10,13 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import random_problem
 
-from planner.certificate import Certificate, Proof
-from planner.checker import check
+from planner.checker import check, verify_optimal
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
-from planner.plan import Status
+from planner.plan import Certificate, Proof, Status
 from planner.solvers import SOLVERS, SolveLimit, solver
-from planner.verifier import verify_optimal
 
 seeds = st.integers(0, 2**32 - 1)
 SEARCH = ExactSolver(table_bytes=0)

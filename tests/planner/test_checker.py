@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from planning_cases import optimum, random_problem
 
 from planner import checker
-from planner.certificate import Proof
 from planner.checker import allowance, check
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.greedy_solver import GreedySolver
-from planner.plan import Status
+from planner.plan import Proof, Status
 
 SOLVERS = (ExactSolver(), ExactSolver(table_bytes=0), GreedySolver())
 CAPACITIES = st.integers(1, 4)
@@ -96,11 +95,11 @@ def test_a_table_is_filled_up_to_and_including_the_limit(capacity, solver, rows,
     rows = rows or int(np.prod([len(group) + 1 for group in certificate.groups]))
     false = dataclasses.replace(certificate, root=certificate.root + round(0.01 / certificate.unit))
     lie = dataclasses.replace(plan, certificate=false)
-    monkeypatch.setattr(checker, "MAX_ROWS", rows)
+    monkeypatch.setattr(checker, "CHECK_ROWS", rows)
     assert check(problem, plan) == pytest.approx(certificate.root * certificate.unit)
     with pytest.raises(ProblemError, match="certificate's root claims"):
         check(problem, lie)
-    monkeypatch.setattr(checker, "MAX_ROWS", rows - 1)
+    monkeypatch.setattr(checker, "CHECK_ROWS", rows - 1)
     assert check(problem, plan) == check(problem, lie) == 0.0
 
 

@@ -25,13 +25,13 @@ from planner.exact.solver import ExactSolver
 from planner.exact.warm_start import NOTHING_KNOWN
 from planner.greedy_solver import nearest_first
 from planner.plan import Plan, Status, VisitKind
+from planner.problem import possible_next, tour_length
 from planner.regret import RegretEvaluator
 from planner.route import TaskState, remaining
 from planner.service import Mode, Planner
 from planner.solver_source import TIE, SolverSource
 from planner.solvers import SolveLimit, solver
 from planner.task_problems import TaskProblems
-from planner.tour import possible_next, tour_length
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ from planning_cases import optimum, random_problem
 
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
+from planner.problem import possible_next
 from planner.regret import after, regrets
 from planner.solvers import SolveLimit, solver
-from planner.tour import possible_next
 
 seeds = st.integers(0, 2**32 - 1)
 TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)

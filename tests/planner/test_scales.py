@@ -10,14 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planning_cases import optimum, random_problem
 
-from planner.checker import check
+from planner.checker import check, verify_optimal
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.integer_distances import TOLERANCE
 from planner.plan import Status
 from planner.problem import RoutingProblem, Shipment
 from planner.solvers import SOLVERS, solver
-from planner.verifier import verify_optimal
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
 SCALES = [1e-200, 1e-9, 1e-5, 0.1, 1 / 3, 1.0, 1e3, 6e13, 1e15, 1e200]

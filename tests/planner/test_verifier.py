@@ -7,14 +7,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.certificate import Certificate, Proof
+from planner.checker import verify_optimal
 from planner.errors import ProblemError
 from planner.exact.solver import ExactSolver
 from planner.greedy_solver import GreedySolver
-from planner.plan import Status
+from planner.plan import Certificate, Proof, Status
 from planner.problem import RoutingProblem, Shipment
 from planner.solvers import SolveLimit
-from planner.verifier import verify_optimal
 from tests.planning_cases import optimum, random_problem
 
 SEARCH = ExactSolver(table_bytes=0)

@@ -12,7 +12,6 @@ from planning_cases import random_problem as points_or_metric
 
 from planner.checker import check
 from planner.exact.annealing import anneal, decode, tour_actions
-from planner.exact.deadline import NEVER
 from planner.exact.expand import row_of
 from planner.exact.instance import make_instance, to_visits
 from planner.exact.multipliers import counted_by_bin, first_bound, grown
@@ -21,10 +20,9 @@ from planner.exact.solver import ExactSolver
 from planner.exact.table import new_table
 from planner.exact.table_kernels import fill, walk
 from planner.plan import Status
-from planner.problem import RoutingProblem, Shipment
+from planner.problem import RoutingProblem, Shipment, tour_length
 from planner.regret import one_by_one, regrets
-from planner.solvers import SolveLimit, solver
-from planner.tour import tour_length
+from planner.solvers import NEVER, SolveLimit, solver
 
 seeds = st.integers(0, 2**32 - 1)
 random_problem = functools.partial(points_or_metric, bins=6)

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from planner.checker import check
 from planner.exact.solver import ExactSolver
 from planner.plan import Status
-from planner.problem import RoutingProblem, Shipment
-from planner.tour import tour_length
+from planner.problem import RoutingProblem, Shipment, tour_length
 
 TABLE, SEARCH = ExactSolver(), ExactSolver(table_bytes=0)
 FAR = 1 << 60
