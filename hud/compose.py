@@ -99,17 +99,7 @@ class Compositor:
 def compose(
     frame: NDArray[np.uint8], state: HudState, pictures: Pictures, texts: HudTexts
 ) -> NDArray[np.uint8]:
-    """Draw the HUD over one frame. Use a `Compositor` to draw many frames.
-
-    Args:
-        frame: RGB, uint8, shape (H, W, 3), at least 320 x 240.
-        state: HUD state to draw.
-        pictures: RGBA pictures by key, uint8 (s, s, 4), straight alpha.
-        texts: Words of the HUD.
-
-    Raises:
-        FrameError: The frame or a picture has the wrong shape or type, or the frame is too small.
-    """
+    """Draw the HUD over one frame. Arguments and errors are those of `Compositor`, which is faster for many frames."""
     return Compositor(pictures, texts).compose(frame, state)
 
 
@@ -166,11 +156,7 @@ def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tup
 
 
 class Captions:
-    """Draws captions of a title and a line of detail at the bottom of frames of one size, px.
-
-    Raises:
-        FrameError: The size is too small.
-    """
+    """Draws captions of a title and a line of detail at the bottom of frames of one size, px."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = (width, height)

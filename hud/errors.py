@@ -1,12 +1,4 @@
-"""Errors of the HUD.
-
-HudError
-├── ConditionError    an assistance condition does not exist or cannot be used
-├── TaskViewError     a task view names an object or receptacle that it does not contain
-├── FrameError        a frame, picture or camera has the wrong shape
-├── MessageError      a message key does not exist
-└── SchemaError       a dictionary does not describe a HUD state
-"""
+"""Errors of the HUD."""
 
 
 class HudError(Exception):

@@ -51,15 +51,7 @@ def message(
 ) -> Message:
     """Make the message for an event or a refusal, such as "picked" or "hands_full".
 
-    Args:
-        key: Field of `HudTexts`.
-        texts: Words of the HUD.
-        object: Label of the object.
-        receptacle: Label of the receptacle.
-        opacity: 1 opaque, 0 gone.
-
-    Raises:
-        MessageError: There is no such message.
+    `object` and `receptacle` are labels. Raises MessageError if there is no such message.
     """
     if key not in KINDS:
         raise MessageError(f"no message {key!r}; there are {', '.join(KINDS)}")

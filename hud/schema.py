@@ -41,8 +41,7 @@ def from_dict(raw: object) -> HudState:
 def check_state(state: object) -> None:
     """Check that the result of a condition is a HUD state that can be drawn and sent, including values in its fields.
 
-    Raises:
-        SchemaError: It is not. The message contains the path of the faulty value.
+    Raises SchemaError with the path of the faulty value.
     """
     if not isinstance(state, HudState):
         kind = "None" if state is None else f"a value of type {type(state).__name__}"

@@ -74,10 +74,10 @@ def allowance(problem: RoutingProblem, plan: Plan) -> float:
 def shortest_tour(
     problem: RoutingProblem, limit: float, max_states: float = np.inf
 ) -> tuple[float, int] | None:
-    """Return the length of the shortest tour below a limit, m, and the number of visited states.
+    """Return the length of the shortest tour below a limit, m (infinite if there is none), and the number of visited
+    states.
 
-    The length is infinite if there is no such tour. The result is None if there are more than `max_states`. Works for
-    any capacity and any distances.
+    The result is None if there are more than `max_states`.
     """
     d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
@@ -111,11 +111,7 @@ def shortest_tour(
 
 
 def replayed(problem: RoutingProblem, plan: Plan) -> float:
-    """Return the length of a plan's tour, m.
-
-    Raises:
-        ProblemError: A visit is not feasible.
-    """
+    """Return the length of a plan's tour, m. Raises ProblemError if a visit is not feasible."""
     n = len(problem.shipments)
     loose, held = set(range(n)), set(range(n, len(problem.names)))
     here, cost = problem.start, 0.0

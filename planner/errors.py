@@ -1,12 +1,4 @@
-"""Errors of the planner.
-
-PlannerError
-├── NavMeshError        obstacles, bounds or sizes do not make a navmesh
-├── NotNavigableError   no navigable point is near a position
-├── UnreachableError    two positions are on different islands of the navmesh
-├── ProblemError        a routing problem is malformed, or a plan does not solve it
-└── InfeasibleError     a well-formed problem has no feasible plan
-"""
+"""Errors of the planner."""
 
 
 class PlannerError(Exception):

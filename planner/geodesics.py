@@ -81,9 +81,8 @@ class Geodesics:
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return the geodesic distances between all pairs of points (m, 2), m: (m, m), symmetric, zero diagonal, m.
 
-        Raises:
-            NotNavigableError: There is no navigable point within `max_snap` of a point.
-            UnreachableError: Two points are on different islands.
+        Raises NotNavigableError if no navigable point is within `max_snap` of a point, and UnreachableError if two
+        points are on different islands.
         """
         query = self._query(*self._locate(points))
         result = self._between(query, query)

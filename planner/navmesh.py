@@ -123,17 +123,10 @@ class NavMesh:
         return self.island_of(point) is not None
 
     def snap(self, point: ArrayLike, max_distance: float = 1.0, island: int = 0) -> NDArray[np.float64]:
-        """Return the point of an island nearest to a point, (2,), m.
+        """Return the point of an island (by default the largest) nearest to a point, (2,), m.
 
-        This is the point itself if it is on the island, without the tolerance of `is_navigable`.
-
-        Args:
-            point: (2,), m.
-            max_distance: Largest distance to the island, m.
-            island: Index into `islands`, by default the largest.
-
-        Raises:
-            NotNavigableError: The island is farther away than `max_distance`.
+        This is the point itself if it is on the island, without the tolerance of `is_navigable`. Raises
+        NotNavigableError if the island is farther away than `max_distance`, m.
         """
         x, y = _point(point)
         cell = self._cell(x, y)

@@ -215,16 +215,9 @@ def make_plan(
 ) -> Plan:
     """Make a plan whose lower bound also holds for the given distances, which are not in whole units.
 
-    The plan is OPTIMAL if the tour meets the bound in the integer distances, and in the given ones to the problem's
-    tolerance. The latter fails only if the distances are not a metric.
-
-    Args:
-        problem: The problem.
-        metric: Integer distances in which the problem was solved, (k, k).
-        visits: Visits in order.
-        bound: Lower bound of all tours in these distances.
-        started: `time.perf_counter()` at the start of solving.
-        certificate: Proof of the bound.
+    `metric`, (k, k), contains the integer distances in which the problem was solved, and no tour is shorter than
+    `bound` in them. `started` is `time.perf_counter()` at the start of solving. The plan is OPTIMAL if the tour meets
+    the bound in the integer distances and, to the problem's tolerance, in the given ones.
     """
     integers, cost = problem.integers, tour_length(problem, visits)
     lower = certificate.unit * (bound - integers.rounding * len(visits))  # legs may have been rounded up

@@ -38,12 +38,8 @@ class Regret:
 class RegretEvaluator:
     """Evaluates possible and actual visits of a task with the exact planner. Results are bit-identical.
 
-    Args:
-        geodesics: Distances of the house.
-        solver: The exact planner.
-        capacity: Largest number of objects that can be carried.
-        limit: Limit of each search beyond 18 objects left, or None for the planner's own budget.
-        radius: `all` finds regrets up to this value exactly, m.
+    `limit` is that of each search beyond 18 objects left, or None for the planner's own budget. `all` finds regrets up
+    to `radius`, m, exactly.
     """
 
     def __init__(
@@ -72,9 +68,7 @@ class RegretEvaluator:
         """Return the regret of each possible next visit, the best visit first.
 
         `plan` is the plan for this state or an earlier one. If it is proven and for this state, the search is skipped.
-
-        Raises:
-            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
+        Raises UnreachableError if objects cannot be fetched or delivered.
         """
         if self._last is None or not same_state(self._last[0], state):
             problem = self._problems.problem(state)
@@ -122,11 +116,7 @@ def same_state(one: TaskState, other: TaskState) -> bool:
 
 
 def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
-    """Return the rest of the task after a visit. Shipments and onboard objects keep their order.
-
-    Raises:
-        ProblemError: The visit is not possible.
-    """
+    """Return the rest of the task after a visit. Raises ProblemError if the visit is not possible."""
     if visit not in possible_next(problem):
         raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
     shipments, onboard = list(problem.shipments), list(problem.onboard)

@@ -87,11 +87,7 @@ class PlanSource(abc.ABC):
         """Return a new route (see `Planner.ask`). `route` is the previous one."""
 
     def check(self, state: TaskState) -> None:  # noqa: B027 - optional
-        """Check that every object can be fetched and delivered.
-
-        Raises:
-            UnreachableError: Objects cannot be. `names` lists them.
-        """
+        """Raise UnreachableError, with names, if objects cannot be fetched or delivered."""
 
     @property
     def pending(self) -> bool:

@@ -68,8 +68,7 @@ class Planner:
     def route(self) -> Route | None:
         """The route for the last requested state, or None before the first request.
 
-        Raises:
-            PlannerError: Planning failed.
+        Raises PlannerError if planning failed.
         """
         if self._latest is not None:
             self._latest.result()
@@ -82,14 +81,9 @@ class Planner:
         return None if route is None else route.next
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> None:
-        """Plan for the state in which the task will start.
+        """Plan for the state in which the task will start. Raises as `ask`.
 
-        Args:
-            state: The state.
-            seconds: Longest wait for the proof in live mode. Finding the first regrets then loads the kernels.
-
-        Raises:
-            PlannerError: See `ask`.
+        In live mode, `seconds` is the longest wait for the proof. Finding the first regrets then loads the kernels.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -139,8 +133,7 @@ class Planner:
     def do(self, job: Callable[[Route | None], None]) -> None:
         """Call a function with the route for the last requested state, once it is known.
 
-        Raises:
-            PlannerError: Planning failed. In thread mode, the next request raises it.
+        Raises PlannerError if planning failed. In thread mode, the next request raises it.
         """
         before = self._latest
 
@@ -160,11 +153,7 @@ class Planner:
         return self._source.pending
 
     def improve(self, state: TaskState) -> Route | None:
-        """Return a route for the same task that is better or has a better bound, if one was found since, else None.
-
-        Raises:
-            PlannerError: See `ask`.
-        """
+        """Return a route for the same task that is better or has a better bound, or None. Raises as `ask`."""
         better = None if self._route is None else self._source.better(state, self._route)
         self._route = better or self._route
         return better
@@ -196,11 +185,7 @@ class Planner:
         return None
 
     def finish(self) -> list[tuple[Any, float | None]]:
-        """End the task. Return the labels and regrets of visits that `judge` has postponed.
-
-        Raises:
-            PlannerError: Planning failed.
-        """
+        """End the task. Return the labels and regrets of postponed visits. Raises PlannerError if planning failed."""
         self.settle()
         _ = self.route
         self._forget_regrets()

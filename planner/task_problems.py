@@ -28,9 +28,7 @@ class TaskProblems:
     def problem(self, state: TaskState) -> RoutingProblem:
         """Return the routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
 
-        Raises:
-            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
-            ProblemError: More objects are carried than the capacity allows.
+        Raises UnreachableError as `check`, and ProblemError if more objects are carried than the capacity allows.
         """
         at = self._places(state)
         places = list(dict.fromkeys(at.values()))
@@ -54,11 +52,7 @@ class TaskProblems:
         )
 
     def check(self, state: TaskState) -> None:
-        """Check that every object left can be fetched and delivered.
-
-        Raises:
-            UnreachableError: Objects cannot be. `names` lists them.
-        """
+        """Raise UnreachableError, with names, if objects cannot be fetched or delivered."""
         self._places(state)
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:

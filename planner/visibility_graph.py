@@ -120,8 +120,7 @@ def vertex_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the numbers i < j of vertices (v, 6) that see each other along a line tangent at both, each (pairs,).
 
-    `island` is that of each vertex, (v,), `walls` are the edges of the solid obstacles, and `slack` is the tolerance,
-    m.
+    `island` is that of each vertex, (v,). `walls` are the edges of the solid obstacles, with a tolerance `slack`, m.
     """
     rows, columns = [0], [0]
     for i in range(vertices.shape[0]):
@@ -178,17 +177,10 @@ def search_from(
 ) -> tuple[Paths, int]:
     """Find shortest paths from a point, nearest to the goal first (A*; Hart, Nilsson and Raphael 1968).
 
-    Among equally short paths it finds that of Dijkstra's algorithm, with the earlier last corners.
-
-    Args:
-        graph: The graph.
-        views: Vertices that points see.
-        point: Number of the start in `views`.
-        goal: End of the path, m, (2,), or empty to find the paths to all vertices.
-        rest: Length of the last leg from each vertex to the goal, infinite if it is not seen, m, (v,).
-
-    Returns:
-        The paths, and the last vertex of the shortest path to the goal, or -1 without a path.
+    Among equally short paths it finds that of Dijkstra's algorithm, with the earlier last corners. `point` is the
+    number of the start in `views`. Without a goal, (2,) or empty, it finds the paths to all vertices. `rest` is the
+    length of the last leg from each vertex to the goal, infinite if it is not seen, m, (v,). Return the paths, and the
+    last vertex of the shortest path to the goal, or -1.
     """
     size = len(graph.vertices)
     paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))

@@ -73,14 +73,6 @@ class Percept:
 
     Sessions use a subclass that adds the objects in view and the HUD, computed at the first access.
 
-    Args:
-        seen: State of the world.
-        targets: Receptacle key of each object, by instance name.
-        answer: The world's answer to the previous action, if that was a pick or place.
-        blocked: True if the walk makes no progress.
-        capacity: Largest number of objects that can be carried.
-        person: Parameters of the participant's body.
-
     Attributes:
         time: Simulated time, s.
         position: Floor position, m, shape (2,).
@@ -89,10 +81,10 @@ class Percept:
         hands: Objects in the left and the right hand.
         hands_full: True if no other object can be carried.
         busy: True if a pick or place is in progress.
-        targets: As the argument. The lists of the HUD show them.
-        answer: As the argument.
-        blocked: As the argument. Remains True until the person has backed off.
-        person: As the argument.
+        targets: Receptacle key of each object, by instance name. The lists of the HUD show them.
+        answer: The world's answer to the previous action, if that was a pick or place.
+        blocked: True if the walk makes no progress, until the person has backed off.
+        person: Parameters of the participant's body.
     """
 
     def __init__(

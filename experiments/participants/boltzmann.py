@@ -66,11 +66,7 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """Return a factory of participants with this temperature.
-
-    Raises:
-        ConfigError: The temperature is not a number, or is negative.
-    """
+    """Return a factory of participants with this temperature. Raises ConfigError if it is not a valid number."""
     try:
         temperature = float(text)
     except ValueError:

@@ -153,12 +153,7 @@ def distribution(name: str, given: object) -> Distribution:
 
 
 def converted(given: object) -> Distribution:
-    """Do the same as `distribution`, with errors that do not name the parameter.
-
-    Raises:
-        ConfigError: The description is not valid.
-        msgspec.ValidationError: A value has the wrong type.
-    """
+    """Do the same as `distribution`, with errors that do not name the parameter: a ConfigError or a ValidationError."""
     if isinstance(given, Mapping):
         return msgspec.convert(given, Distribution)
     return Distribution(constant=msgspec.convert(given, float))
@@ -187,11 +182,7 @@ class Distributions(Mapping[str, Distribution]):
 
     @classmethod
     def parse(cls, text: str) -> "Distributions":
-        """Read a TOML file, or a description in braces.
-
-        Raises:
-            ConfigError: The file cannot be read, or the description is not valid.
-        """
+        """Read a TOML file, or a description in braces. Raises ConfigError if that fails."""
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])

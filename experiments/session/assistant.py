@@ -33,14 +33,6 @@ VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLAC
 class Assistant:
     """Passes the state of the task to the planner, and the plan to the assistance condition.
 
-    Args:
-        board: Describes the task to the condition.
-        assistance: Name of the assistance condition.
-        planner: Makes the plans.
-        log: Receives plans and visits.
-        log_regrets: True to log the regret of every visit.
-        options: Rules of the world, which contain the capacity.
-
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
         shows_plan: True if the condition shows the plan or its next step.
@@ -108,9 +100,7 @@ class Assistant:
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
         """Process a walk during which nothing happened, with the same result as `observe` of each step.
 
-        Args:
-            positions: Position of the person after every control step, m, shape (n, 2).
-            observation: State at the end.
+        `positions`, (n, 2), are those of the person after every control step, m. `observation` is the state at the end.
         """
         if (places := self._places_to_follow(observation)) is not None:
             self._paths.path.follow(positions, *places)

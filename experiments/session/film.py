@@ -33,15 +33,8 @@ def write_flythrough(
 ) -> str:
     """Write the film of a house atomically, and return the SHA-256 of its frames, which equal arguments reproduce.
 
-    Args:
-        house: The house.
-        path: Video file to write.
-        film: Frame size and render profile.
-        seconds: Duration, at least 1 s, or None for that of the camera path.
-        on_progress: Called with the number of drawn frames and of all frames.
-
-    Raises:
-        ConfigError: The duration is too short.
+    The film takes `seconds`, at least 1 s, or by default as long as the camera path. `on_progress` is called with the
+    numbers of drawn frames and of all frames. Raises ConfigError if the film is too short.
     """
     if seconds is not None and seconds < MIN_DURATION:
         raise ConfigError(f"a film of {seconds} s is too short; it needs at least {MIN_DURATION:.0f} s")

@@ -28,14 +28,8 @@ from mjsim.world.world import World
 class FirstPersonRenderer:
     """Renders first-person frames with the HUD. Use it as a context manager to free the GL context.
 
-    Args:
-        scene: Scene to render.
-        house: House, whose objects and receptacles are in the pictures of the HUD.
-        film: Frame size and render profile.
-        pictures: Result of `render_pictures` for the house's catalogue, or None to render the pictures.
-
-    Raises:
-        RenderError: There is no off-screen GL context, or the size or profile is not valid.
+    `pictures` is the result of `render_pictures` for the house's catalogue, or None to render it. Raises RenderError if
+    there is no off-screen GL context, or the size or profile is not valid.
     """
 
     def __init__(
@@ -58,17 +52,11 @@ class FirstPersonRenderer:
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
-        """Render the view of the person with the HUD.
+        """Render the view of the person with the HUD: RGB, uint8, (height, width, 3), larger if panels are next to the
+        picture.
 
-        Args:
-            data: State of the scene's model.
-            state: HUD state, whose markers are drawn into the scene.
-
-        Returns:
-            RGB, uint8, shape (height, width, 3), or larger if the panels are next to the picture.
-
-        Raises:
-            RenderError: A marker cannot be drawn, or the renderer is closed.
+        `data` is the state of the scene's model. Raises RenderError if a marker cannot be drawn, or the renderer is
+        closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)

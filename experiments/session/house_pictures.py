@@ -24,11 +24,7 @@ SMALL, FAR = (96, 64), 4.0  # size of the depth images in which views are compar
 
 
 def draw_house(house: House, folder: Path) -> list[Path]:
-    """Write `floorplan.png` and `room_<key>.png` into an existing folder, and return their paths.
-
-    Raises:
-        RenderError: Rendering failed.
-    """
+    """Write `floorplan.png` and `room_<key>.png` into an existing folder, and return their paths."""
     pictures = {"floorplan": floor_plan(house)}
     model, data = compiled_house(house.catalogue).model, compiled_house(house.catalogue).data
     views_of = room_views(house, house.viewpoints)
@@ -82,11 +78,7 @@ def _width(text: str) -> int:
 
 
 def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]]:
-    """Return a view from each corner of each room, those with the least nearby obstruction first.
-
-    Raises:
-        RenderError: Rendering failed.
-    """
+    """Return a view from each corner of each room, those with the least nearby obstruction first."""
     compiled = compiled_house(house.catalogue)
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
     nearest = house.rooms.distances(floor).argmin(axis=1)

@@ -17,12 +17,9 @@ CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in a claimed length or
 
 
 def planner_named(name: str, *, exact: bool = True) -> Solver:
-    """Return the planner of this name. A custom one is wrapped in an `OwnPlanner`.
+    """Return the planner of this name. A custom one is checked, and with `exact` the exact planner bounds its tours.
 
-    With `exact`, the exact planner bounds the tours of a custom planner.
-
-    Raises:
-        PlannerError: There is no such planner.
+    Raises PlannerError if there is no such planner.
     """
     found = solver(name)
     return OwnPlanner(name, found, ExactSolver() if exact else None) if is_own(found) else found
@@ -31,12 +28,8 @@ def planner_named(name: str, *, exact: bool = True) -> Solver:
 class OwnPlanner:
     """A custom planner, whose plans are replayed before use.
 
-    Length, bound and status of the returned plans are computed here. A wrong length is an error.
-
-    Args:
-        name: Name in records and messages.
-        planner: The user's planner.
-        exact: Bounds the tours, or None to use only the bound of the check.
+    Length, bound and status of the returned plans are computed here. A wrong length is an error. `exact` bounds the
+    tours. Without it, the bound is that of the check.
     """
 
     def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
@@ -44,11 +37,7 @@ class OwnPlanner:
         self._what = f"planner {name!r}"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Return the plan of the custom planner.
-
-        Raises:
-            UserCodeError: The planner failed, or its plan is not feasible or has a wrong length.
-        """
+        """Return the plan of the custom planner. Raises UserCodeError if it failed or its plan is not feasible."""
         return self._with_bound(problem, self._asked(problem, seed, limit))
 
     def improve(

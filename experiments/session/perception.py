@@ -25,16 +25,7 @@ from mjsim.world.world import World
 
 
 class SessionPercept(Percept):
-    """A percept in a session. Expensive parts are computed once, at the first access.
-
-    Args:
-        seen: State of the world.
-        answer: The world's answer to the previous pick or place.
-        world: The world in that state.
-        assistant: Provides the guidance.
-        hud: Returns the HUD state.
-        blocked: True if the walk makes no progress.
-    """
+    """A percept in a session. Expensive parts are computed once, at the first access."""
 
     def __init__(
         self,

@@ -95,12 +95,7 @@ class Session:
         return self.finish(on_progress)
 
     def begin(self) -> None:
-        """Make the first plan and show it, before anything is simulated.
-
-        Raises:
-            SessionError: The participant requires guidance that the assistance condition does not show.
-            UserCodeError: A custom condition failed.
-        """
+        """Make the first plan and show it, before anything is simulated. Raises as `run`."""
         self._now = self._world.reset()
         self._first_state = self._now, self._world.health_sample, self._world.state_hash()
         try:
@@ -169,11 +164,7 @@ class Session:
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once, for one control step or as many as a path or a wait takes.
-
-        Raises:
-            PhysicsError: The physics failed.
-        """
+        """Let the participant act once, for one control step or as many as a path or a wait takes."""
         self._observe()
         if self.assistant.is_custom:
             self._hud_state()  # a faulty condition ends the session even if nothing is shown
@@ -186,10 +177,8 @@ class Session:
     def restore(self, record: Record, step: int | None) -> None:
         """Continue from the checkpoint before a control step of a record, or from the start if `step` is None.
 
-        The assistant first observes the recorded steps, because its state is not in the checkpoint.
-
-        Raises:
-            StateError: The checkpoint does not fit the world.
+        The assistant first observes the recorded steps, because its state is not in the checkpoint. Raises StateError
+        if the checkpoint does not fit the world.
         """
         if step is None:
             self.begin()
@@ -207,8 +196,7 @@ class Session:
     def resume(self, record: Record) -> None:
         """Continue an unfinished record at its end. The actions after its last checkpoint are simulated again.
 
-        Raises:
-            RecordError: The simulated states differ from the recorded ones.
+        Raises RecordError if the simulated states differ from the recorded ones.
         """
         self.restore(record, max(record.checkpoint_steps, default=None))
         for step in range(self.record.step, record.steps):

@@ -28,22 +28,15 @@ class ShownPath:
         self._points: NDArray[np.float64] | None = None
 
     def begin(self, start: Point, target: Point, goal: Point) -> None:
-        """Show a new path.
+        """Show a new path from `start` to `target`.
 
-        Args:
-            start: Start of the path, m, shape (2,).
-            target: End of the path, m, shape (2,).
-            goal: Position of the object or the receptacle, m, shape (2,).
+        `goal` is the object or the receptacle. All are in m, shape (2,).
         """
         self._start, self._target, self._goal, self._points = start.copy(), target.copy(), goal.copy(), None
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Points of the whole path, m, shape (k, 2).
-
-        Raises:
-            UnreachableError: There is no path.
-        """
+        """Points of the whole path, m, shape (k, 2). Raises UnreachableError if there is none."""
         if self._points is None:
             self._points = self._geodesics.shortest_path(self._start, self._target).points
         return self._points
@@ -53,13 +46,7 @@ class ShownPath:
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
     def follow(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
-        """Show a new path wherever the person has left the last one.
-
-        Args:
-            positions: Successive positions of the person, m, shape (n, 2).
-            target: See `begin`.
-            goal: See `begin`.
-        """
+        """Show a new path wherever the person has left the last one. `positions` are successive ones, m, (n, 2)."""
         off = -1
         while self._rerouted and self._points is not None:
             off = first_off_path(self._points, positions, off + 1, TOLERANCE)
@@ -78,12 +65,7 @@ class ShownPath:
 
 
 class PathsToNext:
-    """The paths to the next visit that a condition may show.
-
-    Attributes:
-        segment: The segment of the plan, from the place of the last visit.
-        path: The path from the person.
-    """
+    """The paths to the next visit: the plan's `segment` from the last visit, and the `path` from the person."""
 
     def __init__(self, geodesics: Geodesics) -> None:
         self.segment = ShownPath(geodesics, rerouted=False)

@@ -15,11 +15,7 @@ CHECK_TIMEOUT_S = 2.0  # a trial that has not checked for signals after this tim
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal asked the process to stop.
-
-    Attributes:
-        number: The signal.
-    """
+    """A signal, `number`, asked the process to stop."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -64,22 +60,14 @@ def exit_raised() -> Iterator[None]:
 
 
 class PostponedSignals:
-    """Signals that have arrived but are not handled yet.
-
-    Attributes:
-        number: The first signal, or None.
-    """
+    """Signals that have arrived but are not handled yet. `number` is the first one, or None."""
 
     def __init__(self) -> None:
         self.number: int | None = None
         self._saving = False
 
     def check(self) -> None:
-        """Stop if a signal has arrived.
-
-        Raises:
-            Stopped: A signal has arrived.
-        """
+        """Raise `Stopped` if a signal has arrived."""
         if self.number is not None:
             self._stop_timer()
             raise Stopped(self.number)
@@ -114,11 +102,7 @@ def signals_postponed() -> Iterator[PostponedSignals]:
 
 
 def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine like `asyncio.run`. A signal cancels it, so that it can clean up.
-
-    Raises:
-        Stopped: A signal arrived.
-    """
+    """Run a coroutine like `asyncio.run`. A signal cancels it, so that it can clean up, and raises `Stopped`."""
     came: list[int] = []
 
     async def watched() -> T:

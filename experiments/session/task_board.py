@@ -40,14 +40,7 @@ class _Shown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanView:
-    """The planner's suggestion in one state of the world (a `PlanAhead`), computed when a condition asks for it.
-
-    Attributes:
-        board: Describes the task.
-        observation: State of the world.
-        route: Returns the route.
-        paths: Returns the paths to the next visit.
-    """
+    """The planner's suggestion in one state of the world (a `PlanAhead`), computed when a condition asks for it."""
 
     board: "TaskBoard"
     observation: Observation
@@ -83,11 +76,7 @@ class PlanView:
 class TaskBoard:
     """Describes the task to the conditions, and keeps the message and the steps done.
 
-    Args:
-        house: The house.
-        episode: The disorganized house.
-        order: Object names in this participant's random order (PAPER section 5).
-        eye_height: Eye height of the person, m.
+    `order` are the object names in this participant's random order (PAPER section 5).
     """
 
     def __init__(
@@ -137,15 +126,7 @@ class TaskBoard:
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
     ) -> TaskView:
-        """Return the task as a condition sees it now.
-
-        Args:
-            observation: State of the world.
-            ahead: The planner's suggestion.
-            capacity: Largest number of objects that can be carried.
-            camera: The eye camera.
-            regrets: Returns the regrets of the visits that are possible next.
-        """
+        """Return the task as a condition sees it now."""
         return TaskView(
             objects=self._task_objects(observation),
             receptacles=self._receptacles,

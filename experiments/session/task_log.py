@@ -19,14 +19,6 @@ class TaskLog:
     """Requests plans and logs them in every condition, because deviations count in all of them (PAPER section 6).
 
     A line gets its place in the log at once, and its content when the planner has answered.
-
-    Args:
-        planner: Makes the plans and finds the regrets.
-        log: Receives the events.
-        house: The house.
-        episode: The disorganized house.
-        capacity: Largest number of objects that can be carried.
-        regrets: True to log the regret of every visit.
     """
 
     def __init__(
@@ -38,16 +30,9 @@ class TaskLog:
         self._visits = 0
 
     def plan(self, time: float, state: TaskState, position: NDArray[Any], *, shown: bool) -> None:
-        """Request the plan for a state, and log it if it is new.
+        """Request the plan for a state, and log it if it is new. `position` is the person's, m, shape (2,).
 
-        Args:
-            time: Simulated time, s.
-            state: The task as it is now.
-            position: Position of the person, m, shape (2,).
-            shown: True if the plan is shown.
-
-        Raises:
-            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
+        Raises UnreachableError, with names, if objects cannot be fetched or delivered.
         """
         line, first = self._log.reserve(), self._state is None
         if first:
@@ -74,13 +59,7 @@ class TaskLog:
         return before is None or better.visits != before.visits
 
     def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
-        """Log a visit and the plan before it.
-
-        Args:
-            time: Simulated time, s.
-            made: The visit.
-            position: Position of the person, m, shape (2,).
-        """
+        """Log a visit and the plan before it. `position` is the person's, m, shape (2,)."""
         assert self._state is not None  # noqa: S101 - for the type checker
         line, state, number = self._log.reserve(), self._state, self._visits
         walk = self._house.body_geodesics.shortest_path(self._last_visit_at, position)
@@ -170,15 +149,10 @@ def _rounded(metres: float | None) -> float | None:
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:
-    """Return a lower bound of the walk in any order of visits, m.
+    """Return a lower bound of the walk in any order of visits, m. `tour` is one of all tours between their places, m.
 
     A person who picks and places from a distance can save that distance on the way to a place and again on the way from
     it, except after the last visit. Objects are assumed to stay in place, and arms to reach over free floor only.
-
-    Args:
-        tour: A lower bound of all tours between the places of the visits, m.
-        house: The house, with the person's reach.
-        episode: The disorganized house.
     """
     reach = house.person.reach
     places = [

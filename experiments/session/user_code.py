@@ -45,12 +45,7 @@ class _Overdue(BaseException):
 def user_code(code: object, what: str) -> Iterator[None]:
     """Raise a `UserCodeError` for any exception of user code in the block, `SystemExit` included, and limit its time.
 
-    Args:
-        code: Function, or object with methods. The block has no effect if this is code of this project.
-        what: Name of the code in messages.
-
-    Raises:
-        UserCodeError: The code raised an exception or exceeded the time limit.
+    The block has no effect if `code`, a function or an object, belongs to this project. `what` is its name in messages.
     """
     if not is_own(code):
         yield
@@ -105,11 +100,9 @@ def is_own(code: object) -> bool:
 def make_participant(
     name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
 ) -> Participant:
-    """Make a participant for a house, with the behaviour drawn for the person if its model has parameters.
+    """Make a participant for a house, with these values of its model's parameters if it has any.
 
-    Raises:
-        ConfigError: There is no such participant.
-        UserCodeError: A custom participant cannot be created, or has no method `act`.
+    Raises ConfigError if there is no such participant, and UserCodeError if a custom one is faulty.
     """
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
@@ -125,8 +118,7 @@ def make_participant(
 def needs_of(participant: Participant) -> frozenset[str]:
     """Return the roles of the markers that a participant requires.
 
-    Raises:
-        UserCodeError: `needs` is not a set of names.
+    Raises UserCodeError if they are not a set of names.
     """
     name = f"participant {type(participant).__qualname__}"
     with user_code(participant, name):
@@ -141,8 +133,7 @@ def needs_of(participant: Participant) -> frozenset[str]:
 def decide(participant: Participant, percept: Percept) -> Action:
     """Return the decision of a participant.
 
-    Raises:
-        UserCodeError: A custom participant failed, or returned something other than a decision.
+    Raises UserCodeError if a custom participant failed or returned another type.
     """
     name = type(participant).__qualname__
     with user_code(participant, f"participant {name}"):
@@ -157,10 +148,9 @@ def decide(participant: Participant, percept: Percept) -> Action:
 
 
 def shown_by(condition: Condition, name: str, view: TaskView) -> HudState:
-    """Return the HUD state of an assistance condition.
+    """Return the HUD state of a condition.
 
-    Raises:
-        UserCodeError: A custom condition failed, or returned something that cannot be shown.
+    Raises UserCodeError if a custom condition failed or returned another type.
     """
     with user_code(condition, f"assistance condition {name!r}"):
         state = condition(view)

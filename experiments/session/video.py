@@ -20,14 +20,7 @@ QUEUE_LENGTH = 8  # frames
 class VideoWriter:
     """Writes frames to an MP4 file. Use it as a context manager to complete the file.
 
-    Args:
-        path: File to write, in an existing folder.
-        width: Frame width, px, even (4:2:0 chroma).
-        height: Frame height, px, even.
-        fps: Frames per second.
-
-    Raises:
-        RecordError: A size is odd, or the encoder failed.
+    Width and height, px, must be even (4:2:0 chroma). Raises RecordError if they are not, or the encoder failed.
     """
 
     def __init__(self, path: Path, *, width: int, height: int, fps: int = 25) -> None:
@@ -50,8 +43,7 @@ class VideoWriter:
     def write(self, frame: Image) -> None:
         """Append a frame, uint8 RGB of shape (height, width, 3), which the caller must not change afterwards.
 
-        Raises:
-            RecordError: The frame has another shape, or the encoder failed.
+        Raises RecordError if the frame has another shape, or the encoder failed.
         """
         if frame.shape != self._shape:
             raise RecordError(f"frame of shape {frame.shape} does not fit a video of shape {self._shape}")
@@ -59,11 +51,7 @@ class VideoWriter:
         self._queue.put(frame)
 
     def close(self) -> None:
-        """Encode the queued frames and complete the file.
-
-        Raises:
-            RecordError: The encoder failed.
-        """
+        """Encode the queued frames and complete the file. Raises RecordError if the encoder failed."""
         self._queue.put(None)
         self._thread.join()
         self._raise_failure()

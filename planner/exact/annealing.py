@@ -182,7 +182,7 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
 
 
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    """Anneal from the order of the indices. Return the length and the order (n,) of the best tour."""
+    """Anneal from the order of the indices. See `anneal_from`."""
     return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
 
 

@@ -32,13 +32,8 @@ def improving_tours(
 ) -> Iterator[Solution]:
     """Yield a first tour and bound, then those after each pass of the search.
 
-    Args:
-        instance: The problem.
-        seed: Seed of the annealing.
-        work: Largest number of states to expand.
-        deadline: No pass begins after it. The first tour is always found.
-        passes: Passes of `ExactSolver`.
-        start: Warm start, or None.
+    `work` is the largest number of states to expand. The first tour is always found, but no pass begins after the
+    deadline.
     """
     bound, upper, lower, actions = _first_tour(instance, seed, work, start)
     yield Solution(actions, min(lower, upper), _certificate(bound))

@@ -46,11 +46,7 @@ class ExactSolver:
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
         """Plan the rest of a task. The plan is OPTIMAL if proven, else FEASIBLE with the best bound so far.
 
-        Args:
-            problem: The rest of the task.
-            seed: Seed of the annealing.
-            limit: States or seconds, by default 4 million states. A limit on states is not passed to OR-Tools, which
-                counts other work.
+        The default limit is 4 million states. A limit on states is not passed to OR-Tools, which counts other work.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
@@ -70,12 +66,8 @@ class ExactSolver:
     ) -> Iterator[Plan]:
         """Yield the annealed tour with a first bound, then each shorter tour or better bound.
 
-        Args:
-            problem: The rest of the task.
-            seed: Seed of the annealing.
-            limit: See `solve`.
-            warm: Results for similar problems. The first plan then comes from a narrow search and is better. The last
-                plan may differ from that of `solve` if it is not proven, or is one of several optimal plans.
+        With a warm start, the first plan comes from a narrow search and is better. The last plan may differ from that
+        of `solve` if it is not proven, or is one of several optimal plans.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):

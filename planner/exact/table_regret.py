@@ -47,20 +47,11 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Return the costs of all next visits. Those up to `longest`, units, are exact, and others are some larger number.
+    """Return the costs of all next visits, units. Costs up to `longest` are exact, and others are some larger number.
 
     Every state on a tour of at most that length is visited, layer by layer. A sweep back then finds the shortest rest
-    of the task from each state.
-
-    Args:
-        bound: Bound of the cost-to-go.
-        visits: Possible next visits: places of carried objects, then picks.
-        longest: Length up to which costs are exact, units.
-        max_states: Largest number of states.
-        deadline: End of the search.
-
-    Returns:
-        Costs in units, or None if there are too many states or the deadline has passed.
+    of the task from each. `visits` are the possible next ones: places of carried objects, then picks. The result is
+    None if there are more than `max_states` or the deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)

@@ -32,9 +32,7 @@ PERSON: Final[Mapping[str, Any]] = {
 class _Build:
     """Factory of guests.
 
-    Attributes:
-        behaviour: Parameters of the model by name.
-        person: Distributions of the guests' bodies.
+    `behaviour` are the parameters of the model, and `person` the distributions of the guests' bodies.
     """
 
     behaviour = PARAMETERS
