@@ -107,7 +107,7 @@ def test_what_is_remembered_changes_no_distance(monkeypatch):
     mesh = NavMesh.build(random_field(3), BOUNDS, agent_radius=0.2)
     points = mesh.sample(np.random.default_rng(3), 12)
     expected = Geodesics(mesh).distances(points)
-    monkeypatch.setattr(planner.geodesics, "MAX_REMEMBERED", 5)
+    monkeypatch.setattr(planner.geodesics, "MAX_CACHED", 5)
     geodesics = Geodesics(mesh)
     for _ in range(2):
         np.testing.assert_array_equal(geodesics.distances(points), expected)
