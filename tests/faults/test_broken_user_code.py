@@ -71,12 +71,12 @@ def test_a_participant_that_fails(after, fault, said, house, tmp_path, own_modul
         ("return replace(state, markers=None)", "Expected `array`, got `null` - at `$.markers`"),
         ("return replace(state, message=b'hi')", "got `bytes` - at `$.message`"),
         ("return replace(state, checklist_title='\\ud800')", "at `$.checklist_title`"),
-        ("return replace(state, clock=float('nan'))", "nan is no usable number - at `$.clock`"),
+        ("return replace(state, clock=float('nan'))", "nan is not a usable number - at `$.clock`"),
         ("return replace(state, message=Message(b'hi', MessageKind.INFO))", "at `$.message.text`"),
         ("return replace(state, markers=[Marker('cone', (0, 0, 0), (1, 1, 1), (1, 1, 1, 1), '')])", "cone"),
         (
             "return replace(state, markers=[Marker('box', (0, 0, 1e309), (1, 1, 1), (1, 1, 1, 1), '')])",
-            "inf is no usable number - at `$.markers[0].position[2]`",
+            "inf is not a usable number - at `$.markers[0].position[2]`",
         ),
     ],
 )

@@ -180,7 +180,7 @@ def fault_of(folder, capsys, name, document):
         ("problem", {"start": 3}, "start 3 is out of range for 3 locations"),
         ("problem", {"shipments": [{"pickup": 1}]}, "required field `delivery` - at `$.shipments[0]`"),
         ("problem", {"onbaord": []}, "unknown field `onbaord`"),
-        ("claim", {"visits": [["pick", 9]]}, "visits[0] is of number 9, but the problem has 1 to pick"),
+        ("claim", {"visits": [["pick", 9]]}, "visits[0] has the number 9, but the problem has 1 to pick"),
         ("claim", {"visits": [["place onboard", -1]]}, "number -1"),
         ("claim", {"visits": [["throw", 1]]}, "Invalid enum value 'throw' - at `$.visits[0][0]`"),
         ("claim", {"status": "perfect"}, "Invalid enum value 'perfect' - at `$.status`"),

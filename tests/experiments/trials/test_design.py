@@ -63,13 +63,13 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
         ("[[cells]]\nobjects = 60\nassistance = 'none'\nseeds = 1", "objects is 60; it must be 1 to 40"),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nperson = 'x'",
-            "'x' is no table of values",
+            "'x' is not a table of values",
         ),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nperson = { a = {} }",
             "a is an empty table",
         ),
-        ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nbehaviour = [1]", "is no table of values"),
+        ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nbehaviour = [1]", "is not a table of values"),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\nperson_seeds = [1, 1]\nhouse_seeds = 0\norder_seeds = 0",
             "2 times",
