@@ -69,7 +69,10 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
             "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nperson = { a = {} }",
             "a is an empty table",
         ),
-        ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nbehaviour = [1]", "is not a table of values"),
+        (
+            "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nbehaviour = [1]",
+            "is not a table of values",
+        ),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\nperson_seeds = [1, 1]\nhouse_seeds = 0\norder_seeds = 0",
             "2 times",
