@@ -10,6 +10,8 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from pymdownx.superfences import SuperFencesException
+
 COLUMN, ROW, MARGIN = 150, 30, 16  # sizes in px
 _ARROW = re.compile(r"(\w+)(--?>>)(\w+): (.+)")
 _NOTE = re.compile(r"Note over (\w+): (.+)")
@@ -27,9 +29,12 @@ def fence(source: str, *_: Any, **__: Any) -> str:
     """Draw the diagram of a fence.
 
     Raises:
-        ValueError: A line is not in the notation that is drawn here.
+        SuperFencesException: A line is not in the notation that is drawn here. Any other error would show the source.
     """
-    return f'<div class="diagram">{Sequence(source).svg()}</div>'
+    try:
+        return f'<div class="diagram">{Sequence(source).svg()}</div>'
+    except ValueError as error:
+        raise SuperFencesException(str(error)) from error
 
 
 class Sequence:
