@@ -13,6 +13,7 @@ from typing import Any
 from pymdownx.superfences import SuperFencesException
 
 COLUMN, ROW, MARGIN = 150, 30, 16  # sizes in px
+_PARTICIPANT = re.compile(r"participant (\w+) as (\w+)")
 _ARROW = re.compile(r"(\w+)(--?>>)(\w+): (.+)")
 _NOTE = re.compile(r"Note over (\w+): (.+)")
 _BLOCK = re.compile(r"(alt|loop|else) (.+)")
@@ -49,8 +50,8 @@ class Sequence:
         first, *self._lines = [line.strip() for line in source.strip().splitlines() if line.strip()]
         if first != "sequenceDiagram":
             raise ValueError(f"cannot draw diagram '{first}': only sequenceDiagram is supported")
-        participants = re.findall(r"^participant (\w+) as (\w+)$", "\n".join(self._lines), re.MULTILINE)
-        self._names: dict[str, str] = dict(participants)
+        found = [_PARTICIPANT.fullmatch(line) for line in self._lines]
+        self._names = {match[1]: match[2] for match in found if match}
         self._column = {key: MARGIN + COLUMN * (0.5 + n) for n, key in enumerate(self._names)}
         self._y = MARGIN + 46.0
         self._open: list[float] = []
@@ -58,9 +59,7 @@ class Sequence:
     def svg(self) -> str:
         """The drawing, as inline SVG."""
         width = 2 * MARGIN + COLUMN * len(self._names)
-        body = [
-            part for line in self._lines if not line.startswith("participant ") for part in self._row(line)
-        ]
+        body = [part for line in self._lines if not _PARTICIPANT.fullmatch(line) for part in self._row(line)]
         if self._open:
             raise ValueError("a block of the diagram has no end")
         heads = [part for key, x in self._column.items() for part in self._head(self._names[key], x)]
