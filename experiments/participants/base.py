@@ -69,7 +69,7 @@ class Choice:
 
 
 class Percept:
-    """What a person can know at one control step without any assistance.
+    """The knowledge of a person at one control step without any assistance.
 
     Sessions use a subclass that adds the objects in view and the HUD, computed at the first access.
 

@@ -18,7 +18,7 @@ _BUILDS = re.compile(r"^(def build\(|build = )", re.MULTILINE)
 
 @functools.cache
 def participant_names() -> tuple[str, ...]:
-    """Names of the participants that this package holds, sorted; nothing is imported to find them."""
+    """Return the names of the participants of this package, sorted, without importing them."""
     folder = Path(__file__).parent
     sources = [*folder.glob("[!_]*.py"), *folder.glob("*/__init__.py")]
     found = [path for path in sources if _BUILDS.search(path.read_text(encoding="utf-8"))]
@@ -26,12 +26,11 @@ def participant_names() -> tuple[str, ...]:
 
 
 def participant(name: str) -> "ParticipantFactory":
-    """Find a participant by module name, with its parameter after a colon, or one by `package.module:attribute`.
+    """Return the factory of a participant by module name, with its parameter after a colon, or by
+    `package.module:attribute`.
 
-    A module that takes a parameter defines `with_parameter(text)`, which gives the factory.
-
-    Raises:
-        ConfigError: There is no such participant, it cannot be loaded or called, or the parameter is none of its.
+    A module with a parameter defines `with_parameter(text)`, which returns the factory. Raises ConfigError if there is
+    no such participant, it cannot be loaded or called, or it takes no parameter.
     """
     module, colon, parameter = name.partition(":")
     if module in participant_names():

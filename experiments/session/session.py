@@ -118,7 +118,7 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Run a session that has begun to its end. The result and the errors are those of `run`."""
+        """Run a session to its end after `begin`. The result and the errors are those of `run`."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()

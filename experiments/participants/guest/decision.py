@@ -107,7 +107,7 @@ def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What the person knows of the task when choosing."""
+    """The person's knowledge of the task on which a choice depends."""
 
     objects: Mapping[str, Point]  # remembered places of objects, m, shape (2,)
     pull: float  # weight of straight lines in estimates of distances to these objects, 0 to 1
