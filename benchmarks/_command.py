@@ -1,4 +1,4 @@
-"""`mjsim bench`: the benchmarks, one module each in this folder."""
+"""`mjsim bench`: run a benchmark, one of the modules in this folder."""
 
 import argparse
 import importlib.util
@@ -15,18 +15,16 @@ from experiments.cli.options import add_command, add_force, int_list
 from experiments.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parent
-BUSY = 0.5  # load average per core above which wall times are not to be trusted
+BUSY = 0.5  # load average per core above which wall times are unreliable
 
 DESCRIPTION = """\
-Run a benchmark of the source checkout and print what it measured, as ratios where possible, so that the figures hold on
-other machines as well. A benchmark is a module in benchmarks/ that defines measure() -> dict of JSON values, and
-lines(result) -> lines of text. measure may take any of the keywords quick, houses, count, hours, workers, only,
-parts, seeds, objects, rooms, first_seed and out; the options of the same name set them. picture(result, path) may draw
-the result."""
+Run a benchmark of the source checkout and print the results, as ratios where possible, so that they hold on other
+machines as well. A benchmark is a module in benchmarks/ with measure() -> dict of JSON values, and lines(result) ->
+lines of text. measure accepts some of the keywords quick, houses, count, hours, workers, only, parts, seeds, objects,
+rooms, first_seed and out, which the options of the same names set. picture(result, path) may draw the result."""
 
 
 def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
-    """Names of the benchmarks, sorted."""
     return tuple(sorted(path.stem for path in folder.glob("*.py") if not path.stem.startswith("_")))
 
 
@@ -41,66 +39,46 @@ def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
         raise ConfigError(f"no benchmark {name!r}; there are {', '.join(names)}")
     module = load(folder / f"{name}.py")
     if not (hasattr(module, "measure") and hasattr(module, "lines")):
-        raise ConfigError(f"{folder / name}.py is no benchmark; define measure() and lines(result)")
+        raise ConfigError(f"{folder / name}.py is not a benchmark; define measure() and lines(result)")
     return module
 
 
 def load(path: Path) -> ModuleType:
-    """Load a module from a file outside of any package.
-
-    Raises:
-        ConfigError: The file is not a Python module.
-    """
+    """Load a module from a file outside of any package. Raises a `ConfigError` if the file is not a Python module."""
     spec = importlib.util.spec_from_file_location(f"{path.parent.name}.{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise ConfigError(f"{path} cannot be loaded as a module")
+        raise ConfigError(f"cannot load {path} as a module")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
     parser = add_command(commands, "bench", run, description=DESCRIPTION)
     names = ", ".join(benchmark_names())
     parser.add_argument("name", metavar="NAME", help=f"benchmark: {names}")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="draw the result as well")
-    add_force(parser, "replace a picture that exists")
-    group = parser.add_argument_group("size of the benchmark, where it has such an option")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="also draw the result")
+    add_force(parser, "replace an existing picture")
+    group = parser.add_argument_group("size of the benchmark (each benchmark has some of these options)")
     for name, kind, metavar, text in OPTIONS:
         group.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=text)
-    group.add_argument("--quick", action="store_true", help="a smaller run")
+    group.add_argument("--quick", action="store_true", help="run a smaller benchmark")
 
 
 def positive(text: str) -> int:
-    """Parse a whole number above 0.
-
-    Raises:
-        argparse.ArgumentTypeError: The text is something else.
-    """
     if not text.isdecimal() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above 0")
     return int(text)
 
 
 def natural(text: str) -> int:
-    """Parse a whole number, 0 included.
-
-    Raises:
-        argparse.ArgumentTypeError: The text is something else.
-    """
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
     return int(text)
 
 
 def positive_number(text: str) -> float:
-    """Parse a finite number above 0.
-
-    Raises:
-        argparse.ArgumentTypeError: The text is something else.
-    """
     try:
         value = float(text)
     except ValueError:
@@ -114,19 +92,19 @@ OPTIONS = (
     ("houses", positive, "N", "number of houses"),
     ("count", positive, "N", "number of cases"),
     ("hours", positive_number, "H", "simulated hours"),
-    ("workers", positive, "N", "processes"),
+    ("workers", positive, "N", "number of processes"),
     ("only", natural, "N", "run only the session with this number"),
-    ("parts", lambda text: text.split(","), "NAME,..", "run only the parts of these names"),
-    ("seeds", positive, "N", "houses for each number of objects"),
+    ("parts", lambda text: text.split(","), "NAME,..", "run only these parts"),
+    ("seeds", positive, "N", "number of houses for each number of objects"),
     ("objects", int_list, "N,..", "numbers of objects"),
     ("rooms", int_list, "N,..", "sizes of homes, such as 1:11"),
     ("first_seed", natural, "N", "seed of the first home"),
-    ("out", Path, "DIR", "folder of what is kept, so that it can be continued"),
+    ("out", Path, "DIR", "folder for intermediate results, from which to resume"),
 )
 
 
 def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
-    """The given options, as keywords of the benchmark's `measure`.
+    """Return the given options as keywords of the benchmark's `measure`.
 
     Raises:
         ConfigError: The benchmark has no such option.
@@ -142,7 +120,6 @@ def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure and print."""
     from experiments.record.run_directory import check_file
 
     module = benchmark(arguments.name)
@@ -151,8 +128,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_file(arguments.picture, replace=arguments.force)
     if (load := os.getloadavg()[0] / (os.cpu_count() or 1)) > BUSY:
         print(
-            f"mjsim: {load:.1f} processes per core were running in the last minute; where wall time is measured, "
-            "figures will be too low: repeat this on an idle machine",
+            f"mjsim: {load:.1f} processes per core were running in the last minute; rates in wall time will be "
+            "too low: repeat this on an idle machine",
             file=sys.stderr,
         )
     result = module.measure(**given)

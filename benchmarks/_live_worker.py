@@ -1,7 +1,7 @@
-"""Replans beside a person who goes their own way, in a process of its own: the first plan, how good it is, its proof.
+"""Measures replans for a person who ignores the plan: the first plan, its quality, and its proof.
 
-Called by the planner benchmark with a number of objects and of houses; writes one JSON object. Run with `python -P`, as
-this folder has a module named like the package that it measures.
+The planner benchmark calls it with numbers of objects and houses, and reads one JSON object. Run it with `python -P`,
+because this folder has a module named like a package that it measures.
 """
 
 import contextlib
@@ -21,12 +21,11 @@ from planner.service import Mode, Planner
 from planner.solver_source import SolverSource
 from planner.solvers import solver
 
-REACH = 0.3  # m, spread of where a person stands to reach something
-LARGE = 15  # objects left from which on a first plan is a matter of search rather than of a small table
+REACH = 0.3  # standard deviation of the person's distance from a visited place, m
+LARGE = 15  # from this many objects on, the first plan comes from a search instead of a small table
 
 
 def main() -> None:
-    """Arguments: objects, houses."""
     objects, houses = int(sys.argv[1]), int(sys.argv[2])
     house = House.load("apartment")
     replans = [replan for seed in range(houses) for replan in task(house, objects, seed)]
@@ -35,7 +34,7 @@ def main() -> None:
 
 
 def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
-    """One task, every visit of it drawn at random from those possible: what each replan took."""
+    """Run a task in which every visit is drawn at random from the possible ones. Yield a record of each replan."""
     rng = np.random.default_rng([objects, seed])
     episode = house.sample_episode(objects=objects, seed=seed)
     approach = {key: xy(r.approach) for key, r in house.receptacles.items()}
@@ -61,7 +60,7 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
 
 
 def replan(guide: Planner, state: TaskState) -> dict[str, Any]:
-    """What the caller waits for, and what comes of it in the background."""
+    """Measure the call for which the caller waits, and the search in the background."""
     wall, own, cpu = time.perf_counter(), time.thread_time(), time.process_time()
     first = route(guide, state).plan.cost
     record = {"wall": time.perf_counter() - wall, "cpu": time.thread_time() - own}
@@ -75,7 +74,6 @@ def replan(guide: Planner, state: TaskState) -> dict[str, Any]:
 
 
 def route(guide: Planner, state: TaskState) -> Route:
-    """The route for a state."""
     guide.ask(state)
     if guide.route is None:
         raise ValueError("no route")
@@ -83,13 +81,12 @@ def route(guide: Planner, state: TaskState) -> Route:
 
 
 def possible(loose: dict[str, XY], carried: list[str]) -> list[Visit]:
-    """Visits that can be made next."""
     picks = [Visit(VisitKind.PICK, name) for name in loose] if len(carried) < 2 else []
     return [Visit(VisitKind.PLACE, name) for name in carried] + picks
 
 
 def figures(replans: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of a group of replans: times in s, gaps in %."""
+    """Summarize replans: times in s, gaps in %."""
     columns = {name: [float(r[name]) for r in replans] for name in ("wall", "cpu", "proof_wall", "proof_cpu")}
     gaps = [r["gap"] for r in replans]
     return {
@@ -103,7 +100,6 @@ def figures(replans: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def xy(point: Any) -> XY:
-    """A point of the floor."""
     return float(point[0]), float(point[1])
 
 

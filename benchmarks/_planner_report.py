@@ -1,4 +1,4 @@
-"""Report of the planner benchmark: a table, lines of text and a picture."""
+"""Report of the planner benchmark: a table, lines of text and a figure."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from rich.table import Table
 
 
 def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One row per planner, size and state; gaps of the problems that it found a tour for."""
+    """Return a row per planner, size and state, with the gaps of the problems that the planner solved."""
     best: dict[tuple[int, int, str], float] = {}
     groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
     for r in records:
@@ -27,7 +27,7 @@ def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
-    """Figures of one planner on the problems of one size and state; None where a figure does not apply."""
+    """Summarize one planner on the problems of one size and state. A figure is None if it does not apply."""
     solved = [r for r in group if r["cost"] is not None]
     gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
     # A tour of length 0 is optimal.
@@ -51,7 +51,6 @@ def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], fl
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     yield from _table_lines(result)
     for label in result["not_installed"]:
         yield f"{label}: not installed (pip install 'mjsim[peers]')"
@@ -110,7 +109,7 @@ def _live_lines(beside: dict[str, Any]) -> Iterator[str]:
 
 
 def cells(row: dict[str, Any]) -> list[str]:
-    """Figures of a row of the table."""
+    """Format the figures of a row."""
     failed = row["problems"] - row["solved"]
     counts = [
         f"{row['problems']}" + (f", {failed} failed" if failed else ""),
@@ -126,7 +125,7 @@ def cells(row: dict[str, Any]) -> list[str]:
 
 
 def picture(result: dict[str, Any], path: Path) -> None:
-    """Left, mean gap over CPU time with 24 objects (or the most there are); right, CPU time to proof by size."""
+    """Draw mean gap over CPU time at 24 objects (or the largest size below), and CPU time to proof by size."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4), layout="constrained")
@@ -139,7 +138,7 @@ def picture(result: dict[str, Any], path: Path) -> None:
 
 
 def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
-    """A point per planner, labelled; the label of the exact planner below, where no gap can be."""
+    """Draw a labelled point per planner. The label of the exact planner is below the point, where there is room."""
     shown = max(row["objects"] for row in rows if row["objects"] <= 24)
     for row in rows:
         if row["objects"] != shown or row["state"] != "start" or row["gap_mean"] is None:
@@ -165,7 +164,6 @@ def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def draw_proofs(axes: Any, runs: Sequence[dict[str, Any]]) -> None:
-    """A point per problem, by size and state."""
     sizes = sorted({r["objects"] for r in runs})
     for k, state in enumerate(dict.fromkeys(r["state"] for r in runs)):
         for x, n in enumerate(sizes):

@@ -1,7 +1,7 @@
-"""Solves routing problems with one planner in a process of its own, so that memory and CPU time are that planner's.
+"""Solves routing problems with one planner in its own process, which isolates its memory and CPU time.
 
-Called by the planner benchmark: reads a pickled list of problems, writes a line of JSON per problem.
-Run with `python -P`, as this folder has a module named like the package that it measures.
+The planner benchmark passes a pickled list of problems and reads a line of JSON per problem. Run it with `python -P`,
+because this folder has a module named like a package that it measures.
 """
 
 import json
@@ -19,18 +19,18 @@ import numpy as np
 from planner.problem import RoutingProblem
 from planner.solvers import PATIENT_WORK, SolveLimit, solver
 
-# Length of a tour in m (None: found none), its lower bound in m if the planner gives one, whether it is proven.
+# Length of a tour in m or None if none was found, its lower bound in m or None, and whether it is proven optimal
 Answer = tuple[float | None, float | None, bool]
 Method = Callable[[RoutingProblem], Answer]
 
 
 def main() -> None:
-    """Arguments: a planner, its limit of seconds (0: none), the file of problems."""
+    """Read the arguments: a planner, its time limit in seconds (0 for none), and the file of problems."""
     name, limit, path = sys.argv[1], float(sys.argv[2]), sys.argv[3]
     solve = method(name, limit)
     problems: list[RoutingProblem] = pickle.loads(Path(path).read_bytes())
     if name == "exact":
-        import planner.exact.table_kernels  # noqa: F401 - or it plans a few objects without its kernels
+        import planner.exact.table_kernels  # noqa: F401 - otherwise small problems are solved without kernels
     solve(problems[0])  # loads the compiled kernels and the libraries
     for problem in problems:
         wall, cpu = time.perf_counter(), time.process_time()
@@ -47,13 +47,12 @@ def main() -> None:
 
 
 def peak_mb() -> float:
-    """Most memory that this process ever had; getrusage would count the process that started it as well."""
+    """Return the peak memory of this process. getrusage would include the parent's memory before exec."""
     found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(encoding="ascii"))
     return int(found[1]) / 1024 if found else float("nan")
 
 
 def method(name: str, limit: float) -> Method:
-    """The planner of a name, limited to seconds."""
     if name == "pyvrp":
         return lambda problem: by_pyvrp(problem, limit)
     if name == "vroom":
@@ -71,7 +70,7 @@ def method(name: str, limit: float) -> Method:
 
 
 def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
-    """PyVRP: one vehicle, shipments, a depot at no distance to end at. Nothing may be carried at the start."""
+    """Solve with PyVRP: one vehicle, shipments, a depot at distance 0 as the end, and nothing carried at the start."""
     import pyvrp
     from pyvrp.stop import MaxRuntime
 
@@ -92,7 +91,7 @@ def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
 
 
 def by_vroom(problem: RoutingProblem) -> Answer:
-    """VROOM at its greatest exploration level: an open route. Nothing may be carried at the start."""
+    """Solve with VROOM at its highest exploration level, with an open route. Nothing may be carried at the start."""
     import vroom
 
     task: Any = vroom.Input()

@@ -1,7 +1,7 @@
-"""Runs the trials of a batch in a process of its own, with timers around the parts of the program.
+"""Runs the trials of a batch in its own process, with timers around parts of the program.
 
-Called by the trials benchmark with a JSON list: fidelity, assistance, participant, objects, seeds; writes one JSON
-object. Run with `python -P`, as this folder has modules named like packages.
+The trials benchmark passes a JSON list of fidelity, assistance, participant, objects and seeds, and reads one JSON
+object. Run it with `python -P`, because this folder has modules named like packages.
 """
 
 import json
@@ -28,9 +28,9 @@ from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
 
-# Part -> callables. Time in a callable of one part that is called by another part belongs to the caller.
+# Part -> callables. Time in a callable that another part calls counts for the calling part.
 PARTS = {
-    "planning": (  # waiting times; the rest runs in a thread
+    "planning": (  # only waiting times, because the rest runs in a thread
         "planner.service.Planner.ask",
         "concurrent.futures._base.Future.result",
         "concurrent.futures.thread.ThreadPoolExecutor.shutdown",
@@ -47,8 +47,8 @@ PARTS = {
         "experiments.record.records.EventLog.append",
         "experiments.record.writer.RecordWriter.append",
         "experiments.record.writer.RecordWriter.record",
-        "experiments.record.export.save_arrays",
-        "experiments.record.export.write_json",
+        "experiments.record.writer.save_arrays",
+        "experiments.record.writer.write_json",
         "mjsim.values.episode.Episode.save",
     ),
 }
@@ -56,11 +56,7 @@ REST = "participant and the rest"
 
 
 class Timers:
-    """Wall time of the main thread in the callables of `PARTS`; a context manager that patches them.
-
-    Attributes:
-        seconds: Part -> s.
-    """
+    """Wall time of the main thread in the callables of `PARTS`, by part. A context manager that patches them."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
@@ -91,7 +87,7 @@ class Timers:
 
 
 def main() -> None:
-    """Run the trials, then repeat their calls on bare worlds."""
+    """Run the trials, then repeat their recorded calls on bare worlds."""
     fidelity, assistance, user, objects, seeds = json.loads(sys.argv[1])
     started = time.perf_counter()
     house = House.load()

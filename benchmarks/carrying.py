@@ -1,4 +1,4 @@
-"""Carrying two objects through the house at 1.4 m/s: how far welds stretch and twist, and how many objects are lost."""
+"""Stretch and twist of welds, and lost objects, when two objects are carried through the house at 1.4 m/s."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from benchmarks.support.parallel_sessions import run_sessions
 from benchmarks.support.requirements import Requirement, requirement_lines
 
 COUNT, QUICK = 200, 20
-STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # m/s at least; rad/s at most, at least
+STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # minimum speed, m/s; maximum and minimum turning speed, rad/s
 REQUIREMENTS = (
     Requirement("objects that arrive, %", "kept_percent", ">=", 99.0),
     Requirement("weld error, 99th percentile at 1.4 m/s, straight on, mm", "straight_p99_mm", "<", 2.0),
@@ -26,20 +26,19 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, count: int | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        quick: A few walks.
-        count: How many walks.
-        workers: Processes; one per core unless said.
-        only: Run this session alone, to look at a failure again.
+        quick: Run a few walks.
+        count: Number of walks.
+        workers: Number of processes (default: one per core).
+        only: Run only this session, to reproduce a failure.
     """
     sessions = count or (QUICK if quick else COUNT)
     return summarise(run_sessions(run_session, sessions, workers=workers, only=only))
 
 
 def summarise(walks: Sequence[CarryResult]) -> dict[str, Any]:
-    """Figures over all walks."""
     speed = np.concatenate([walk.speed for walk in walks])
     turn = np.abs(np.concatenate([walk.turn for walk in walks]))
     everywhere = {
@@ -69,7 +68,6 @@ def summarise(walks: Sequence[CarryResult]) -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     yield (
         f"{result['walks']} walks with two objects each, {result['metres']:.0f} m; {result['arrived']} arrived, "
         f"{result['lost']} objects lost; deepest overlap {result['penetration_max_mm']:.1f} mm"

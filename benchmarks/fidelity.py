@@ -1,4 +1,4 @@
-"""The same trials in every fidelity: how far `event` agrees with `full`, trial by trial."""
+"""Agreement of `event` with `full` on the same trials."""
 
 import os
 import statistics
@@ -21,13 +21,13 @@ SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
 def measure(
     *, seeds: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        seeds: Houses of each difficulty; 0 for 50, or 2 when `quick`.
-        objects: Difficulties.
-        workers: Processes; 0 for one per core.
-        quick: Few trials.
+        seeds: Houses per difficulty (default: 50, or 2 when `quick`).
+        objects: Numbers of objects.
+        workers: Number of processes (default: one per core).
+        quick: Run few trials.
     """
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
     difficulties = tuple(objects) or (QUICK_OBJECTS if quick else OBJECTS)
@@ -48,9 +48,9 @@ def measure(
 
 
 def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str, Any]:
-    """Agreement of the same trials in two fidelities.
+    """Compare the same trials in two fidelities.
 
-    Differences are relative to the mean of `full` where that is not 0: of the means, and the largest of any trial.
+    Differences, of the means and the largest of any trial, are relative to the mean of `full` unless it is 0.
     """
     row: dict[str, Any] = {
         "same_deliveries": statistics.fmean(
@@ -75,7 +75,6 @@ def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str,
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text: a table in Markdown, then the requirements."""
     yield f"{result['seeds']} houses of each difficulty; differences from `full`: of the mean (largest of any trial)"
     yield ""
     yield "| participant | objects | fidelity | same deliveries | time | distance | `ipl_stand` | `nd_feasible` |"

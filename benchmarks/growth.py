@@ -1,7 +1,7 @@
-"""What becomes of time and memory as work grows: resuming a batch, analysing it, and collecting a study with people.
+"""Time and memory of large work: resuming a batch, analysing it, and collecting a study with many participants.
 
-Records of thousands of trials are made from 100 real ones, with other seeds, names, fingerprints and checksums. Figures
-are processor time of a command with its workers, and the largest memory of one of its processes.
+Records of thousands of trials are made from 100 real ones, with other seeds, names, fingerprints and checksums. Results
+are the CPU time of a command with its workers, and the peak memory of its largest process.
 """
 
 import os
@@ -22,7 +22,7 @@ from experiments.trials.batch_folder import OUTDATED
 from experiments.trials.table import NAME, read_rows
 
 TRIALS, PEOPLE, REAL = 16_000, 10_000, 100
-QUICK = 40  # the quick run has so many times fewer records, and a tenth of the real trials
+QUICK = 40  # factor by which the quick run has fewer records
 BATCH = "batch"
 REQUIREMENTS = {
     "resume": (Requirement("processor time, s", "processor_s", "<", 10.0),),
@@ -42,13 +42,13 @@ def measure(
     workers: int = 1,
     out: Path | None = None,
 ) -> dict[str, Any]:
-    """Run the benchmark, or only some parts; everything in the result can be written as JSON.
+    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
 
     Args:
-        parts: Names of the parts to run; none for all.
-        quick: 400 trials, 250 people and 10 real trials.
+        parts: Names of the parts to run (default: all).
+        quick: Run 400 trials, 250 people and 10 real trials.
         count: Number of trials and of people, in place of 16,000 and 10,000; an even number.
-        workers: Processes of a batch.
+        workers: Number of processes of a batch.
         out: Folder that keeps the real trials for the next call.
 
     Raises:
@@ -67,7 +67,7 @@ def measure(
         nullcontext(out) if out is not None else tempfile.TemporaryDirectory(prefix="mjsim-growth-") as folder
     ):
         work = Path(folder)
-        _fresh(work / BATCH)  # of an earlier call, perhaps with other code
+        _fresh(work / BATCH)  # an earlier call may have used other code
         real = real_trials(REAL // 10 if quick else REAL, work / "real", workers)
         for name in parts or measures:
             print(f"{name}: begins", file=sys.stderr, flush=True)
@@ -76,7 +76,6 @@ def measure(
 
 
 def lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """The result, for people."""
     for name, requirements in REQUIREMENTS.items():
         if name in result:
             found = result[name]
@@ -121,11 +120,11 @@ def _collect(work: Path, real: Any, sizes: Mapping[str, int], _: int) -> dict[st
 
 
 def _batch(work: Path, real: Any, sizes: Mapping[str, int]) -> Path:
-    """The folder of all trials, made by the first part that needs it in a call."""
-    place = work / BATCH
-    if not place.is_dir():
-        grow_batch(real, sizes["trials"], place)
-    return place
+    """Return the folder of all trials, which the first part that needs it makes."""
+    batch = work / BATCH
+    if not batch.is_dir():
+        grow_batch(real, sizes["trials"], batch)
+    return batch
 
 
 def _fresh(folder: Path) -> Path:
@@ -134,7 +133,7 @@ def _fresh(folder: Path) -> Path:
 
 
 def _run(words: Sequence[str]) -> dict[str, float]:
-    """Run a command of mjsim; its processor time, and the largest memory of one of its processes."""
+    """Run a command of mjsim. Return its CPU time and the peak memory of its largest process."""
     process = subprocess.Popen([sys.executable, "-m", "mjsim", *words], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -1,4 +1,4 @@
-"""Generated homes of seeds that nobody chose: whether each is usable, what it costs, and how much they differ."""
+"""Quality, cost and variety of generated homes, for seeds that were not chosen."""
 
 import itertools
 import json
@@ -21,11 +21,11 @@ from mjsim.support.files import ROOT, digest_of
 
 T = TypeVar("T")
 Rows = Sequence[dict[str, Any]]
-COUNT, QUICK = 100, 2  # of each size
+COUNT, QUICK = 100, 2  # homes of each size
 FIRST_SEED = 50_000
 OUT = Path("runs/bench-houses")
-AGAIN = 10  # one home of so many is made again in another process
-FURNISHED = (0.25, 0.45)  # of the floor
+AGAIN = 10  # every tenth home is made again in another process
+FURNISHED = (0.25, 0.45)  # limits of the furnished share of the floor
 FAULTS = (
     "failure",
     "errors",
@@ -60,7 +60,7 @@ def _percentile(values: Sequence[float]) -> float:
 
 
 def _overlap(key: str) -> Callable[[Rows], float]:
-    """Mean over all pairs of homes of the pieces that both have, as a share of those that either has (with numbers)."""
+    """Return the mean overlap of furniture over pairs of homes: pieces in both over pieces in either."""
 
     def mean(rows: Rows) -> float:
         bags: list[Counter[str]] = [Counter(row[key]) for row in rows]
@@ -85,7 +85,7 @@ def _by_size(rows: Rows) -> dict[int, Rows]:
     }
 
 
-COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # of the table, for homes of one size
+COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # columns of the table, for homes of one size
     "homes": len,
     "m2": _of("area", statistics.median),
     "made in s": _of("make_s", statistics.median),
@@ -117,10 +117,10 @@ REQUIREMENTS: Mapping[str, tuple[Callable[[Rows], float], str, float]] = {
         0.85,
     ),
     "narrowest way into a room, m": (_of("way", min), ">=", WAY),
-    "pieces that nobody comes to by ways of 0.70 m": (_count("unusable"), "<=", 0),
-    "places that large people do not come to": (lambda rows: sum(row["pockets"] for row in rows), "<=", 0),
+    "pieces that are not reachable by ways of 0.70 m": (_count("unusable"), "<=", 0),
+    "places that large people cannot reach": (lambda rows: sum(row["pockets"] for row in rows), "<=", 0),
     "windows behind something higher than the sill": (_count("windows_behind"), "<=", 0),
-    "homes that lack something they must have": (_homes("lacking"), "<=", 0),
+    "homes that lack something required": (_homes("lacking"), "<=", 0),
     "least share of the floor that is furnished": (_of("share", min), ">=", FURNISHED[0]),
     "most": (_of("share", max), "<=", FURNISHED[1]),
     "rooms with nothing": (_count("empty"), "<=", 0),
@@ -150,15 +150,15 @@ def measure(
     workers: int = 1,
     out: Path = OUT,
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        quick: Two homes of each size.
+        quick: Run two homes of each size.
         count: Homes of each size.
         rooms: Sizes.
-        first_seed: Of the first home; the others follow.
-        workers: Processes.
-        out: Folder that keeps the figures of every home; those of the same generator are not measured again.
+        first_seed: Seed of the first home; later ones count up.
+        workers: Number of processes.
+        out: Folder that caches the figures of every home for the same version of the generator.
     """
     each = count or (QUICK if quick else COUNT)
     homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
@@ -200,21 +200,20 @@ def _kept(out: Path) -> Iterator[dict[str, Any]]:
     path = out / "homes.jsonl"
     if path.is_file():
         for line in path.read_text(encoding="utf-8").splitlines():
-            if line.endswith("}"):  # the last one may have been cut off
+            if line.endswith("}"):  # the last line may be truncated
                 yield json.loads(line)
 
 
 def _in_workers(
     run: Callable[[tuple[int, int]], T], homes: Sequence[tuple[int, int]], workers: int, what: str
 ) -> Iterator[T]:
-    """In fresh processes, which compile their kernels with a home that does not count."""
+    """Run in fresh processes, which first compile their kernels with a home that does not count."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, initializer=figures, initargs=((ROOMS[0], 0),)) as pool:
         yield from track(pool.map(run, homes), what, total=len(homes), console=Console(stderr=True))
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     yield from result["faults"]
     yield "| rooms | " + " | ".join(COLUMNS) + " |"
     yield "|---" * (len(COLUMNS) + 1) + "|"

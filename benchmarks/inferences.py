@@ -1,6 +1,6 @@
-"""The same simulated people in `event` and in `full`: does every test of the study decide the same?
+"""Agreement of all tests of the study for the same simulated participants in `event` and in `full`.
 
-Orders of means are shown beside the tests. Two draws of the same people may differ in an order of means that are close.
+Orders of means are also compared. Close means may differ in order even for two draws of the same people.
 """
 
 import os
@@ -17,14 +17,14 @@ from experiments.analysis.statistics.effects import ALPHA
 from experiments.analysis.study.measures import read_measures
 from experiments.analysis.study.table import StudyTable, read_study
 from experiments.errors import StatisticsError
-from experiments.trials import simulate as study
+from experiments.trials import designs as study
 from experiments.trials.batch import run_batch
 from experiments.trials.design import Design
 from experiments.trials.trial_config import TrialConfig
 from studies.published import Published, read_published
 from studies.score_rules import points, published_cells, tests_of
 
-PEOPLE = 40  # of each cell
+PEOPLE = 40  # per cell
 QUICK_PEOPLE = 2
 QUICK_OBJECTS = (6,)
 TIERS = ("full", "event")
@@ -34,13 +34,13 @@ INFERENCE, ORDER = "inferences", "orders of means"
 def measure(
     *, count: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        count: People of each cell of the published study; 0 for 40 (or as many as there are), 2 when `quick`.
-        objects: Numbers of objects; all, or 6 when `quick`.
-        workers: Processes; 0 for one per core.
-        quick: Few people.
+        count: People per cell of the published study (default: 40 or as many as there are, or 2 when `quick`).
+        objects: Numbers of objects (default: all, or 6 when `quick`).
+        workers: Number of processes (default: one per core).
+        quick: Run few people.
     """
     levels = tuple(objects) or (QUICK_OBJECTS if quick else (6, 12, 18, 24))
     chosen = people(count or (QUICK_PEOPLE if quick else PEOPLE), levels)
@@ -54,7 +54,7 @@ def measure(
 
 
 def people(count: int, objects: Sequence[int]) -> list[TrialConfig]:
-    """The first `count` people of every cell of the published design with these numbers of objects."""
+    """Return the first `count` people of every cell of the published design with these numbers of objects."""
     taken: Counter[Any] = Counter()
     chosen = []
     for trial in study.read_study(study.study_path("paper")).trials:
@@ -73,7 +73,7 @@ def _simulated(trials: Sequence[TrialConfig], tier: str, workers: int) -> StudyT
 
 
 def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tuple[str, str], dict[str, str]]:
-    """What each tier decides, by kind and words; without tests that cannot be computed."""
+    """Return the decisions of each tier by kind and test. Tests that cannot be computed are left out."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for tier, table in tables.items():
         for test in published.tests:
@@ -95,7 +95,7 @@ def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tupl
 
 
 def _gaps(tables: dict[str, StudyTable]) -> dict[str, dict[str, float]]:
-    """By how much a person's measures differ between tiers, over the standard deviation between people in `full`."""
+    """Compare each person's measures between tiers, in standard deviations between people in `full`."""
     full, event = (tables[tier] for tier in TIERS)
     there = {_person(row): k for k, row in enumerate(full.rows)}
     order = [there[_person(row)] for row in event.rows]
@@ -112,12 +112,10 @@ def _person(row: Any) -> tuple[Any, ...]:
 
 
 def same(row: dict[str, str]) -> bool:
-    """Whether both tiers decide the same."""
     return row["full"].split(" (")[0] == row["event"].split(" (")[0]
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text: a table of decisions in Markdown, and how far apart the same person is."""
     yield f"{result['people']} simulated people in each tier"
     yield ""
     yield "| what is decided | full | event | same |"

@@ -1,9 +1,8 @@
-"""Simulated seconds per core-second in each fidelity, and the overhead over the raw engine.
+"""Simulated seconds per core-second at each fidelity, and the overhead over the raw engine.
 
-The workload is recorded trials: every call that a session made to its world in a trial of the follower under optimal
-assistance. The raw engine takes the same steps of the same model with the same controls. Both are timed in chunks of
-a hundred calls. The best of several repetitions of each chunk counts, in CPU time, so that the ratios hold on a busy
-machine, too.
+The workload is recorded trials: all calls to the world in trials of the follower under optimal assistance. The raw
+engine takes the same steps of the same model with the same controls. Both are timed in chunks of a hundred calls. The
+best of several repetitions of each chunk counts, in CPU time, so that the ratios hold on a busy machine.
 """
 
 import ctypes
@@ -29,15 +28,14 @@ from mjsim.world.world import World
 
 OBJECTS = (6, 12, 18, 24, 48)
 DEFAULT_OBJECTS = 24
-CHUNK = 100  # calls that are timed at once
+CHUNK = 100  # calls that are timed together
 REPEATS = 3
-PROFILED = 60.0  # s of simulated time that the profile covers
+PROFILED_S = 60.0  # simulated time of the profile
 TARGETS = (("full", 120.0), ("event", 3000.0))  # simulated s per core-second
-MAX_OVERHEAD = 1.3  # times the raw engine
+MAX_OVERHEAD = 1.3  # relative to the raw engine
 
 
 def measure(*, quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON."""
     house = House.load("apartment")
     repeats = 2 if quick else REPEATS
     seeds = (3,) if quick else (3, 4, 5)
@@ -56,7 +54,6 @@ def measure(*, quick: bool = False) -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     yield f"{result['objects']} objects; simulated seconds per core-second, Python included"
     targets = dict(TARGETS)
     full = next(row for row in result["tiers"] if row["fidelity"] == "full")
@@ -86,12 +83,11 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
 
 
 def outcome(met: bool) -> str:
-    """For people."""
     return "pass" if met else "FAIL"
 
 
 def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int) -> dict[str, Any]:
-    """Simulated seconds per core-second of a tier, over some trials."""
+    """Measure simulated seconds per core-second of a tier, over some trials."""
     simulated = spent = 0.0
     for seed in seeds:
         trial = record_trial(house, DEFAULT_OBJECTS, seed, fidelity)
@@ -108,7 +104,7 @@ def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int
 
 @dataclass(frozen=True, eq=False)
 class EngineInput:
-    """Inputs of the engine in one control step (activations, controls, welds, sleep states), or a state to set."""
+    """Inputs of the engine in one control step, or a physics state to set."""
 
     act: Any = None
     ctrl: Any = None
@@ -118,7 +114,7 @@ class EngineInput:
 
 
 def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float]:
-    """Inputs of every control step of a trial; mean number of awake trees; mean number of contacts."""
+    """Return inputs of every control step of a trial, the mean number of awake trees, and of contacts."""
     world, found, awake, contacts = trial.world(), [], 0, 0
     advance = mujoco.mj_step
 
@@ -144,7 +140,7 @@ def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float
 
 
 def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int) -> float:
-    """CPU seconds that the engine alone takes for some control steps."""
+    """Return the CPU time of the engine alone for some control steps, s."""
     act, ctrl, active, asleep = data.act, data.ctrl, data.eq_active, data.tree_asleep
     advance, clock, lost = mujoco.mj_step, time.process_time, 0.0
     start = clock()
@@ -160,7 +156,7 @@ def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int)
 
 
 def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
-    """Microseconds of `World.step` and of the raw engine for the same control steps, in alternating chunks."""
+    """Measure the time per control step of `World.step` and of the raw engine, in alternating chunks."""
     calls = trial.single_steps
     found, awake, contacts = engine_inputs(trial)
     world, model = trial.world(), trial.scene.model
@@ -189,7 +185,7 @@ def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
 
 
 def measure_memory(scene: Scene, count: int = 20) -> dict[str, Any]:
-    """Resident megabytes that another world of a scene takes, and megabytes of its model."""
+    """Measure the resident memory of another world of a scene, and the size of its model, MB."""
     keep = [World(scene)]
     gc.collect()
     before = _resident()
@@ -211,7 +207,7 @@ def _resident() -> int:
 
 
 def measure_set_up(house: House, count: int) -> dict[str, float]:
-    """Milliseconds of CPU time until a new episode can be stepped, the best of some."""
+    """Measure the CPU time until a new episode can be stepped, ms, the best of some."""
     clock, rows = time.process_time, []
     for seed in range(count):
         times = [clock()]
@@ -227,17 +223,17 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
 
 
 def measure_profile(trial: RecordedTrial) -> dict[str, float]:
-    """Share of each part of a control step, by MuJoCo's own timers; empty where the system has no clock for them."""
+    """Measure the share of each part of a control step by MuJoCo's timers, or nothing without a clock for them."""
     library = ctypes.util.find_library("gomp")
     if library is None:
         return {}
-    # A C function that returns seconds as a double: a Python clock would cost more than the steps it times.
+    # The clock is a C function, because a Python clock would take longer than the timed steps.
     clock = ctypes.CFUNCTYPE(ctypes.c_double)(("omp_get_wtime", ctypes.CDLL(library)))
     world = trial.world()
     timer, kinds, total = world.data.timer, mujoco.mjtTimer, 0.0
     mujoco.set_mjcb_time(clock)
     try:
-        for action in trial.actions(PROFILED):
+        for action in trial.actions(PROFILED_S):
             start = time.perf_counter()
             world.step(action)
             total += time.perf_counter() - start

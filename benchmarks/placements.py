@@ -1,4 +1,4 @@
-"""10,000 placements by the person's hands: how many are delivered at the first try, and the health of the physics."""
+"""First-try deliveries and health of the physics over 10,000 placements by the person's hands."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -25,13 +25,13 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, count: int | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        quick: A few hundred placements.
-        count: How many placements, rounded up to whole sessions.
-        workers: Processes; one per core unless said.
-        only: Run this session alone, to look at a failure again.
+        quick: Run a few hundred placements.
+        count: Number of placements, rounded up to whole sessions.
+        workers: Number of processes (default: one per core).
+        only: Run only this session, to reproduce a failure.
     """
     total = count or (QUICK if quick else COUNT)
     sessions = run_sessions(run_session, math.ceil(total / LEVELS), workers=workers, only=only)
@@ -39,7 +39,6 @@ def measure(
 
 
 def summarise(placements: Sequence[Placement]) -> dict[str, Any]:
-    """Figures over all placements, by receptacle, fill level and object model."""
     tried = [p for p in placements if p.outcome not in NOT_TRIED]
     steps = 1e3 * np.concatenate([p.penetration for p in tried])
     deepest = 1e3 * np.array([p.penetration.max(initial=0.0) for p in tried])
@@ -72,7 +71,6 @@ def summarise(placements: Sequence[Placement]) -> dict[str, Any]:
 
 
 def _rows(placements: Sequence[Placement], key: Callable[[Placement], str]) -> list[dict[str, Any]]:
-    """One row per value of `key`: how many, how many were delivered, the deepest overlap, the longest settling."""
     rows = []
     for value in sorted({key(p) for p in placements}):
         mine = [p for p in placements if key(p) == value]
@@ -89,7 +87,6 @@ def _rows(placements: Sequence[Placement], key: Callable[[Placement], str]) -> l
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     for title, key in (
         ("receptacle", "by_receptacle"),
         ("objects in it before", "by_fill"),

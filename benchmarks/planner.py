@@ -1,8 +1,7 @@
-"""Planners on disorganized houses, from the start and mid-task: gaps, times, proofs, memory.
+"""Planners on disorganized houses, from the start and mid-task: gaps, times, proofs and memory.
 
-Each planner solves the same problems in a process of its own. CPU seconds count what a planner computed; wall time is
-shared with whatever else runs. Gaps are to the best tour that
-any planner found: the optimum where one is proven.
+Each planner solves the same problems in its own process. CPU time counts only the planner's computation. Gaps are
+relative to the best tour of any planner, which is the optimum if it is proven.
 """
 
 import importlib.util
@@ -33,11 +32,11 @@ LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
 REPORT = load(Path(__file__).with_name("_planner_report.py"))
 summary, lines, picture = REPORT.summary, REPORT.lines, REPORT.picture
 LIVE_OBJECTS = 24
-FIRST_OBJECTS = (12, 24)  # of the first problem in a fresh process
+FIRST_OBJECTS = (12, 24)  # sizes of the first problem in a fresh process
 SIZES = (6, 12, 18, 24, 30)
 STATES = ("start", "mid-task")
-OTHERS_SHARE = 5  # every fifth house is also solved by the others, which take seconds by their nature
-LARGEST_SHARE = 3  # every third house with 30 objects
+OTHERS_SHARE = 5  # the other planners, which are slow, solve every fifth house
+LARGEST_SHARE = 3  # only every third house is used with 30 objects
 FIRST_CALL = """
 from pathlib import Path
 import pickle, sys
@@ -49,7 +48,7 @@ solver("exact").solve(problem)
 
 @dataclass(frozen=True)
 class Candidate:
-    """A planner with a limit of seconds (0: its own budget); `module` is the optional package that it needs."""
+    """A planner with a time limit (0 for its own budget), and the optional package that it needs."""
 
     name: str
     seconds: float = 0.0
@@ -58,12 +57,10 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """Name in tables."""
         return f"{self.name} {self.seconds:g} s" if self.seconds else self.name
 
     @property
     def installed(self) -> bool:
-        """Whether its package is installed."""
         return self.module is None or importlib.util.find_spec(self.module) is not None
 
 
@@ -80,7 +77,7 @@ CANDIDATES = (
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A problem: how many objects the house has, its seed, and the state of the task."""
+    """A problem: number of objects, seed of the house, and state of the task."""
 
     objects: int
     seed: int
@@ -89,11 +86,11 @@ class Case:
 
 
 def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
         houses: Houses of each size.
-        quick: Three houses of 6 and 12 objects, and no limit above 0.2 s.
+        quick: Run three houses of 6 and 12 objects, without limits above 0.2 s.
     """
     sizes = SIZES[:2] if quick else SIZES
     houses = min(houses, 3) if quick else houses
@@ -121,7 +118,7 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
 
 
 def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterator[Case]:
-    """Problems of disorganized apartments, each from the start and from a random feasible state of the same task."""
+    """Yield problems of disorganized apartments, from the start and from a random feasible state of the same task."""
     house = House.load("apartment")
     problems = TaskProblems(house.geodesics)
     counts = {n: max(1, houses // LARGEST_SHARE) if n == SIZES[-1] else houses for n in sizes}
@@ -142,7 +139,7 @@ def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterato
 
 
 def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskState:
-    """A state with some objects delivered, none to two carried, and the person anywhere on the floor."""
+    """Return a state with some objects delivered, up to two carried, and the person anywhere on the floor."""
     names = [str(name) for name in rng.permutation(list(begin.loose))]
     carried = int(rng.integers(0, 3))
     left = int(rng.integers(1, len(names) - carried + 1))
@@ -156,7 +153,6 @@ def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskSt
 
 
 def chosen(candidate: Candidate, cases: Sequence[Case]) -> list[Case]:
-    """The cases that a planner gets."""
     if candidate.name == "exact":
         return list(cases)
     return [
@@ -165,7 +161,7 @@ def chosen(candidate: Candidate, cases: Sequence[Case]) -> list[Case]:
 
 
 def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -> list[dict[str, Any]]:
-    """One record per case, from a process of its own."""
+    """Solve the cases in a worker process. Return a record per case."""
     bar = progress.add_task(candidate.label, total=len(cases))
     records = []
     with tempfile.NamedTemporaryFile(suffix=".pickle") as file:
@@ -184,7 +180,7 @@ def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -
 
 
 def first_call(problem: RoutingProblem) -> dict[str, float]:
-    """Seconds of a fresh process that imports the planner and solves one problem; the best of three."""
+    """Time a fresh process that imports the planner and solves one problem, as the best of three."""
     wall, cpu = [], []
     with tempfile.NamedTemporaryFile(suffix=".pickle") as file:
         pickle.dump(problem, file)
@@ -198,7 +194,7 @@ def first_call(problem: RoutingProblem) -> dict[str, float]:
 
 
 def live(objects: int, houses: int) -> dict[str, Any]:
-    """Replans during a task of a simulated person who ignores the plan: see the worker."""
+    """Measure replans for a simulated person who ignores the plan, in a worker process."""
     command = [sys.executable, "-P", str(LIVE_WORKER), str(objects), str(houses)]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     found: dict[str, Any] = json.loads(done.stdout)
@@ -206,6 +202,5 @@ def live(objects: int, houses: int) -> dict[str, Any]:
 
 
 def children_cpu() -> float:
-    """CPU seconds of all processes that were started here and have ended."""
     times = os.times()
     return times.children_user + times.children_system

@@ -1,4 +1,4 @@
-"""`mjsim play` from outside, over real sockets: how fast it answers, and how many sessions a core holds."""
+"""Response times of `mjsim play` over real sockets, and the number of sessions per core."""
 
 import os
 import sys
@@ -10,14 +10,14 @@ from typing import Any
 
 from benchmarks.support.first_frame import measure_first_frame
 from benchmarks.support.play_load import load, measure_capacity, measure_latency
-from benchmarks.support.play_server import Report
+from benchmarks.support.play_server import ProgressReport
 from benchmarks.support.requirements import Requirement, requirement_lines
 from experiments.errors import ConfigError
 
-SESSIONS, DRAWING_SESSIONS = 3, 25  # a core, with frames and with clients that draw
-SECONDS, QUICK_SECONDS = 15.0, 4.0  # of each case
-OPENINGS, QUICK_OPENINGS = 5, 1  # of a link, in each case
-TRIES = 3  # numbers of sessions that are tried, each smaller than the one before
+SESSIONS, DRAWING_SESSIONS = 3, 25  # per core, with frames and with clients that draw
+SECONDS, QUICK_SECONDS = 15.0, 4.0  # duration of each case
+OPENINGS, QUICK_OPENINGS = 5, 1  # number of times that a link is opened in each case
+TRIES = 3  # how many numbers of sessions are tried, in descending order
 FAST = ("--fidelity", "event")
 REQUIREMENTS = {
     "latency": (
@@ -46,11 +46,11 @@ REQUIREMENTS = {
 
 
 def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark, or only some parts; everything in the result can be written as JSON.
+    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
 
     Args:
-        parts: Names of the parts to run; none for all.
-        quick: A smaller run, in the quickest tier.
+        parts: Names of the parts to run (default: all).
+        quick: Run a smaller benchmark at the fastest fidelity.
 
     Raises:
         ConfigError: There is no such part.
@@ -66,14 +66,13 @@ def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]
     }
     with tempfile.TemporaryDirectory(prefix="mjsim-play-") as folder:
         for name in parts or measures:
-            place = Path(folder) / name
-            place.mkdir()
-            result[name] = measures[name](place, _progress(name), quick)
+            work = Path(folder) / name
+            work.mkdir()
+            result[name] = measures[name](work, _progress(name), quick)
     return result
 
 
 def lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """The result, for people."""
     yield f"load at the start: {result['load']:.1f} processes a core"
     for name, requirements in REQUIREMENTS.items():
         if name in result:
@@ -100,8 +99,8 @@ def _first_frame_line(name: str, case: Mapping[str, Any]) -> str:
 LINES = {"first-frame": _first_frame_line}
 
 
-def _progress(part: str) -> Report:
-    """Reports on standard error what is measured now, and for how long the part has been running."""
+def _progress(part: str) -> ProgressReport:
+    """Return a function that reports progress on standard error, with the time since the part began."""
     began = time.monotonic()
 
     def report(line: str) -> None:
@@ -110,7 +109,7 @@ def _progress(part: str) -> Report:
     return report
 
 
-def _latency(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
+def _latency(folder: Path, report: ProgressReport, quick: bool) -> dict[str, Any]:
     seconds, words = _size(quick)
     found = measure_latency(folder / "visits", seconds, report, *words)
     jpeg = found["jpeg"]
@@ -118,11 +117,11 @@ def _latency(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
     return {"cases": found, "jpeg_p95_ms": jpeg["p95_ms"], "jpeg_fps": jpeg["fps"], "codec_ratio": ratio}
 
 
-def _capacity(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
+def _capacity(folder: Path, report: ProgressReport, quick: bool) -> dict[str, Any]:
     seconds, words = _size(quick)
     cores = os.cpu_count() or 1
     frames = measure_capacity(folder, seconds, "jpeg", _counts(SESSIONS * cores, quick), report, *words)
-    # one core for the server: a machine has few enough for as many simulated browsers
+    # The server gets only one core, because the simulated browsers need the others.
     drawing = _counts(DRAWING_SESSIONS, quick)
     states = measure_capacity(folder, seconds, "none", drawing, report, *words, core=cores - 1)
     cases = {f"{case['sessions']:.0f} sessions, frames": case for case in frames}
@@ -137,16 +136,15 @@ def _capacity(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
 
 
 def _counts(most: int, quick: bool) -> Sequence[int]:
-    """Numbers of sessions to try."""
     return range(most, 0, -max(1, most // 6))[: 1 if quick else TRIES]
 
 
 def _held(tried: Sequence[Mapping[str, float]]) -> float:
-    """How many sessions hold, at the last try."""
+    """Return the number of sessions of the last try, if they held."""
     return tried[-1]["sessions"] if tried[-1]["holds"] else 0.0
 
 
-def _first_frame(folder: Path, report: Report, quick: bool) -> dict[str, Any]:
+def _first_frame(folder: Path, report: ProgressReport, quick: bool) -> dict[str, Any]:
     _, words = _size(quick)
     cases = measure_first_frame(folder / "visits", QUICK_OPENINGS if quick else OPENINGS, report, *words)
     first = cases["first visit"]

@@ -1,7 +1,7 @@
-"""Frames per second and core by size and profile, against raw `mjr_render` and against MuJoCo's default quality.
+"""Frames per second and core by size and profile, compared with raw `mjr_render` and with MuJoCo's default quality.
 
-Everything is measured in one run on the same views of the same disorganized apartment, interleaved, so that the ratios
-hold on a busy machine as well. With a software rasteriser times are CPU times of this process, else wall times.
+All measurements are interleaved, on the same views of the same disorganized apartment, so that the ratios hold on a
+busy machine. With a software rasterizer, times are CPU times of this process, else wall times.
 """
 
 import dataclasses
@@ -37,11 +37,11 @@ from mjsim.world.world import World
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}
-SLOW_VIEWS = 2  # views that slow settings are measured on
+SLOW_VIEWS = 2  # number of views for slow settings
 FOVY = 1.2
 SESSION = TrialConfig(objects=6, assistance="optimal", seed=0)
-# The comparison with MuJoCo's defaults is the one in which every light casts shadows, as a light in MJCF does unless
-# it is told not to. The house tells all but one not to, which is an optimization of its author's, not a default.
+# In the comparison with MuJoCo's defaults, every light casts shadows, as is the default of MJCF. For speed, only one
+# light of the house casts shadows.
 TARGETS = (
     ("fast 640x480 with HUD over raw mjr_render", "with_hud_ratio", "<=", 1.15),
     ("MuJoCo's default quality over fast 640x480", "default_over_fast", ">=", 20.0),
@@ -52,7 +52,7 @@ TARGETS = (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Subject:
-    """What is drawn: a scene, views of it, and a HUD state."""
+    """A scene to draw, with views of it and a HUD state."""
 
     scene: Scene
     data: Any
@@ -63,7 +63,6 @@ class Subject:
 
 
 def measure() -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON."""
     gl = gl_info()
     subject = make_subject(time.process_time if gl.software else time.perf_counter)
     rows = [
@@ -101,7 +100,6 @@ def measure() -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text."""
     yield f"{result['renderer']}, {result['gl']}; {result['clock']}, {result['views']} views, {result['geoms']} geoms"
     yield f"{'profile':10}{'size':>12}{'ms':>9}{'fps/core':>10}{'raw ms':>9}{'to raw':>8}"
     for row in result["frames"]:
@@ -129,7 +127,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
 
 
 def make_subject(clock: Callable[[], float]) -> Subject:
-    """Twelve objects in the apartment, seen from the start and from the middle of every room."""
+    """Prepare twelve objects in the apartment, seen from the start and from the middle of every room."""
     house = House.load("apartment")
     scene = compose(house.sample_episode(objects=12, seed=7), house.catalogue)
     world = World(scene)
@@ -151,7 +149,7 @@ def make_subject(clock: Callable[[], float]) -> Subject:
 
 
 def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, int]) -> dict[str, Any]:
-    """Milliseconds of a frame with markers, and of raw `mjr_render` at the same drawn size and settings."""
+    """Measure a frame with markers, and raw `mjr_render` at the same drawn size and settings, ms."""
     width, height = size
     poses = subject.poses if profile.name != "quality" else subject.poses[:SLOW_VIEWS]
     own: list[float] = []
@@ -187,7 +185,7 @@ def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, i
 def raw_renderer(
     subject: Subject, profile: RenderProfile, size: tuple[int, int]
 ) -> Iterator[Callable[[CameraPose], None]]:
-    """Draws the whole scene with the markers by `mjr_render` alone: no update, no reading, no reduction."""
+    """Yield a function that draws the whole scene only by `mjr_render`: no update, no reading, no downsampling."""
     model = subject.scene.model
     drawn = round(size[0] * profile.supersampling), round(size[1] * profile.supersampling)
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1000)
@@ -222,7 +220,7 @@ def raw_renderer(
 
 
 def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[str, Any]:
-    """A frame of 640 x 480 by `mujoco.Renderer` as MuJoCo's defaults have it, and by profile `fast`."""
+    """Measure a frame of 640 x 480 by `mujoco.Renderer` with MuJoCo's defaults, and by profile `fast`."""
     model = subject.scene.model
     authored = model.light_castshadow.copy()
     if shadows_of_all_lights:
@@ -246,7 +244,7 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
 
 
 def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any]:
-    """Milliseconds of laying the HUD over a frame of 640 x 480, for every frame of a whole trial."""
+    """Measure drawing the HUD over a frame of 640 x 480, ms, for every frame of a trial."""
     states = session_states(subject.house, trial)
     times = hud_milliseconds(
         Compositor(render_pictures(subject.house.catalogue), subject.house.texts), states, clock=subject.clock
@@ -255,23 +253,22 @@ def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any
 
 
 def measure_environment(seconds: float = 2.0) -> dict[str, float]:
-    """Steps per core-second of the Gymnasium environment without and with pixels."""
+    """Measure steps per core-second of the Gymnasium environment without and with pixels."""
     return {name: steps_per_second(SETTINGS[name], seconds)[0] for name in ("state", "state, rgb 128 x 96")}
 
 
 @contextmanager
 def off_screen() -> Iterator[None]:
-    """Let `mujoco.Renderer` make EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
-    from mujoco import egl  # only now, when the driver is known to work
+    """Make `mujoco.Renderer` create EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
+    from mujoco import egl  # imported late, when the driver is known to work
 
     backend = sys.modules[mujoco.Renderer.__module__].gl_context
-    # There is none yet where MuJoCo was imported to draw nothing.
+    # The attribute is missing if MuJoCo was imported without rendering.
     with mock.patch.object(backend, "GLContext", egl.GLContext, create=True):
         yield
 
 
 def timed(clock: Callable[[], float], work: Callable[[], Any]) -> float:
-    """Seconds that `work` takes."""
     start = clock()
     work()
     return clock() - start

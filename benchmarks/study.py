@@ -1,4 +1,4 @@
-"""A study with people from outside, over real HTTP and sockets: many who arrive at once, many who play at once."""
+"""A study over real HTTP and sockets, with many participants who arrive at once and many who play at once."""
 
 import asyncio
 import sys
@@ -17,7 +17,7 @@ from benchmarks.support.study_people import arrive_at_once, study_process
 from experiments.errors import ConfigError
 
 PEOPLE, SESSIONS = 500, 50
-SECONDS, QUICK_SECONDS = 30.0, 5.0  # of sessions
+SECONDS, QUICK_SECONDS = 30.0, 5.0  # duration of sessions
 REQUIREMENTS = {
     "arrivals": (
         Requirement("pages that did not come", "failed", "<=", 0),
@@ -28,13 +28,13 @@ REQUIREMENTS = {
 
 
 def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark, or only some parts; everything in the result can be written as JSON.
+    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
 
-    MJSIM_STUDY_DATABASE names an empty database of a server to use in place of SQLite.
+    MJSIM_STUDY_DATABASE may name an empty database of a server to use in place of SQLite.
 
     Args:
-        parts: Names of the parts to run; none for all.
-        quick: A tenth of the people.
+        parts: Names of the parts to run (default: all).
+        quick: Run a tenth of the people.
 
     Raises:
         ConfigError: There is no such part.
@@ -52,7 +52,6 @@ def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]
 
 
 def lines(result: Mapping[str, Any]) -> Iterator[str]:
-    """The result, for people."""
     yield f"load at the start: {result['load']:.1f} processes a core"
     for name, case in result.get("arrivals", {}).get("pages", {}).items():
         yield f"{name}: median {case['median_s']:.2f} s, slowest {case['slowest_s']:.2f} s"
@@ -103,7 +102,7 @@ def _sessions(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 async def _play(addresses: Sequence[str], seconds: float) -> list[float]:
-    """Everybody turns to and fro; the times until inputs were safe, ms."""
+    """Let all participants turn to and fro. Return the times until inputs were acknowledged, ms."""
     browsers = [SimulatedBrowser(address, seed=number) for number, address in enumerate(addresses)]
     await settle(browsers)
     trips = await asyncio.gather(*(turn(browser, seconds) for browser in browsers))

@@ -1,8 +1,8 @@
-"""Whole trials as `mjsim batch` runs them: simulated seconds per second of wall time, and where the time goes.
+"""Whole trials as in `mjsim batch`: simulated seconds per second of wall time, and the share of each part.
 
-Each participant runs one batch in one process. The figure is the sum of `simulated_s` over the sum of `wall_s` in the
-`metrics.json` of its trials. A second run with timers gives the share of each part of the program, and repeats the
-recorded calls on a bare world: that is the reference for the machine at that moment.
+Each participant runs one batch in one process. The speed is the sum of `simulated_s` over the sum of `wall_s` of its
+trials. A second run with timers gives the share of each part of the program, and repeats the recorded calls on a bare
+world as a reference for the machine at that moment.
 """
 
 import json
@@ -22,12 +22,12 @@ from experiments.trials.warmup import compile_kernels
 OBJECTS = 24
 SEEDS = 10
 QUICK_SEEDS = 2
-HOUSE_WANTED = 0.5  # s from the call of House.load to its return
+HOUSE_WANTED = 0.5  # target for House.load, s
 WORKER = Path(__file__).with_name("_trials_worker.py")
 
 
 class Setting(NamedTuple):
-    """A batch: fidelity, assistance and participant, and how many simulated seconds per second are wanted."""
+    """A batch, and its wanted speed in simulated seconds per second."""
 
     fidelity: str
     assistance: str
@@ -45,11 +45,11 @@ SETTINGS = (
 
 
 def measure(*, seeds: int = 0, quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        seeds: Houses; 0 for 10, or 2 when `quick`.
-        quick: Few houses.
+        seeds: Number of houses (default: 10, or 2 when `quick`).
+        quick: Run few houses.
     """
     compile_kernels()
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
@@ -57,7 +57,7 @@ def measure(*, seeds: int = 0, quick: bool = False) -> dict[str, Any]:
 
 
 def measure_batch(setting: Setting, seeds: int, objects: int = OBJECTS) -> dict[str, Any]:
-    """Speed of one batch, its reference, and the share of each part of its wall time."""
+    """Measure the speed of one batch, its reference, and the share of each part of its wall time."""
     design = factorial(
         objects=(objects,),
         assistance=(setting.assistance,),
@@ -92,7 +92,6 @@ def measure_batch(setting: Setting, seeds: int, objects: int = OBJECTS) -> dict[
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result as text: a table in Markdown, then what was aimed at."""
     rows = result["rows"]
     yield f"{result['objects']} objects, {result['seeds']} houses, one process, no regrets; simulated s per s"
     yield ""

@@ -11,7 +11,7 @@ from benchmarks.support.requirements import Requirement, requirement_lines
 from benchmarks.support.walking_sessions import SECONDS, WalkResult, run_session
 
 HOURS, QUICK = 1.0, 0.05
-SLOW = 2.0  # m/s: sessions up to this speed are reported apart
+SLOW = 2.0  # sessions up to this speed are also reported separately, m/s
 REQUIREMENTS = (
     Requirement(
         "control steps at which the body was in or had crossed something solid", "tunnelled", "<=", 0
@@ -29,20 +29,19 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, hours: float | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark; everything in it can be written as JSON.
+    """Run the benchmark. Everything in the result can be written as JSON.
 
     Args:
-        quick: A few simulated minutes.
+        quick: Run a few simulated minutes.
         hours: Simulated time, h.
-        workers: Processes; one per core unless said.
-        only: Run this session alone, to look at a failure again.
+        workers: Number of processes (default: one per core).
+        only: Run only this session, to reproduce a failure.
     """
     total = math.ceil(3600.0 * (hours or (QUICK if quick else HOURS)) / SECONDS)
     return summarise(run_sessions(run_session, total, workers=workers, only=only))
 
 
 def summarise(walks: Sequence[WalkResult]) -> dict[str, Any]:
-    """Figures over all sessions."""
     overlap = 1e3 * np.concatenate([walk.overlap for walk in walks])
     slow = 1e3 * np.concatenate([[0.0], *(walk.overlap for walk in walks if walk.speed <= SLOW)])
     return {
@@ -78,7 +77,6 @@ def summarise(walks: Sequence[WalkResult]) -> dict[str, Any]:
 
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
-    """The result for people."""
     for failure in result["failures"]:
         yield "failed: at {speed:.1f} m/s; --only {session} runs it again".format(**failure)
     yield (

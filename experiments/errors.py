@@ -1,12 +1,12 @@
-"""Typed errors of the experiments, and descriptions of any error: one line, and where in user code it was raised.
+"""Error types of the experiments, and functions that describe any error.
 
 ExperimentError
-├── ConfigError     an option of a run or batch is unusable
+├── ConfigError     an option of a run or batch is not usable
 ├── SessionError    a session cannot continue
 ├── RecordError     a run directory is missing, incomplete or in the way
-├── UserCodeError   a user-supplied participant, condition or planner raised, or returned something unusable
+├── UserCodeError   a custom participant, condition or planner raised, or returned an invalid value
 ├── StatisticsError the data do not allow a statistical test
-├── StoreError      the database of a study cannot be used, or what is asked contradicts what it holds
+├── StoreError      the database of a study is not usable, or a request contradicts its content
 └── ReplayError     a recorded run cannot be replayed, or differs from its record
 """
 
@@ -19,10 +19,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
-CALL_LIMIT = (
-    "MJSIM_CALL_LIMIT"  # environment variable: longest call of a user's own code, s; workers inherit it
-)
-LONGEST = 300  # characters of a message or value that are shown
+# Environment variable with the time limit for one call of custom code, in seconds. Workers inherit it.
+CALL_LIMIT = "MJSIM_CALL_LIMIT"
+MAX_SHOWN = 300  # longest message or value in an error, in characters
 
 
 class ExperimentError(Exception):
@@ -30,7 +29,7 @@ class ExperimentError(Exception):
 
 
 class ConfigError(ExperimentError):
-    """An option of a run or batch is unusable."""
+    """An option of a run or batch is not usable."""
 
 
 class SessionError(ExperimentError):
@@ -42,7 +41,7 @@ class RecordError(ExperimentError):
 
 
 class UserCodeError(ExperimentError):
-    """A user-supplied participant, condition or planner raised, or returned something unusable."""
+    """A custom participant, condition or planner raised, or returned an invalid value."""
 
 
 class StatisticsError(ExperimentError):
@@ -50,15 +49,15 @@ class StatisticsError(ExperimentError):
 
 
 class StoreError(ExperimentError):
-    """The database of a study cannot be used, or what is asked contradicts what it holds; says what to do."""
+    """The database of a study is not usable, or a request contradicts its content. The message says what to do."""
 
 
 class ReplayError(ExperimentError):
     """A recorded run cannot be replayed, or differs from its record.
 
     Attributes:
-        step: First bad control step, or None where no step can be named.
-        verdicts: A line for every file of the run that was checked.
+        step: First bad control step, or None if no step is to blame.
+        verdicts: One line for each file that was checked.
     """
 
     def __init__(self, message: str, step: int | None = None, verdicts: Sequence[str] = ()) -> None:
@@ -68,15 +67,15 @@ class ReplayError(ExperimentError):
 
 
 def describe(error: BaseException) -> str:
-    """An error as one line: its message, preceded by its type unless it is one of this project's errors."""
-    # Imported late, so that `mjsim doctor` can name a distribution that hides one of these packages.
+    """Describe an error in one line. The type precedes the message unless it is one of this project's errors."""
+    # Imported late because `mjsim doctor` must work if another distribution shadows one of these packages.
     from hud.errors import HudError
     from mjsim.values.errors import MjsimError
     from planner.errors import PlannerError
 
     try:
         message = " ".join(str(error).split()).encode(errors="backslashreplace").decode()
-    except Exception:  # a user's own error
+    except Exception:  # raised by a custom error type
         message = ""
     if isinstance(error, ExperimentError | HudError | MjsimError | PlannerError):
         return message
@@ -84,40 +83,38 @@ def describe(error: BaseException) -> str:
 
 
 def shown(value: object) -> str:
-    """A value in a message, whatever it is."""
+    """Format a value of any type for a message."""
     try:
         return _cut(" ".join(repr(value).encode(errors="backslashreplace").decode().split()))
-    except Exception:  # a user's own type
+    except Exception:  # raised by a custom type
         return f"a {type(value).__name__}"
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 
-def is_own_file(file: str) -> bool:
-    """Whether a file of code is none of Python, of a library or of this project."""
-    own = Path(file).is_absolute() and not file.startswith(
-        LIBRARIES
-    )  # compiled libraries name relative files
-    return own and not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
-
-
-def place(error: BaseException | None) -> str:
-    """File and line of the innermost frame of a user's own code, empty if there is none."""
+def user_code_location(error: BaseException | None) -> str:
+    """Return file and line of the innermost frame in custom code, or an empty string."""
     trace, found = error.__traceback__ if error is not None else None, ""
     while trace is not None:
         file, module = trace.tb_frame.f_code.co_filename, str(trace.tb_frame.f_globals.get("__name__", ""))
-        if is_own_file(file) and module.partition(".")[0] not in PACKAGES:
+        if _is_user_file(file) and module.partition(".")[0] not in PACKAGES:
             found = f" ({file}, line {trace.tb_lineno})"
         trace = trace.tb_next
     return found
 
 
+def _is_user_file(file: str) -> bool:
+    if not Path(file).is_absolute() or file.startswith(LIBRARIES):  # compiled libraries name relative files
+        return False
+    return not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
+
+
 def definition(code: object) -> str:
-    """File and line where a function is defined, empty if there is none."""
+    """Return file and line of a function's definition, or an empty string if they are unknown."""
     try:
         found = inspect.unwrap(code).__code__  # type: ignore[arg-type]
         return f" ({found.co_filename}, line {found.co_firstlineno})"
-    except Exception:  # something else that can be called
+    except Exception:  # another kind of callable
         return ""

@@ -1,4 +1,4 @@
-"""A house prepared once and used for many episodes: catalogue, navmesh, geodesics, rooms, receptacles."""
+"""A house prepared for many episodes: catalogue, navmesh, geodesics, rooms and receptacles."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -28,28 +28,26 @@ from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
 TEXTS = Path(__file__).with_name("texts")  # one file for each language
-VIEWPOINT_SPACING = 2.2  # m; from a viewpoint one sees what lies within it in spite of furniture
+VIEWPOINT_SPACING = (
+    2.2  # m; objects within this distance of a viewpoint are visible from it despite furniture
+)
 VIEWPOINT_CANDIDATES = 3000
-WALL_GAP = 0.05  # m that planned paths keep from walls beyond the body's radius, so that corners can be cut
+WALL_GAP = 0.05  # extra distance of planned paths from walls, in metres, so that walkers can cut corners
 
 
 @dataclass(frozen=True, eq=False)
 class House:
-    """What no episode of a house changes. Participants know it from the familiarisation (PAPER section 7).
+    """The parts of a house that no episode changes. Participants know them from the familiarisation (PAPER section 7).
 
     Attributes:
-        catalogue: Rooms, categories, receptacles and object models.
-        sampling_floor: Where the usual person can walk, by the compiled model's own geoms: objects lie and people start
-            there, whoever takes part.
-        navmesh: Where this house's person can walk.
-        geodesics: Shortest paths on it, for planning and guidance: a little away from the walls. Objects may lie
-            off it, within the person's reach.
-        rooms: Which room a point lies in.
-        receptacles: Receptacle key -> geometry.
+        sampling_floor: Navmesh of the default person, on which objects and start positions are sampled for all persons.
+        navmesh: Navmesh of this house's person.
+        geodesics: Shortest paths for planning and guidance, slightly away from walls. An object may be off the navmesh
+            but within reach.
+        receptacles: Geometry by receptacle key.
         bounds: (x_min, y_min, x_max, y_max) of the floor, m.
-        person: Whose size and reach count.
-        texts: Words of the HUD, in the language of the catalogue's labels.
-        seen: Receptacles that a participant has seen; None for all of them.
+        texts: HUD texts in the language of the catalogue's labels.
+        seen: Keys of the receptacles that the participant has seen, or None for all.
     """
 
     catalogue: Catalogue
@@ -65,21 +63,20 @@ class House:
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":
-        """Compile a house and compute where the usual person can walk.
+        """Compile a house and build the default person's navmesh.
 
         Args:
-            name: Name under `models/houses`, path of a `catalogue.toml`, its folder or a recipe, or the seed of a
-                generated home, which is generated if necessary.
+            name: Name under `models/houses`, path of a `catalogue.toml`, its folder or a recipe, or a generated home
+                such as `generated:7`.
 
         Raises:
-            AssetError: The house cannot be read, does not compile, or breaks a convention of docs/models.md.
-            HouseError: It cannot be generated as asked.
+            AssetError: The house cannot be read or compiled, or breaks a convention of docs/models.md.
+            HouseError: The home cannot be generated.
         """
         return cls.of(load_catalogue(name))
 
     @classmethod
     def of(cls, catalogue: Catalogue) -> "House":
-        """Compile the house of a catalogue, as by `load`."""
         house = compiled_house(catalogue)
         require_usable(house)
         floor = house.floor
@@ -99,7 +96,7 @@ class House:
         )
 
     def in_language(self, language: str, texts: HudTexts | None = None) -> "House":
-        """The same house with labels and words of the HUD in a language; `texts` replace its usual words.
+        """Return this house with labels and HUD texts in another language; `texts` overrides the HUD texts.
 
         Raises:
             ConfigError: There are no texts in the language.
@@ -111,10 +108,10 @@ class House:
         return dataclasses.replace(self, catalogue=catalogue, rooms=rooms, texts=texts)
 
     def for_person(self, person: PersonParameters) -> "House":
-        """The same house, with the same episodes, for a person of another size or reach.
+        """Return this house, with the same episodes, for a person of another size or reach.
 
         Raises:
-            ConfigError: A receptacle is out of reach from where this person would stand.
+            ConfigError: A receptacle would be out of reach.
         """
         usual, size = PersonParameters(), (person.body_radius, person.reach)
         if size == (self.person.body_radius, self.person.reach):
@@ -135,19 +132,19 @@ class House:
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
-        """Shortest paths of a person whose trunk touches the walls; no actual walk is shorter."""
+        """Shortest paths of a person whose trunk touches the walls. They are lower bounds on walking distances."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(_navmesh(floor, self.person.body_radius))
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
-        """Receptacle key -> navigable point from which to use it, m, shape (2,)."""
+        """Navigable points from which to use each receptacle, m, shape (2,), by receptacle key."""
         return {key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()}
 
     @cached_property
     def viewpoints(self) -> Mapping[str, NDArray[np.float64]]:
-        """Room key -> places from which the whole room can be seen, m, shape (k, 2)."""
-        # A fixed seed: viewpoints are a property of the house, not of a trial.
+        """Points from which a whole room can be seen, m, shape (k, 2), by room key."""
+        # The seed is fixed because viewpoints are a property of the house, not of a trial.
         floor = self.navmesh.sample(np.random.default_rng(0), VIEWPOINT_CANDIDATES)
         rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
         return {
@@ -170,7 +167,7 @@ class House:
         )
 
     def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
-        """The points of a seed where objects may lie, m, shape (points, 2).
+        """Return the points of a seed at which objects may lie, m, shape (points, 2).
 
         Raises:
             SamplingError: The house is too small for them.
@@ -179,10 +176,10 @@ class House:
 
 
 def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
-    """All texts in a language, by section and name.
+    """Read all texts in a language, by section and name.
 
     Raises:
-        ConfigError: There is no such language.
+        ConfigError: There are no texts in the language.
     """
     path = TEXTS / f"{language}.toml"
     if not path.is_file():
@@ -196,7 +193,7 @@ def _navmesh(floor: Footprint, radius: float) -> NavMesh:
 
 
 def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Farthest-point sampling of points (m, 2), m >= 1, until all lie within `spacing` m of a chosen one."""
+    """Sample points (m, 2) farthest-first until every point is within `spacing` metres of a sampled one."""
     chosen = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     gap = np.linalg.norm(points - points[chosen[0]], axis=1)
     while gap.max() > spacing:

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
-from experiments.analysis.page import Picture
+from experiments.analysis.page import FigureBlock
 from experiments.analysis.report.figures import svg
 from studies.published import Published
 from studies.score import EFFECT_SIZE, Score
@@ -16,7 +16,7 @@ FOREST = (
 PUBLISHED, TARGET, AGREES, DIFFERS = "#444444", "#DDDDDD", "#0072B2", "#D55E00"
 
 
-def forest(score: Score, published: Published) -> Picture:
+def forest(score: Score, published: Published) -> FigureBlock:
     """A row for each effect size that was judged."""
     tests = {(t.measure, str(t.effect), t.objects): t for t in published.tests}
     rows = [r for r in score.rows if r.kind == EFFECT_SIZE and r.target is not None]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import f, ncf
 
-from experiments.analysis.statistics.effects import ALPHA, FTest, partial_eta_squared
-from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.statistics.effects import ALPHA, FTest, Interval, partial_eta_squared
 from studies.published import PublishedTest
 
 SHARE = 0.9  # of the intervals

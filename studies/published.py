@@ -7,8 +7,7 @@ from typing import Literal
 import msgspec
 from scipy.stats import f
 
-from experiments.analysis.statistics.effects import ALPHA, FTest, partial_eta_squared
-from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.statistics.effects import ALPHA, FTest, Interval, partial_eta_squared
 
 FILE = Path(__file__).with_name("published.toml")
 NOT_SIGNIFICANT = "n.s."

@@ -13,8 +13,7 @@ from functools import partial
 import numpy as np
 
 from experiments.analysis.page import p_value
-from experiments.analysis.statistics.effects import ALPHA, FTest
-from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.statistics.effects import ALPHA, FTest, Interval
 from experiments.analysis.study.measures import LIKERT_PREFIX
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError

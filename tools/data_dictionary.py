@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.record.event_check import OUTCOMES, OutcomeEvent
-from experiments.record.events import TYPES, LoggedEvent
-from experiments.trials.dictionary import described, trial_columns
+from experiments.record.events import OUTCOMES, TYPES, OutcomeEvent
+from experiments.record.session_events import LoggedEvent
+from experiments.trials.table import described, trial_columns
 
 _HEAD = """\
 # Data dictionary

@@ -1,1 +1,1 @@
-"""What several benchmarks and their tests use."""
+"""Code shared by benchmarks and their tests."""

@@ -1,4 +1,4 @@
-"""The same trials in every tier of fidelity: which objects were delivered, and the metrics."""
+"""The same trials at every fidelity: delivered objects and metrics."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -22,13 +22,7 @@ from mjsim.values.options import FIDELITIES
 
 @dataclass(frozen=True)
 class TierResult:
-    """One trial in one tier.
-
-    Attributes:
-        config: The trial.
-        delivered: Names of the objects in their receptacles at the end.
-        metrics: The paper's metrics, by name.
-    """
+    """Result of a trial at one fidelity. `delivered` names the objects in their receptacles at the end."""
 
     config: TrialConfig
     delivered: frozenset[str]
@@ -36,7 +30,7 @@ class TierResult:
 
 
 def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
-    """Run a trial in every tier, without a record on disk; its own fidelity is ignored."""
+    """Run a trial at every fidelity, without a record on disk. Its own fidelity is ignored."""
     scene = compose(trial_episode(config, house), house.catalogue)
     results = {}
     for fidelity in FIDELITIES:
@@ -51,7 +45,7 @@ def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
 
 
 def run_all_in_tiers(configs: Sequence[TrialConfig], *, workers: int = 1) -> Iterator[dict[str, TierResult]]:
-    """Run trials in every tier, on several processes; yields fidelity -> result, trial by trial."""
+    """Run trials at every fidelity in several processes. Yield results by fidelity, trial by trial."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run_one, configs)
 

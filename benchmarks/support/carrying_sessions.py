@@ -1,7 +1,7 @@
-"""Carrying two objects through the house at full speed: how far welds stretch and twist, and how many objects are lost.
+"""Sessions in which two objects are carried through the house at full speed, with the errors of their welds.
 
-In a session the person picks up two objects next to them and walks to another point of the house by the
-shortest path, at 1.4 m/s round every corner.
+The person picks up two objects nearby and walks to another point of the house by the shortest path, at 1.4 m/s even
+around corners.
 """
 
 import math
@@ -23,7 +23,7 @@ SEED = 2027
 SPEED = 1.4  # m/s
 LOOK_AHEAD = 0.3  # m
 BRAKING = 1.5  # m/s^2
-BESIDE = 0.55  # m
+PICK_DISTANCE = 0.55  # m
 MIN_LENGTH = 6.0  # m of the path
 MAX_STEPS = 900  # control steps of a walk
 ARRIVED = 0.1  # m
@@ -31,19 +31,17 @@ ARRIVED = 0.1  # m
 
 @dataclass(frozen=True)
 class CarryResult:
-    """Result of a walk with two objects.
+    """Result of a walk with two objects, for T control steps.
 
     Attributes:
-        session: Its number; `run_session` repeats it.
-        models: Models of the objects.
-        lost: How many of them slipped out of a hand.
-        arrived: Whether the person got there.
+        session: Number of the session, by which `run_session` repeats it.
+        lost: Number of objects that slipped out of a hand.
         length: Length of the path, m.
-        speed: Speed of the body at each control step, m/s, (T,).
-        turn: Its yaw rate, rad/s, (T,).
-        stretch: Weld errors, m, (T, 2), NaN where nothing is held.
+        speed: Speed of the body, m/s, (T,).
+        turn: Yaw rate of the body, rad/s, (T,).
+        stretch: Weld errors, m, (T, 2), NaN if nothing is held.
         twist: Weld errors, rad, (T, 2).
-        penetration: Deepest overlap, m, (T,).
+        penetration: Deepest penetration, m, (T,).
     """
 
     session: int
@@ -59,7 +57,7 @@ class CarryResult:
 
 
 def run_session(house: House, number: int) -> CarryResult:
-    """Run session `number`; the same number gives the same session, to the last bit."""
+    """Run session `number`. Equal numbers give bit-identical sessions."""
     rng = np.random.default_rng([SEED, number])
     path = _path(house, rng)
     episode = _episode(house, number, path[0], rng)
@@ -96,10 +94,11 @@ def run_session(house: House, number: int) -> CarryResult:
 
 
 def _path(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A shortest path, (k, 2) m, that begins where there is room to pick objects up."""
     while True:
         start, goal = house.navmesh.sample(rng), house.navmesh.sample(rng)
-        around = [start + BESIDE * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.8)]
+        around = [
+            start + PICK_DISTANCE * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.8)
+        ]
         if all(house.navmesh.is_navigable(point) for point in around):
             path = np.asarray(house.geodesics.shortest_path(start, goal).points)
             if path_length(path) >= MIN_LENGTH:
@@ -107,19 +106,19 @@ def _path(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _episode(house: House, number: int, start: NDArray[np.float64], rng: np.random.Generator) -> Episode:
-    """The person at a floor point (2,) m with two random objects in front, one on each side."""
+    """Place the person at a floor point (2,) m with two random objects in front, one on each side."""
     heading = float(rng.uniform(-math.pi, math.pi))
     objects = []
     for i, side in enumerate((0.8, -0.8)):
         model = str(rng.choice(list(house.catalogue.objects)))
         angle, yaw = heading + side, rng.uniform(-math.pi, math.pi)
-        xy = start + BESIDE * np.array([math.cos(angle), math.sin(angle)])
+        xy = start + PICK_DISTANCE * np.array([math.cos(angle), math.sin(angle)])
         objects.append(upright_object(house, i, model, xy, 0.01, yaw))
     return session_episode(house, number, start, heading, objects)
 
 
 def _towards(path: NDArray[np.float64], position: NDArray[np.float64], heading: float) -> Action:
-    """Full speed along a path (k, 2) m, turning into its direction; slower only at the very end."""
+    """Return a move at full speed along a path (k, 2) m, turning into its direction and slowing at its end."""
     x, y = (float(v) for v in position)
     arc, _ = project(path, x, y)
     to_x, to_y = point_along(path, arc + LOOK_AHEAD)

@@ -1,4 +1,4 @@
-"""Chromium of the system, driven by Playwright: without a screen, and with WebGL by software."""
+"""The system's Chromium, driven by Playwright, headless and with software WebGL."""
 
 import os
 from collections.abc import Iterator
@@ -8,14 +8,13 @@ from pathlib import Path
 from playwright.sync_api import Browser, sync_playwright
 
 CHROMIUM = Path("/usr/bin/chromium")
-# Mesa's software, some four times as fast as the browser's own.
+# Mesa's software renderer is about four times as fast as the browser's.
 WEBGL = ["--use-angle=gles-egl", "--ignore-gpu-blocklist", "--enable-unsafe-swiftshader"]
 FLAGS = ["--no-sandbox", "--disable-background-networking", *WEBGL]
 
 
 @contextmanager
 def chromium_browser() -> Iterator[Browser]:
-    """A browser that draws with one of the processor's programs."""
     with sync_playwright() as driver:
         software: dict[str, str | float | bool] = {**os.environ, "LIBGL_ALWAYS_SOFTWARE": "1"}
         browser = driver.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS, env=software)

@@ -1,4 +1,4 @@
-"""How fast the environment is: steps and resets per second of one core, and what several processes gain.
+"""Speed of the environment: steps and resets per core-second, and the speed-up of several processes.
 
 python -m benchmarks.support.environment_speed
 """
@@ -23,7 +23,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple[float, float]:
-    """Steps and simulated seconds per second of CPU time, with random actions and 6 objects."""
+    """Return steps and simulated seconds per second of CPU time, with random actions and 6 objects."""
     env = gymnasium.make(ID, episodes=1, disable_env_checker=True, **options)
     env.action_space.seed(0)
     env.reset(seed=0)
@@ -43,7 +43,7 @@ def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple
 
 
 def seconds_per_reset(episodes: int | None, resets: int) -> float:
-    """Mean CPU time of a reset, s, to one of `episodes` houses that come again, or to new houses."""
+    """Return the mean CPU time of a reset, s, to one of `episodes` houses that repeat, or to new houses if None."""
     env = gymnasium.make(ID, episodes=episodes, disable_env_checker=True)
     for seed in range(episodes or 1):
         env.reset(seed=seed)
@@ -56,9 +56,9 @@ def seconds_per_reset(episodes: int | None, resets: int) -> float:
 
 
 def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
-    """Steps per second of `processes` environments in as many processes, relative to one environment in this process.
+    """Return the speed of `processes` environments in as many processes, relative to one environment in this process.
 
-    Both are measured alternately, in wall time, with images: cheap steps spend more time between the processes.
+    Both are measured alternately, in wall time, with images. Cheap steps would be dominated by communication.
     """
     options: dict[str, Any] = {"episodes": 1, "observations": ("state", "rgb")}
     one = gymnasium.make_vec(ID, num_envs=1, vectorization_mode="sync", **options)
@@ -85,7 +85,6 @@ def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
     table = Table("observations", "steps per core-second", "simulated s per core-second")
     for name, options in SETTINGS.items():
         steps, simulated = steps_per_second(options)
@@ -93,7 +92,7 @@ def main() -> None:
     console = Console()
     console.print(table)
     console.print(f"reset to a new house: {seconds_per_reset(None, 10) * 1e3:.0f} ms")
-    console.print(f"reset to one of 4 houses that come again: {seconds_per_reset(4, 400) * 1e3:.2f} ms")
+    console.print(f"reset to one of 4 houses that repeat: {seconds_per_reset(4, 400) * 1e3:.2f} ms")
     console.print(f"2 environments in 2 processes: {vector_speedup(2):.2f} times as many steps as one")
 
 

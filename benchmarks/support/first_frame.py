@@ -1,4 +1,4 @@
-"""How soon a visit can be played: from opening its link until the house is loaded and Start can be pressed."""
+"""Time from opening the link of a visit until the house is loaded and Start can be pressed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,10 +7,10 @@ from typing import Any
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from benchmarks.support.chromium import chromium_browser
-from benchmarks.support.play_server import PATIENCE, TASK_ALONE, PlayProcess, Report
+from benchmarks.support.play_server import PATIENCE, TASK_ALONE, PlayProcess, ProgressReport
 
 SLOW = {"offline": False, "latency": 80, "downloadThroughput": 10e6 / 8, "uploadThroughput": 10e6 / 8}
-# The time since the link was opened, ms, once Start can be pressed; it comes when the house is loaded and compiled.
+# Time since the link was opened, ms, once Start is shown, which is when the house is loaded and compiled
 PLAYABLE = """() => {
   const start = document.querySelector("#panel[open] button.button:enabled");
   return document.querySelector("#play[data-phase=ready]") && start?.checkVisibility() && performance.now();
@@ -23,19 +23,21 @@ class Opened:
     """A visit that was opened.
 
     Attributes:
-        seconds: From opening the link until Start could be pressed, s.
-        megabytes: What came over the network, with all that is loaded later, MB.
+        seconds: Time from opening the link until Start could be pressed, s.
+        megabytes: Data received, including what loads later, MB.
     """
 
     seconds: float
     megabytes: float
 
 
-def measure_first_frame(folder: Path, tries: int, report: Report, *words: str) -> dict[str, dict[str, Any]]:
-    """Cases of opening a visit: each the median of some tries, but for the first visit to a server."""
+def measure_first_frame(
+    folder: Path, tries: int, report: ProgressReport, *words: str
+) -> dict[str, dict[str, Any]]:
+    """Measure cases of opening a visit, each as a median of some tries, except for the first visit to a server."""
     cases: dict[str, list[Opened]] = {}
-    places = "--sessions", str(3 * tries + 1)  # pages that are closed keep theirs for a while
-    with PlayProcess(folder, *TASK_ALONE, *places, *words) as server, chromium_browser() as browser:
+    slots = "--sessions", str(3 * tries + 1)  # closed pages keep their slots for a while
+    with PlayProcess(folder, *TASK_ALONE, *slots, *words) as server, chromium_browser() as browser:
         report("the first visit to a server that has just started")
         cases["server just started"] = [_open(_context(browser), server)]
         for number in range(tries):
@@ -51,7 +53,7 @@ def measure_first_frame(folder: Path, tries: int, report: Report, *words: str) -
 
 
 def _context(browser: Browser) -> BrowserContext:
-    """Like a new browser, with an empty cache."""
+    """Return a browser context with an empty cache."""
     context = browser.new_context(viewport={"width": WIDTH, "height": HEIGHT})
     context.set_default_timeout(1000.0 * PATIENCE)
     return context
@@ -68,7 +70,7 @@ def _open(context: BrowserContext, server: PlayProcess, *, slow: bool = False) -
 
 
 def _count(page: Page, slow: bool) -> list[float]:
-    """Bytes that come in, of answers as they are on the wire and of the socket before compression."""
+    """Count received bytes: responses as transferred, and socket messages before compression."""
     came: list[float] = []
     session = page.context.new_cdp_session(page)
     session.send("Network.enable")

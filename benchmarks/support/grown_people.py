@@ -1,4 +1,4 @@
-"""A study whose participants have all finished: its file, database and visits, without a server."""
+"""A study whose participants have all finished: its file, database and visits, made without a server."""
 
 import asyncio
 import hashlib
@@ -27,7 +27,7 @@ fidelity = "event"
 name = "grown"
 title = "A study that has grown"
 institution = "a benchmark"
-contact = "nobody@example.org"
+contact = "study@example.org"
 phases = ["consent", "comprehension", "task", "survey", "completion"]
 """
 ANSWERS: Mapping[str, Mapping[str, Any]] = {
@@ -39,7 +39,7 @@ BEGAN = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def fill_study(folder: Path, real: Mapping[str, Sequence[Source]], people: int) -> Path:
-    """Write the study into a folder that does not exist. Return the study file."""
+    """Write the study to a new folder. Return the study file."""
     folder.mkdir(parents=True)
     file = folder / "study.toml"
     file.write_text(STUDY.format(people=people))
@@ -57,7 +57,7 @@ async def _make(url: str, name: str, file_hash: str) -> None:
 
 
 def _fill(engine: Engine, tokens: Sequence[str], phases: Sequence[str]) -> None:
-    """Add participants in one transaction; a transaction for each step of each would take most of the time."""
+    """Add all participants in one transaction, because many transactions would take most of the time."""
     people, places, passed, given, trials = [], [], [], [], []
     for number, token in enumerate(tokens, start=1):
         began = BEGAN + timedelta(minutes=number)

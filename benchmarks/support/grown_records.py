@@ -1,4 +1,4 @@
-"""Records of many trials, made from a few real ones: their seeds change, and with them names and checksums."""
+"""Records of many trials, made from a few real ones by changing seeds, names and checksums."""
 
 import hashlib
 import itertools
@@ -13,8 +13,8 @@ from experiments.record import records
 from experiments.record.files import CHECKSUMS, read_checksums
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import run_batch
-from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import read_trial, trial_key, trial_name
+from experiments.trials.batch_plan import check_trials
 from experiments.trials.design import Design, factorial
 from experiments.trials.fingerprint import Inputs, fingerprint
 from experiments.trials.trial_config import SEEDS, TrialConfig
@@ -25,25 +25,24 @@ CONDITIONS = "none", "optimal"
 
 @dataclass(frozen=True)
 class Source:
-    """A real run directory: the files that change with the seeds, as they are there, and all checksums."""
+    """A real run directory: its files that depend on the seeds, and all checksums."""
 
     path: Path
-    events: tuple[str, str]  # the line of the start, and all that follow
+    events: tuple[str, str]  # the line of the start event, and all others
     episode: Mapping[str, Any]
     metrics: Mapping[str, Any]
     sums: Mapping[str, str]
 
     @classmethod
     def read(cls, path: Path) -> "Source":
-        """Read a run directory."""
         start, _, others = (path / records.EVENTS).read_text().partition("\n")
         episode, metrics = (
             json.loads((path / name).read_text()) for name in (records.EPISODE, records.METRICS)
         )
         return cls(path, (start, others), episode, metrics, read_checksums(path))
 
-    def grow(self, trial: TrialConfig, inputs: Inputs, place: Path) -> None:
-        """Write the record that a trial would have if it went as this one did; large files are linked."""
+    def grow(self, trial: TrialConfig, inputs: Inputs, folder: Path) -> None:
+        """Write the record of a trial as if it went like this one. Large files are linked."""
         changed = {name: getattr(trial, name) for name in SEEDS}
         episode = json.dumps({**self.episode, "seed": trial.house_seed})
         changed["fingerprint"] = fingerprint(trial, inputs)
@@ -58,25 +57,25 @@ class Source:
             records.EVENTS: f"{json.dumps(start)}\n{self.events[1]}",
             records.METRICS: json.dumps({**self.metrics, **changed}, indent=2),
         }
-        place.mkdir(parents=True)
+        folder.mkdir(parents=True)
         sums = {**self.sums, **{name: _sha256(text) for name, text in texts.items() if name in self.sums}}
         for path in self.path.iterdir():
             if path.name not in (*texts, CHECKSUMS):
-                os.link(path, place / path.name)
+                os.link(path, folder / path.name)
         texts[CHECKSUMS] = "".join(f"{sums[name]}  {name}\n" for name in sorted(sums))
         for name, text in texts.items():
-            (place / name).write_text(text)
+            (folder / name).write_text(text)
 
 
 def design_of(trials: int) -> Design:
-    """Half of the trials without assistance and half with it, each pair with a seed of its own."""
+    """Return a design with half of the trials without assistance and half with it, paired by seed."""
     return factorial(
         assistance=CONDITIONS, users=("follower",), seeds=range(trials // 2), objects=(1,), **_same()
     )
 
 
 def batch_words(trials: int, out: Path) -> list[str]:
-    """Words of the command that runs this design."""
+    """Return the command line that runs this design."""
     return [
         *("batch", "--objects", "1", "--fidelity", "event", "--no-regret"),
         *("--assistance", ",".join(CONDITIONS), "--seeds", f"0:{trials // 2}", "--out", str(out)),
@@ -97,7 +96,7 @@ def grow_batch(real: Mapping[str, Sequence[Source]], trials: int, out: Path) -> 
     """Write the folder of a batch whose trials are all finished, without its tables.
 
     Raises:
-        RuntimeError: A record is not the one that the design asks for.
+        RuntimeError: A record does not match the design.
     """
     design = design_of(trials).trials
     inputs = check_trials(design)
@@ -111,7 +110,7 @@ def grow_batch(real: Mapping[str, Sequence[Source]], trials: int, out: Path) -> 
 
 
 def grow_visits(real: Mapping[str, Sequence[Source]], places: Iterable[Path]) -> None:
-    """Write a record to each place, each of another person."""
+    """Write a record to each place, each for another person."""
     sources = itertools.cycle(source for some in real.values() for source in some)
     for number, place in enumerate(places):
         source = next(sources)

@@ -1,4 +1,4 @@
-"""What is measured of a generated home: its files, the geometry of its model, rooms and openings of its recipe."""
+"""Figures of a generated home: its files, the geometry of its model, rooms and openings of its recipe."""
 
 import hashlib
 import itertools
@@ -29,19 +29,19 @@ from mjsim.house.check import check_house_name
 from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
 
-DRAWN = 10  # one home of so many is exported as the browser's client draws it
+DRAWN = 10  # every tenth home is exported for the browser, to count draw calls
 CELL = 0.0125  # m
-BAND = (0.05, 1.8)  # m, heights in which a person bumps into things
-WAY = 0.70  # m
+BAND = (0.05, 1.8)  # heights of obstacles for a person, m
+WAY = 0.70  # width of a way to furniture, m
 USUAL, LARGE = (
     0.50,
     0.58,
-)  # m, a body of 0.20 and one of 0.24 m radius, with the planner's clearance of 0.05 m
-POCKET = 0.01  # m2 of floor for the middle of a body
-REACH = 0.60  # m from the middle of a person to a piece that the person uses
-BEFORE_WINDOW = 0.5  # m
-HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # m, of rays in doorways
-SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)  # groups of geoms
+)  # widths of default and large people (radius 0.20 and 0.24 m) with 0.05 m clearance, m
+POCKET = 0.01  # smallest pocket that counts, m2 of floor for the middle of a body
+REACH = 0.60  # largest distance from the middle of a person to furniture in use, m
+BEFORE_WINDOW = 0.5  # depth of the zone in front of a window, m
+HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # of rays in doorways, m
+SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)  # groups of geoms that rays hit
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 KITCHENS = ("straight_kitchen", "corner_kitchen")  # each has a sink, a cooker and a fridge
 SEATS = {"sofa": 2, "corner_sofa": 4, "bench": 2} | dict.fromkeys(
@@ -59,7 +59,7 @@ THINGS: Mapping[str, tuple[str, ...]] = {
 
 
 def figures(home: tuple[int, int]) -> dict[str, Any]:
-    """All figures of the home of (rooms, seed); everything can be written as JSON."""
+    """Return all figures of the home of (rooms, seed), JSON-ready."""
     about: dict[str, Any] = {"rooms": home[0], "seed": home[1], "draws": None}
     try:
         files, about["make_s"] = _made(home)
@@ -76,7 +76,7 @@ def figures(home: tuple[int, int]) -> dict[str, Any]:
                 scene = json.loads(export_scene(catalogue)[SCENE])
                 about["draws"] = scene["sizes"][HOUSE]["draw_calls"]
             measured = _Home(compiled_house(catalogue), plan).figures()
-    except Exception as error:  # whatever it is, the home cannot be used
+    except Exception as error:  # with any error, the home cannot be used
         return {**about, "failure": f"{type(error).__name__}: {error}"}
     return {
         **about,
@@ -88,12 +88,11 @@ def figures(home: tuple[int, int]) -> dict[str, Any]:
 
 
 def remade(home: tuple[int, int]) -> str:
-    """The digest of the home of (rooms, seed), which is made again."""
     return _digest(_made(home)[0])
 
 
 def _made(home: tuple[int, int]) -> tuple[Mapping[str, bytes], float]:
-    """The files of a home, and the CPU time, s, of plan and furniture."""
+    """Return the files of a home, and the CPU time of plan and furniture, s."""
     start = time.process_time()
     recipe, furnishing = generate(home[1], home[0])
     seconds = time.process_time() - start
@@ -107,12 +106,12 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A piece of furniture with the upright boxes around its geoms, rows of x0, y0, z0, x1, y1, z1, m."""
+    """A piece of furniture with the bounding boxes of its geoms, in rows of x0, y0, z0, x1, y1, z1, m."""
 
     room: str
     kind: str
-    shown: NDArray[np.float64]  # of all, (n, 6)
-    solid: NDArray[np.float64]  # of what a person bumps into, (k, 6)
+    shown: NDArray[np.float64]  # boxes of all geoms, (n, 6)
+    solid: NDArray[np.float64]  # boxes of obstacles for a person, (k, 6)
     form: str  # hash of shapes, places and colours
 
     @property
@@ -121,13 +120,13 @@ class _Piece:
 
     @property
     def size(self) -> tuple[float, ...]:
-        """To 0.1 m, the longer side first."""
+        """Size to 0.1 m, the longer side first."""
         x, y, z = np.round(self.shown[:, 3:].max(axis=0) - self.shown[:, :3].min(axis=0), 1).tolist()
         return max(x, y), min(x, y), z
 
 
 class _Home:
-    """A compiled home with a grid of the distances of its floor to what stands there."""
+    """A compiled home with a grid of distances from its floor to the nearest obstacle."""
 
     def __init__(self, house: CompiledHouse, plan: FloorPlan) -> None:
         self._model, self._data, self._plan = house.model, house.data, plan
@@ -161,7 +160,7 @@ class _Home:
         }
 
     def _all_pieces(self) -> Iterator[_Piece]:
-        """What stands, hangs and lies: bodies called `room/kind_number`."""
+        """Yield furniture and decoration: bodies named `room/kind_number`."""
         model, data = self._model, self._data
         for body in range(1, model.nbody):
             room, _, name = model.body(body).name.partition("/")
@@ -185,13 +184,13 @@ class _Home:
         return slice(max(i, 0), u + 1), slice(max(j, 0), v + 1)
 
     def _free(self, width: float) -> NDArray[np.bool_]:
-        """Where the middle of a disc of a diameter may be that comes into all rooms; nowhere where none can."""
+        """Return cells from which a disc of this diameter reaches all rooms. There are none if it cannot."""
         islands, _ = label(self._field.distance >= width / 2)
         seen = [set(np.unique(islands[cells]).tolist()) for cells in self._rooms.values()]
         return np.isin(islands, list(set.intersection(*seen) - {0}))
 
     def _way(self) -> float:
-        """Diameter, m, of the widest disc that comes into all rooms, to a cell, up to 1.2 m."""
+        """Return the diameter of the widest disc that reaches all rooms, m, to a cell, up to 1.2 m."""
         low, high = 0, round(1.2 / CELL)
         while low < high:
             middle = (low + high + 1) // 2
@@ -199,13 +198,13 @@ class _Home:
         return low * CELL
 
     def _pockets(self) -> int:
-        """Pieces of floor that people of the usual width come to, and large ones do not."""
+        """Count areas of the floor that default people reach and large people do not."""
         usual, _ = label(self._free(USUAL))
         islands, _ = label((self._field.distance >= LARGE / 2) & (usual > 0))
         return int((np.bincount(islands[islands > 0]) * CELL**2 > POCKET).sum()) - 1
 
     def _unusable(self, pieces: list[_Piece]) -> Iterator[str]:
-        """Pieces to which nobody comes, from within the room, by ways of `WAY`; plants and lamps are only seen."""
+        """Yield furniture that is not reachable from within its room by ways of `WAY`. Plants and lamps are ignored."""
         free = self._free(WAY - CELL)
         for room, cells in self._rooms.items():
             away = np.full(free.shape, math.inf)
@@ -216,7 +215,7 @@ class _Home:
                     yield f"{room}: {piece.kind}"
 
     def _clear(self, door: Door) -> float:
-        """Clear width, m, of a doorway, by rays from its middle to both sides."""
+        """Return the clear width of a doorway, m, by rays from its middle to both sides."""
         floor = self._plan.room(door.rooms[0]).floor
         middle = floor.along(door.side, door.center, door.center, -WALL / 2, -WALL / 2).center
         along, across = np.eye(3)[[0, 1] if door.side in ("south", "north") else [1, 0]]
@@ -230,7 +229,6 @@ class _Home:
         return float(min(widths))
 
     def _hides(self, piece: _Piece, window: Window) -> bool:
-        """Whether a piece is before a window and higher than its sill."""
         low, high = window.center - window.width / 2, window.center + window.width / 2
         zone = self._plan.room(window.room).floor.along(window.side, low, high, 0.0, BEFORE_WINDOW)
         x0, y0, _, x1, y1, top = piece.shown.T
@@ -238,14 +236,13 @@ class _Home:
         return bool((inside & (top > window.sill + 0.01)).any())
 
     def _palette(self) -> list[float]:
-        """Colours of wood, fronts and cloth of the home's furniture, in steps of 0.2."""
         names = {self._model.material(i).name: i for i in range(self._model.nmat)}
         found = [names[name] for name in ("wood_a", "wood_b", "front_a", "cloth_a") if name in names]
         return [round(float(v) * 5) / 5 for v in self._model.mat_rgba[found, :3].ravel()]
 
 
 def _door_graph(plan: FloorPlan) -> str:
-    """Which rooms have doors to which, by use: the same for plans that only call their bedrooms otherwise."""
+    """Return the doors between rooms by use. Plans that differ only in the names of bedrooms have equal graphs."""
     uses = {room.key: room.use for room in plan.rooms} | {"outside": "outside"}
     bedrooms = [key for key, use in uses.items() if use == "bedroom"]
     forms = []
@@ -261,7 +258,6 @@ def _within(value: float, bounds: tuple[float, float]) -> bool:
 
 
 def _lacking(plan: FloorPlan, kinds: Counter[str]) -> Iterator[str]:
-    """What a home must have and this one does not."""
     bedrooms = sum(room.use in ("bedroom", "studio") for room in plan.rooms)
     if sum(kinds[kind] for kind in BEDS) < bedrooms:
         yield "beds"

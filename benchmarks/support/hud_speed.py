@@ -1,4 +1,4 @@
-"""What drawing the HUD costs in a real session: every HUD state of one trial is drawn in turn.
+"""Time for drawing the HUD in a real session: every HUD state of a trial is drawn in turn.
 
 python -m benchmarks.support.hud_speed --assistance optimal --objects 6
 """
@@ -25,7 +25,7 @@ from mjsim.values.observation import Observation
 from mjsim.world.world import World
 
 SIZE = (640, 480)
-# Bytes written between two frames, as rendering does, so that no processor cache still holds the panels.
+# Bytes written between two frames, as by rendering, to evict the panels from the processor's cache
 BETWEEN_FRAMES = 16 << 20
 
 
@@ -36,17 +36,14 @@ class _Recorder:
         self.states: list[HudState] = []
 
     def camera(self, world: World) -> CameraView:
-        """The eye camera."""
         pose = camera_pose(world.model, world.data, "avatar/eye", SIZE[0] / SIZE[1])
         return CameraView(pose.position, pose.rotation, pose.fovy, *SIZE)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002
-        """Keep the state of this control step."""
         self.states.append(hud_state)
 
 
 def session_states(house: House, trial: TrialConfig) -> tuple[HudState, ...]:
-    """The states of a trial, one per control step."""
     scene = compose(trial_episode(trial, house), house.catalogue)
     recorder = _Recorder()
     session, _ = prepare_session(trial, house, scene, EventLog(), recorder)
@@ -60,13 +57,13 @@ def hud_milliseconds(
     size: tuple[int, int] = SIZE,
     clock: Callable[[], float] = time.process_time,
 ) -> NDArray[np.float64]:
-    """What it takes to lay each of `states` over a frame, in order, ms, shape (states,).
+    """Measure the time for composing each HUD state over a frame, ms, shape (states,).
 
     Args:
-        compositor: Draws them; what it keeps from frame to frame is part of what is measured.
-        states: Of a session.
+        compositor: Draws the states. Its caches between frames are part of the measurement.
+        states: States of a session, in order.
         size: Width and height of the frame, px.
-        clock: Counts seconds.
+        clock: Returns seconds.
     """
     frame = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
     elsewhere = np.zeros(BETWEEN_FRAMES, np.uint8)
@@ -80,7 +77,7 @@ def hud_milliseconds(
 
 
 def summary(times: NDArray[np.float64]) -> dict[str, float]:
-    """Mean, median, 99th percentile and maximum of times (frames,), ms, without the first; and the first, ms."""
+    """Summarize times (frames,), ms. The first is reported separately."""
     later = times[1:]
     return {
         "frames": len(times),
@@ -93,7 +90,6 @@ def summary(times: NDArray[np.float64]) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the cost for one trial."""
     parser = argparse.ArgumentParser(description="Measure what drawing the HUD costs in a real session.")
     parser.add_argument("--assistance", default="optimal")
     parser.add_argument("--objects", type=int, default=6)

@@ -1,4 +1,4 @@
-"""Stress sessions: their episodes, and how many of them run on several cores with a progress bar."""
+"""Stress sessions: their episodes, and running them on several cores with a progress bar."""
 
 import functools
 import math
@@ -27,17 +27,14 @@ def run_sessions(
     only: int | None = None,
     house: str = "apartment",
 ) -> list[T]:
-    """Run sessions 0 to count - 1, or one of them alone.
+    """Run sessions 0 to count - 1, or only one of them. Return the results in order.
 
     Args:
-        run: Runs the session of a number; a function of a module.
-        count: How many.
-        workers: Processes; one per core unless said.
-        only: Number of the one session to run, to look at a failure again.
+        run: Runs the session of a number. It must be a module's function, which can be pickled.
+        count: Number of sessions.
+        workers: Number of processes (default: one per core).
+        only: Number of the only session to run, to reproduce a failure.
         house: Name of the house, or path of its catalogue.
-
-    Returns:
-        Their results, in the order of the numbers.
     """
     numbers = range(count) if only is None else range(only, only + 1)
     results = _results(run, numbers, workers or os.cpu_count() or 1, house)
@@ -49,7 +46,7 @@ def _results(run: Callable[[House, int], T], numbers: Sequence[int], workers: in
         house = House.load(name)
         yield from (run(house, number) for number in numbers)
         return
-    # Spawned, not forked: a forked thread pool would not survive.
+    # Processes are spawned because thread pools do not survive a fork.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         yield from pool.map(functools.partial(_run_in_worker, run, name), numbers)
 
@@ -60,14 +57,13 @@ def _run_in_worker(run: Callable[[House, int], T], name: str, number: int) -> T:
 
 @functools.cache
 def _house(name: str) -> House:
-    """Each house once per process."""
     return House.load(name)
 
 
 def upright_object(
     house: House, number: int, model: str, xy: NDArray[np.float64], height: float, yaw: float
 ) -> PlacedObject:
-    """Object `o<number>` of a session: a model at a floor point (2,) m, at a height, m, turned by a yaw, rad."""
+    """Return object `o<number>` of a session at a floor point (2,) m and a height, m, turned by a yaw, rad."""
     x, y = xy.tolist()
     quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
     category = house.catalogue.objects[model].category
@@ -77,7 +73,7 @@ def upright_object(
 def session_episode(
     house: House, number: int, start: NDArray[np.float64], heading: float, objects: Sequence[PlacedObject]
 ) -> Episode:
-    """Episode of a session: the person at a floor point (2,) m with a heading, rad, and objects with their targets."""
+    """Return the episode of a session, with the person at a floor point (2,) m with a heading, rad."""
     catalogue = house.catalogue
     return Episode(
         house=catalogue.name,

@@ -1,8 +1,8 @@
 """Seeded placements over all object models, receptacles and fill levels.
 
-In a session the person stands at a random point near a receptacle, with objects of its category on the floor around.
-The person picks one after another and places each into the receptacle, which so fills up. Only the person's hands
-move objects.
+In a session, the person stands at a random point near a receptacle, with objects of its category on the floor around.
+The person picks up one after another and places it into the receptacle, which fills up. Only the person's hands move
+objects.
 """
 
 import math
@@ -22,13 +22,13 @@ from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
 
 SEED = 2026
-LEVELS = 6  # the receptacle holds 0 to 5 objects before
-AROUND = (0.4, 0.92)  # m from the person to the objects on the floor
-STRAY = 0.3  # m from the receptacle's approach point at most, in x and in y
-REACH = 0.8  # m from the person to the receptacle's volume at most
-SPACING = 0.3  # m between objects on the floor
-DROP = 0.01  # m
-MAX_STEPS = 400  # control steps of one motion
+LEVELS = 6  # placements per session, into a receptacle with 0 to 5 objects
+AROUND = (0.4, 0.92)  # distances from the person to the objects on the floor, m
+STRAY = 0.3  # largest distance from the receptacle's approach point in x and in y, m
+REACH = 0.8  # largest distance from the person to the receptacle's volume, m
+SPACING = 0.3  # smallest distance between objects on the floor, m
+DROP = 0.01  # initial height of objects, m
+MAX_STEPS = 400  # most control steps of one motion
 NOT_TRIED = ("pick_failed", "refused")
 _OUTCOMES = (
     EventKind.PICKED, EventKind.PICK_FAILED, EventKind.PLACED, EventKind.PLACE_FAILED, EventKind.GRIP_LOST,
@@ -37,21 +37,17 @@ _OUTCOMES = (
 
 @dataclass(frozen=True)
 class Placement:
-    """One object that was picked up and, if `outcome` is not `pick_failed`, placed.
+    """An object that was picked up and, unless `outcome` is `pick_failed`, placed.
 
     Attributes:
-        session: Number of the session; `run_session` repeats it.
-        model: Object model.
-        receptacle: Receptacle key.
-        fill: How many objects the receptacle held before.
-        outcome: `placed`, or `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it was placed and
-            pushed another one out, `error` if the physics failed.
-        ejections: Number of objects ejected.
-        tunnellings: Number of objects that tunnelled.
+        session: Number of the session, by which `run_session` repeats it.
+        fill: Number of objects in the receptacle before.
+        outcome: `placed`, `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it pushed another
+            object out, or `error` if the physics failed.
         settle_s: Time from release to rest, s.
         weld_m: Largest weld error, m.
-        weld_rad: Likewise, rad.
-        penetration: Deepest overlap in each control step, m.
+        weld_rad: Largest weld error, rad.
+        penetration: Deepest penetration in each control step, m.
     """
 
     session: int
@@ -68,12 +64,11 @@ class Placement:
 
 
 def run_session(house: House, number: int) -> list[Placement]:
-    """Run session `number`; the same number gives the same session, to the last bit."""
+    """Run session `number`. Equal numbers give bit-identical sessions."""
     return run_episode(house, make_episode(house, number))
 
 
 def run_episode(house: House, episode: Episode, options: WorldOptions | None = None) -> list[Placement]:
-    """Place the objects of a session's episode, one after another."""
     world, number = World(compose(episode, house.catalogue), options), episode.seed
     found: list[Placement] = []
     fill = 0
@@ -87,7 +82,7 @@ def run_episode(house: House, episode: Episode, options: WorldOptions | None = N
 
 
 def make_episode(house: House, number: int) -> Episode:
-    """The person near a receptacle with objects around: categories in turn, everything else drawn by chance."""
+    """Arrange the person and objects near a receptacle: categories in turn, everything else at random."""
     rng = np.random.default_rng([SEED, number])
     category = list(house.catalogue.categories.values())[number % len(house.catalogue.categories)]
     return arrange(house, number, category, list(category.objects) * 2, rng)
@@ -96,7 +91,7 @@ def make_episode(house: House, number: int) -> Episode:
 def arrange(
     house: House, number: int, category: Category, models: list[str], rng: np.random.Generator
 ) -> Episode:
-    """The person near the receptacle of a category, with `LEVELS` of these models around, in any order."""
+    """Arrange the person near the receptacle of a category, with `LEVELS` of these models around, in any order."""
     receptacle = house.receptacles[category.receptacle]
     while True:
         stand = _stand(house, category.receptacle, rng)
@@ -113,7 +108,7 @@ def arrange(
 
 
 def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A floor point (2,) m from which a receptacle is in reach, near its approach point."""
+    """Sample a floor point (2,) m near the approach point of a receptacle, within reach."""
     receptacle = house.receptacles[key]
     while True:
         point = receptacle.approach + rng.uniform(-STRAY, STRAY, 2)
@@ -122,7 +117,7 @@ def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float
 
 
 def _spots(house: House, stand: NDArray[np.float64], rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Floor points (2,) m in reach of the person, apart from each other and from furniture."""
+    """Sample floor points (2,) m within reach of the person, apart from each other and from furniture."""
     spots: list[NDArray[np.float64]] = []
     for _ in range(400):
         angle, radius = rng.uniform(-math.pi, math.pi), rng.uniform(*AROUND)
@@ -137,7 +132,6 @@ def _spots(house: House, stand: NDArray[np.float64], rng: np.random.Generator) -
 
 
 def _transport(world: World, session: int, placed: PlacedObject, fill: int) -> Placement:
-    """Pick one object up and place it."""
     receptacle = world.scene.episode.targets[placed.name]
     before = world.health
     rows: list[tuple[float, ...]] = []
@@ -167,7 +161,7 @@ def _transport(world: World, session: int, placed: PlacedObject, fill: int) -> P
 
 
 def _motion(world: World, action: Pick | Place, rows: list[tuple[float, ...]]) -> str:
-    """Outcome of a pick or place; `rows` takes the health of every control step."""
+    """Return the outcome of a pick or place. The health of every control step is added to `rows`."""
     step = world.step(action)
     if step.result is None or not step.result.applied:
         return "refused"

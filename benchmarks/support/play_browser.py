@@ -1,4 +1,4 @@
-"""A browser as `mjsim play` sees it: its socket, its numbered inputs, and a link that may be slow and lossy."""
+"""A simulated browser of `mjsim play`: its socket, its numbered inputs, and a link that may be slow and lossy."""
 
 import asyncio
 import json
@@ -18,7 +18,7 @@ from benchmarks.support.play_server import PATIENCE
 from benchmarks.support.simulated_link import CountingConnection, Link
 from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS, MAX_STEPS_AHEAD
 
-STEP = 0.04  # s of a control step
+STEP = 0.04  # duration of a control step, s
 # A text frame of 126 bytes, masked with zeros, that ends early.
 HALF_A_MESSAGE = b"\x81\xfe\x00\x7e" + bytes(4) + b'{"type": "inputs", "inputs": [{"num'
 
@@ -28,9 +28,9 @@ class SeenFrame:
     """A frame or snapshot that arrived.
 
     Attributes:
-        at: When, as `time.perf_counter` has it.
-        input: Number of the last input that counts in it.
-        width: Of a frame, px; 0 for a snapshot.
+        at: Time of arrival by `time.perf_counter`.
+        input: Number of the last input that it includes.
+        width: Width of a frame, px, or 0 for a snapshot.
     """
 
     at: float
@@ -39,23 +39,23 @@ class SeenFrame:
 
 
 class SimulatedBrowser:
-    """Plays through a socket as the page does, and keeps what was not acknowledged, to send it again.
+    """Plays through a socket like the page, and keeps unacknowledged inputs to send them again.
 
     Args:
-        address: Of the visit.
-        codec: `jpeg`, `h264`, or `none` for a client that draws: it stamps its inputs, and promises them step by step.
-        link: What the network does.
-        size: Of the view, px.
-        seed: Of the network's chance.
+        address: Address of the visit.
+        codec: `jpeg`, `h264`, or `none` for a client that draws, which stamps its inputs and promises them step by
+            step.
+        link: Properties of the network.
+        size: Size of the view, px.
+        seed: Seed of the network's randomness.
 
     Attributes:
         next: Number of the next input.
-        acknowledged: Number of the last input that is safe.
+        acknowledged: Number of the last acknowledged input.
         frames: Frames and snapshots that arrived.
-        last: Type -> the latest message of it.
-        sent_at: Number of an input -> when it was sent.
-        draws: Whether it draws.
-        trips: From sending an input to its acknowledgement, s.
+        last: Latest message by type.
+        sent_at: Time of sending by number of the input.
+        trips: Times from sending an input to its acknowledgement, s.
     """
 
     def __init__(
@@ -72,10 +72,10 @@ class SimulatedBrowser:
         self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec}
         self.draws = codec == "none"
         self._step: int | None = (
-            None  # the next control step of a client that draws; None while the clock stands
+            None  # next control step of a client that draws; None while the clock is paused
         )
         self._newest = 0  # step of the last snapshot
-        self._made: list[dict[str, Any]] = []  # inputs for control steps that were not promised yet
+        self._made: list[dict[str, Any]] = []  # inputs for control steps not promised yet
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -89,7 +89,7 @@ class SimulatedBrowser:
         self.sent_at: dict[int, float] = {}
 
     async def open(self, trial: str) -> None:
-        """Connect, and say hello."""
+        """Connect and send the hello message."""
         parts = urlsplit(self.address)
         self.last.clear()
         self._out = asyncio.Queue()
@@ -108,50 +108,47 @@ class SimulatedBrowser:
         self._tasks = [asyncio.create_task(task) for task in doing]
 
     def lose(self, *, amid_a_message: bool = False) -> None:
-        """Lose the connection, without a word to the server, or in the middle of one."""
+        """Drop the connection without a close message, or in the middle of a message."""
         if self._socket is not None:
             if amid_a_message:
                 self._socket.transport.write(HALF_A_MESSAGE)
             self._socket.transport.abort()
 
     async def cut(self, *, amid_a_message: bool = False) -> None:
-        """Lose the connection, and know it."""
+        """Drop the connection and end its tasks."""
         self.lose(amid_a_message=amid_a_message)
         await self._end()
 
     async def close(self) -> None:
-        """Close the connection."""
         if self._socket is not None:
             await self._socket.close()
         await self._end()
 
     def reload(self) -> None:
-        """Forget all that a page forgets when it is loaded again."""
+        """Forget everything that a page forgets when it is reloaded."""
         self._waiting, self._tab = [], secrets.token_hex(8)
 
     def forget(self) -> None:
-        """Forget the frames and inputs so far."""
+        """Forget the frames and times so far."""
         self.frames.clear()
         self.sent_at.clear()
         self.trips.clear()
 
     @property
     def arrived(self) -> int:
-        """How many bytes have arrived on this connection."""
+        """Number of bytes that arrived on this connection."""
         return 0 if self._socket is None else self._socket.received
 
     @property
     def pending(self) -> int:
-        """Number of inputs that are not acknowledged."""
         return len(self._waiting)
 
     def say(self, **message: Any) -> None:
-        """Send a message."""
         due = time.perf_counter() + self._link.delay(self._rng)
         self._out.put_nowait((due, json.dumps(message)))
 
     def press(self, **values: Any) -> int:
-        """Send an input; its number."""
+        """Send an input. Return its number."""
         number, self.next = self.next, self.next + 1
         new = {"number": number, **values}
         self._waiting.append(new)
@@ -162,10 +159,10 @@ class SimulatedBrowser:
         return number
 
     async def until(self, holds: Callable[[], bool], seconds: float = PATIENCE) -> None:
-        """Wait until something holds.
+        """Wait until a condition holds.
 
         Raises:
-            TimeoutError: It does not.
+            TimeoutError: The condition does not hold in time.
             ConnectionError: The server has closed the connection.
         """
 
@@ -184,14 +181,13 @@ class SimulatedBrowser:
 
     @property
     def phase(self) -> str:
-        """Phase of the session, as the server sent it last."""
         return str(self.last.get("state", {}).get("phase", ""))
 
     async def run(self) -> int:
-        """Let the clock run once the session is open, and send again what was not acknowledged.
+        """Start the clock once the session is open, and send unacknowledged inputs again.
 
         Returns:
-            Number of the last input that the session had.
+            Number of the last input that the session had received.
         """
         await self.until(lambda: self.phase in ("ready", "paused", "running"))
         number = int(self.last["state"]["input"])
@@ -202,11 +198,9 @@ class SimulatedBrowser:
         return number
 
     async def taken(self) -> None:
-        """Wait until all inputs are acknowledged."""
         await self.until(lambda: self.acknowledged >= self.next - 1)
 
     async def leave(self) -> None:
-        """End the session, and disconnect."""
         self.last.pop("saved", None)
         self.say(type="leave")
         await self.until(lambda: "saved" in self.last)
@@ -216,7 +210,6 @@ class SimulatedBrowser:
         self.say(type="run", **({"until": 0} if self.draws else {}))
 
     def _repeat(self) -> None:
-        """Send again what was not acknowledged."""
         for first in range(0, len(self._waiting), MAX_INPUTS):
             self.say(type="inputs", inputs=self._waiting[first : first + MAX_INPUTS])
 
@@ -231,7 +224,7 @@ class SimulatedBrowser:
             await asyncio.sleep(STEP)
             due = time.perf_counter()
             while self._step is not None:
-                if self._step >= self._newest + MAX_STEPS_AHEAD:  # the server would refuse it
+                if self._step >= self._newest + MAX_STEPS_AHEAD:  # the server would reject the step
                     await asyncio.sleep(STEP)
                     due = time.perf_counter()
                     continue
@@ -240,7 +233,7 @@ class SimulatedBrowser:
                 self._send_inputs(made, until=self._step)
                 due += STEP
                 await asyncio.sleep(max(0.0, due - time.perf_counter()))
-            self._made.clear()  # they are repeated once the clock runs again
+            self._made.clear()  # they are sent again when the clock runs
 
     async def _beat(self) -> None:
         while True:
@@ -265,7 +258,7 @@ class SimulatedBrowser:
         await self._notify()
 
     async def _take_all(self, arriving: asyncio.Queue[tuple[float, str | bytes]]) -> None:
-        """Take each message when it is due, and none before those sent earlier, as TCP has it."""
+        """Handle messages when they are due, in order like TCP."""
         while True:
             due, message = await arriving.get()
             await asyncio.sleep(max(0.0, due - time.perf_counter()))
@@ -310,7 +303,6 @@ class SimulatedBrowser:
 
 
 async def begin_task(browser: SimulatedBrowser) -> None:
-    """Skip the training, and start the task."""
     await browser.open("training")
     await browser.until(lambda: browser.phase == "ready")
     await browser.leave()

@@ -1,4 +1,4 @@
-"""How fast `mjsim play` answers, what a session costs, and how many sessions a machine holds."""
+"""Latency of `mjsim play`, cost of a session, and the number of sessions that a machine can run."""
 
 import asyncio
 import math
@@ -11,23 +11,27 @@ from typing import Any
 import numpy as np
 
 from benchmarks.support.play_browser import SimulatedBrowser
-from benchmarks.support.play_server import TASK_ALONE, PlayProcess, Report, memory, processor_time, worker_of
+from benchmarks.support.play_server import (
+    TASK_ALONE,
+    PlayProcess,
+    ProgressReport,
+    memory,
+    processor_time,
+    worker_of,
+)
 from benchmarks.support.simulated_link import Link
 from experiments.record.phases import TASK
 
-PERIOD = 0.25  # s between two inputs
+PERIOD = 0.25  # between two inputs, s
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
-AT_ONCE = 2  # sessions that are opened at the same time
-SETTLING = 2.0  # s before a session is measured
-SETTLING_TOGETHER = 8.0  # s in which sessions find the size of their frames that leaves room for the others
-MIN_FPS, MAX_MS = (
-    15.0,
-    150.0,
-)  # what a session with frames has that holds: frames a second, 95 % from input to frame
+AT_ONCE = 2  # number of sessions that are opened at the same time
+SETTLING = 2.0  # time before a session is measured, s
+SETTLING_TOGETHER = 8.0  # time in which concurrent sessions adapt the size of their frames, s
+MIN_FPS, MAX_MS = 15.0, 150.0  # requirements with frames: fps, 95th percentile from input to frame in ms
 MIN_STATES, MAX_ACKNOWLEDGED = (
     24.5,
     60.0,
-)  # and one that draws: states a second, 95 % until an input is acknowledged, ms
+)  # requirements of drawing clients: states/s, 95 % of acknowledgements in ms
 CASES = {  # codec, link
     "jpeg": ("jpeg", Link()),
     "h264": ("h264", Link()),
@@ -38,16 +42,16 @@ CASES = {  # codec, link
 }
 
 
-def measure_latency(folder: Path, seconds: float, report: Report, *words: str) -> dict[str, Any]:
-    """From an input to the frame that shows it, frames a second and bandwidth, for codecs and links.
+def measure_latency(folder: Path, seconds: float, report: ProgressReport, *words: str) -> dict[str, Any]:
+    """Measure latency from input to frame, fps and bandwidth, by codec and link.
 
-    For a client that draws it is the time until its input is acknowledged, and states a second.
+    For a client that draws, these are the time until its input is acknowledged, and states per second.
 
     Args:
-        folder: Of the visits.
-        seconds: How long for each.
-        report: Takes lines about the progress.
-        words: Further words of the server's command line.
+        folder: Folder for the visits.
+        seconds: Duration of each case.
+        report: Receives lines about the progress.
+        words: Further arguments of the server's command line.
     """
     found = {}
     with PlayProcess(folder, *TASK_ALONE, "--sessions", "2", *words) as server:
@@ -63,20 +67,20 @@ def measure_capacity(
     seconds: float,
     codec: str,
     counts: Sequence[int],
-    report: Report,
+    report: ProgressReport,
     *words: str,
     core: int | None = None,
 ) -> list[dict[str, float]]:
-    """Which numbers of sessions at once hold 15 frames a second and 150 ms, or 25 states a second and 60 ms.
+    """Find the number of sessions at once that hold 15 fps and 150 ms, or 25 states per second and 60 ms.
 
     Args:
-        folder: Gets a folder of visits for each number of sessions.
-        seconds: How long for each number.
-        codec: Of their frames; `none` for clients that draw.
+        folder: Folder for the visits, with a subfolder for each number of sessions.
+        seconds: Duration for each number.
+        codec: Codec of frames, or `none` for clients that draw.
         counts: Numbers of sessions to try, descending, until one holds.
-        report: Takes lines about the progress.
-        words: Further words of the server's command line.
-        core: The only one that the server may use; None for all.
+        report: Receives lines about the progress.
+        words: Further arguments of the server's command line.
+        core: The only core that the server may use, or None for all.
     """
     tried = []
     for count in counts:
@@ -124,19 +128,18 @@ async def _sessions_at_once(
 
 
 def median_width(browsers: Sequence[SimulatedBrowser]) -> float:
-    """Width of the last frames, px; 0 where none came."""
+    """Return the median width of the last frames, px, or 0 without frames."""
     return float(np.median([browser.frames[-1].width if browser.frames else 0 for browser in browsers]))
 
 
 async def settle(browsers: Sequence[SimulatedBrowser], seconds: float = SETTLING_TOGETHER) -> None:
-    """Start the tasks of visits that have no other phase, and let the clocks of pages and server agree."""
+    """Start the tasks of visits without other phases, and let the clocks of pages and server agree."""
     opening = asyncio.Semaphore(AT_ONCE)
     await asyncio.gather(*(_show_something(browser, opening) for browser in browsers))
     await asyncio.gather(*(turn(browser, seconds) for browser in browsers))
 
 
 async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore) -> None:
-    """Start the task of a visit that has no other phase."""
     async with opening:
         await browser.open(TASK)
         await browser.run()
@@ -144,7 +147,7 @@ async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore)
 
 
 async def turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
-    """Turn to and fro; the times from an input to what shows it, ms; where the client draws, to its acknowledgement."""
+    """Turn to and fro. Return the times in ms from each input to its frame or, if the client draws, acknowledgement."""
     browser.forget()
     first, until = browser.next, time.perf_counter() + seconds
     while time.perf_counter() < until:
@@ -164,5 +167,5 @@ async def turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
 
 
 def load() -> float:
-    """How many processes want to run, for each core."""
+    """Return the number of runnable processes per core."""
     return os.getloadavg()[0] / (os.cpu_count() or 1)

@@ -1,4 +1,4 @@
-"""A server of `mjsim play` in a process of its own: started, killed, started again, and measured from outside."""
+"""A server of `mjsim play` in its own process, which can be killed, restarted and measured from outside."""
 
 import os
 import resource
@@ -17,25 +17,25 @@ from experiments.record.journal import JOURNAL
 from experiments.record.run_directory import JOURNALS
 from experiments.visit.tokens import token_hash
 
-PATIENCE = 400.0  # s; a loaded machine may be slow, and may have to compile all kernels first
-TASK_ALONE = ("--phases", "task")  # words of a server whose visits consist of the task
+PATIENCE = 400.0  # timeout, s; a loaded machine may be slow, and may have to compile all kernels first
+TASK_ALONE = ("--phases", "task")  # arguments of a server whose visits consist only of the task
 _TICKS = os.sysconf("SC_CLK_TCK")
 
-Report = Callable[[str], None]  # takes a line about the progress of a benchmark
+ProgressReport = Callable[[str], None]  # receives a line about the progress of a benchmark
 
 
 class PlayProcess:
-    """A server, from entering the context until leaving it. Standard error goes into `server.txt` beside its folder.
+    """A server that runs while the context is active. Its standard error goes to `server.txt` next to its folder.
 
     Args:
-        folder: Where it keeps visits.
-        words: Further words of its command line.
-        core: The only one that it may use; None for all.
-        command: What is run; `study serve FILE` for a study.
-        program: What runs it.
+        folder: Folder for visits.
+        words: Further arguments of its command line.
+        core: The only core that it may use, or None for all.
+        command: Subcommand, such as `study serve FILE` for a study.
+        program: Program with its arguments.
 
     Attributes:
-        url: Its URL.
+        url: URL of the server.
         process: The process.
     """
 
@@ -53,7 +53,7 @@ class PlayProcess:
         self.url = ""
 
     def start(self) -> None:
-        """Start it, after a kill at the same port; returns as soon as it listens."""
+        """Start the server, after a kill at the same port, and wait until it listens."""
         port = urlsplit(self.url).port or 0
         command = [*self._command, "--no-open", "--port", str(port), "--out", str(self._folder), *self._words]
         with self.output.open("ab") as output:
@@ -64,12 +64,12 @@ class PlayProcess:
             raise ChildProcessError(self.output.read_text())
 
     def kill(self) -> None:
-        """`kill -9`; its workers end with it."""
+        """Kill the server by SIGKILL, which also ends its workers."""
         self.process.kill()
-        self.process.communicate()  # its workers hold its output, too
+        self.process.communicate()  # waits for its workers, which have its output open
 
     def begin(self) -> str:
-        """Begin a visit; its address."""
+        """Begin a visit. Return its address."""
         origin = self.url.rstrip("/")
         with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=PATIENCE) as client:
             path = client.post("/begin").headers["location"]
@@ -78,11 +78,9 @@ class PlayProcess:
         return origin + path
 
     def visit(self, address: str) -> Path:
-        """Folder of a visit."""
         return self._folder / token_hash(address.rsplit("/", 1)[1])
 
     def journal(self, address: str, phase: str) -> Path:
-        """Journal of a phase of a visit."""
         return self.visit(address) / JOURNALS / phase / JOURNAL
 
     def __enter__(self) -> "PlayProcess":
@@ -100,41 +98,37 @@ class PlayProcess:
 
 
 def fill_disk(worker: int, journal: Path, room: int) -> None:
-    """Let a worker write only `room` more bytes to its journal, as if the disk was full then."""
+    """Limit a worker to `room` more bytes in its journal, which simulates a full disk."""
     size = journal.stat().st_size + room
     resource.prlimit(worker, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
 
 
 def memory(pid: int) -> float:
-    """Memory of a process, MB; what it shares with others counts in part."""
+    """Return the proportional memory of a process, MB, in which shared memory counts in part."""
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024.0
 
 
 def resident_memory(pid: int) -> float:
-    """Memory of a process, MB, with all that it shares with others."""
+    """Return the resident memory of a process, MB, including all shared memory."""
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024.0
 
 
 def processor_time(pid: int | str) -> float:
-    """Processor time of a process, s."""
+    """Return the CPU time of a process, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def parent_of(pid: int) -> int:
-    """The process that started a process; of a worker, the fork server."""
+    """Return the parent of a process. For a worker, this is the fork server."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return int(fields[1])
 
 
 def worker_of(journal: Path) -> int:
-    """The process that has a journal open.
-
-    Raises:
-        ChildProcessError: There is none.
-    """
+    """Return the process that has a journal open. Raises a `ChildProcessError` if there is no such process."""
     for folder in Path("/proc").glob("[0-9]*/fd"):
         with suppress(OSError):
             if any(entry.readlink() == journal for entry in folder.iterdir()):

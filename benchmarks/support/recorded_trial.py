@@ -1,4 +1,4 @@
-"""Every call that a session makes to its world in a trial, recorded to be played again: a realistic workload."""
+"""The calls of a session to its world in a trial, recorded to be repeated as a realistic workload."""
 
 import time
 from collections.abc import Sequence
@@ -25,11 +25,11 @@ Call = tuple[str, Any]  # `step` with an action and a limit, or `restore`
 
 
 class RecordingWorld(World):
-    """A world that records how it is called.
+    """A world that records calls to `step` and `restore`.
 
     Attributes:
-        calls: `step` and `restore` so far.
-        single_steps: The same, with each control step of an action as a call of its own.
+        calls: The calls.
+        single_steps: The calls, with a separate call for each control step of an action.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions | None = None, *, walls: Any = None) -> None:
@@ -38,7 +38,6 @@ class RecordingWorld(World):
         self.single_steps: list[Call] = []
 
     def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
-        """See `World.step`."""
         self.calls.append(("step", (action, limit)))
         result = super().step(action, limit)
         taken = result.steps.actions
@@ -47,7 +46,6 @@ class RecordingWorld(World):
         return result
 
     def restore(self, state: WorldState) -> Observation:
-        """See `World.restore`."""
         self.calls.append(("restore", None))
         self.single_steps.append(("restore", None))
         return super().restore(state)
@@ -55,14 +53,12 @@ class RecordingWorld(World):
 
 @dataclass(frozen=True, eq=False)
 class RecordedTrial:
-    """The calls that a trial made to its world.
+    """The calls of a trial to its world.
 
     Attributes:
-        scene: The scene of the trial.
-        fidelity: The tier.
-        walls: Outline of the navigable floor, as `World` takes it, m, shape (e, 4).
+        walls: Outline of the navigable floor, as for `World`, m, shape (e, 4).
         calls: `step` with an action and a limit, and `restore` at every checkpoint.
-        single_steps: The same, with each control step as a call of its own.
+        single_steps: The calls, with a separate call for each control step.
     """
 
     scene: Scene
@@ -72,11 +68,11 @@ class RecordedTrial:
     single_steps: tuple[Call, ...]
 
     def world(self) -> World:
-        """A new world to play the calls in."""
+        """Return a new world in which to repeat the calls."""
         return World(self.scene, WorldOptions(fidelity=self.fidelity), walls=self.walls)
 
     def actions(self, seconds: float) -> list[Action]:
-        """The actions of the first control steps, as many as take `seconds` of simulated time."""
+        """Return the actions of the first control steps, for `seconds` of simulated time."""
         steps = [argument[0] for name, argument in self.single_steps if name == "step"]
         return steps[: round(seconds / WorldOptions().control_timestep)]
 
@@ -88,10 +84,10 @@ def record_trial(
 
     Args:
         house: The house.
-        objects: Number of objects; above 40 the sampling points of the house are drawn anew.
+        objects: Number of objects. Above 40, the house gets other sampling points.
         seed: Seed of the episode.
-        fidelity: The tier.
-        seconds: Simulated time after which the trial is cut off, s; None to run to the end.
+        fidelity: The fidelity.
+        seconds: Simulated time after which the trial stops, s, or None to run to the end.
 
     Raises:
         SamplingError: The house has no room for so many objects.
@@ -101,7 +97,7 @@ def record_trial(
     )
     points = max(objects, POINTS)
     episode = sample_episode(house.catalogue, house.navmesh, objects=objects, seed=seed, points=points)
-    scene = compose(episode, house.catalogue, visuals=False)  # as a trial that is not filmed
+    scene = compose(episode, house.catalogue, visuals=False)  # as in a trial without a film
     world = RecordingWorld(scene, WorldOptions(fidelity=fidelity), walls=house.navmesh.outline)
     session, _ = prepare_session(config, house, scene, EventLog(), world=world)
     session.run()
@@ -111,7 +107,7 @@ def record_trial(
 
 
 def play(world: World, calls: Sequence[Call]) -> float:
-    """Repeat calls on a world; returns the CPU time, s, without the checkpoints."""
+    """Repeat calls on a world. Return the CPU time, s, without the checkpoints."""
     clock, checkpoints = time.process_time, 0.0
     start = clock()
     for name, argument in calls:

@@ -1,4 +1,4 @@
-"""People who arrive at a study at the same moment, each at an address of their own, over real HTTP."""
+"""Participants who arrive at a study at the same moment from different addresses, over real HTTP."""
 
 import asyncio
 import json
@@ -11,8 +11,8 @@ from urllib.parse import urlencode, urlsplit
 
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 
-PROXIED = ("--trusted-proxy", "127.0.0.1")  # whose X-Forwarded-For gives everybody an address
-TASK_PAGES = 'data-trial="task"', 'http-equiv="refresh"'  # of the task, and of the queue for it
+PROXIED = ("--trusted-proxy", "127.0.0.1")  # so that X-Forwarded-For gives each participant an address
+TASK_PAGES = 'data-trial="task"', 'http-equiv="refresh"'  # marks of the task page and of the queue
 STUDY = """
 [[cells]]
 assistance = "none"
@@ -32,7 +32,7 @@ fidelity = "{fidelity}"
 name = "small"
 title = "A small study"
 institution = "a test"
-contact = "nobody@example.org"
+contact = "study@example.org"
 phases = {phases}
 """
 
@@ -45,7 +45,7 @@ def study_process(
     fidelity: str = "event",
     phases: Sequence[str] = ("consent", "task", "completion"),
 ) -> PlayProcess:
-    """A server of a small study in a folder, with two cells of so many people."""
+    """Return a server of a small study in a folder, with two cells of `people` participants."""
     values = {"people": people, "fidelity": fidelity, "phases": json.dumps(phases)}
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "study.toml"
@@ -55,8 +55,8 @@ def study_process(
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What a server answered."""
+class HttpResponse:
+    """Response of a server."""
 
     status: int
     headers: Mapping[str, str]
@@ -65,14 +65,13 @@ class Answer:
 
 @dataclass
 class Times:
-    """How long pages took, s, by name; `failed` are those that did not come."""
+    """Response times by name of the page, s, and failed requests."""
 
     pages: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     failed: list[str] = field(default_factory=list)
 
     @property
     def slowest(self) -> float:
-        """Of all pages."""
         return max((seconds for times in self.pages.values() for seconds in times), default=0.0)
 
 
@@ -83,11 +82,11 @@ async def ask(
     number: int = 0,
     cookie: str = "",
     patience: float = PATIENCE,
-) -> Answer:
-    """Ask for a page as person `number`, on a connection of its own; with a form, post it.
+) -> HttpResponse:
+    """Request a page as participant `number` on a new connection, or post a form.
 
     Raises:
-        OSError: No answer came; a TimeoutError after so many seconds.
+        OSError: No response arrived, or not in time.
     """
     parts, body = urlsplit(url), "" if form is None else urlencode(form)
     head = [f"{'GET' if form is None else 'POST'} {path} HTTP/1.1", f"Host: {parts.netloc}"]
@@ -105,14 +104,14 @@ async def ask(
         raise ConnectionError("no answer")
     first, *lines = top.split("\r\n")
     headers = {name.lower(): value for name, _, value in (line.partition(": ") for line in lines)}
-    return Answer(int(first.split()[1]), headers, content)
+    return HttpResponse(int(first.split()[1]), headers, content)
 
 
 async def arrive_at_once(url: str, people: int) -> tuple[Times, list[str]]:
-    """Let people come at once and go to their task, each as fast as pages come; times, and everybody's link."""
+    """Let participants arrive at once and go to their task as fast as possible. Return times, and all links."""
     times = Times()
 
-    async def timed(name: str, number: int, path: str, form: Mapping[str, str] | None = None) -> Answer:
+    async def timed(name: str, number: int, path: str, form: Mapping[str, str] | None = None) -> HttpResponse:
         began = time.perf_counter()
         try:
             answer = await asyncio.wait_for(ask(url, path, form, number), PATIENCE)

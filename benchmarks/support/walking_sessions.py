@@ -1,8 +1,8 @@
-"""Walking into everything: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
+"""Stress sessions of walking: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
 
-In a session the person runs and pushes in random directions, then walks away by the shortest path, and stops for a
-while. Tunnelling, being stuck and drift are judged by the body's position and the floor plan alone, not by the code
-under test.
+In a session, the person runs and pushes in random directions, then walks away by the shortest path, and stands for a
+while. Tunnelling, being stuck and drift are judged only from the body's position and the floor plan, independently of
+the code under test.
 """
 
 import math
@@ -26,12 +26,12 @@ from planner.errors import UnreachableError
 
 SEED = 2028
 SPEEDS = (1.0, 8.0)  # m/s
-ACCELERATION = 12.0  # m/s^2; more than the body's servos have force for
-SECONDS = 36.0  # of a session
-CHARGE, PUSH, RETREAT, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, 1.0  # s
-HEAPED, LAYER = 6, 0.33  # objects, and m from one to the next before they fall: more than any is long
-ROOM = 0.4  # m of free floor around a heap
-NOT_STUCK = 0.2  # m in `RETREAT` seconds
+ACCELERATION = 12.0  # m/s^2, more than the body's servos can reach
+SECONDS = 36.0  # duration of a session
+CHARGE, PUSH, RETREAT, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, 1.0  # durations, s
+HEAPED, LAYER = 6, 0.33  # objects in a heap, and their vertical distance before they fall, m
+ROOM = 0.4  # radius of free floor around a heap, m
+NOT_STUCK = 0.2  # distance covered in `RETREAT` seconds by a body that is not stuck, m
 RETREAT_SPEED = 1.4  # m/s
 LOOK_AHEAD = 0.3  # m
 
@@ -41,20 +41,17 @@ class WalkResult:
     """Result of a session.
 
     Attributes:
-        session: Its number; `run_session` repeats it.
+        session: Number of the session, by which `run_session` repeats it.
         speed: Commanded speed, m/s.
         simulated: Simulated time, s.
         tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
-        stuck: Walks away in which the body got no farther than `NOT_STUCK` m from where it was.
-        retreats: Number of walks away.
-        drift: How far the body moved in the last second of standing still, m, by occasion.
-        turned: How far it turned then, rad, by occasion.
-        overlap: Depth of the trunk in walls and furniture at each control step, m.
+        stuck: Retreats in which the body moved less than `NOT_STUCK` m.
+        drift: Movement during the last second of standing, m, by occasion.
+        turned: Rotation during the last second of standing, rad, by occasion.
+        overlap: Penetration of the trunk into walls and furniture at each control step, m.
         fastest: Speed of the fastest object, m/s.
-        ejections: Objects ejected.
-        object_tunnellings: Objects that tunnelled.
-        lost: Objects that are outside the house at the end.
-        error: How the physics failed, or None.
+        lost: Number of objects outside the house at the end.
+        error: Description of a physics error, or None.
     """
 
     session: int
@@ -74,19 +71,17 @@ class WalkResult:
 
 
 def run_session(house: House, number: int, seconds: float = SECONDS) -> WalkResult:
-    """Run session `number`; the same number gives the same session, to the last bit."""
+    """Run session `number`. Equal numbers give bit-identical sessions."""
     return _Session(house, number).run(seconds)
 
 
 class _Session:
-    """A session under way."""
-
     def __init__(self, house: House, number: int) -> None:
         self._house = house
         self._rng = np.random.default_rng([SEED, number])
         self._found = WalkResult(number, float(self._rng.uniform(*SPEEDS)))
         self._heap = _free_place(house, self._rng)
-        # `fastest_walk` is what the session asks for.
+        # This makes `fastest_walk` equal to the speed of the session.
         person = PersonParameters(
             walking_speed=self._found.speed * 13 / 14, walking_acceleration=ACCELERATION
         )
@@ -113,7 +108,7 @@ class _Session:
         return found
 
     def _charge(self) -> None:
-        """Run in some direction, every third time at the heap, then push on at another angle while turning."""
+        """Run in a random direction, every third time at the heap, then push on at another angle while turning."""
         rng, o = self._rng, self._world.observation()
         at_heap = rng.random() < 1 / 3
         offset = self._heap - o.position
@@ -124,7 +119,7 @@ class _Session:
                 self._go(course + veer, self._found.speed, turn)
 
     def _retreat(self) -> None:
-        """Walk away towards somewhere else by the shortest path."""
+        """Walk away towards a distant point by the shortest path."""
         house, start = self._house, self._position
         goal = _far_point(house, house.navmesh.snap(start), self._rng)
         self._found.retreats += 1
@@ -132,7 +127,7 @@ class _Session:
         for _ in range(self._steps(RETREAT)):
             here = house.navmesh.snap(self._position)
             path = np.asarray(house.geodesics.shortest_path(here, goal).points)
-            # First back onto navigable floor, if the charge has left the body off it.
+            # The path first leads back onto navigable floor, if the charge has left it.
             out, ahead = here - self._position, np.array(point_along(path, LOOK_AHEAD)) - here
             course = 4.0 * out + ahead / LOOK_AHEAD
             self._go(math.atan2(course[1], course[0]), RETREAT_SPEED, 0.0)
@@ -140,7 +135,7 @@ class _Session:
         self._found.stuck += farthest < NOT_STUCK
 
     def _stand(self) -> None:
-        """Stop, and measure for a while whether the body stays where it is."""
+        """Stop, and measure for a while whether the body stays in place."""
         for _ in range(self._steps(STAND)):
             self._step(IDLE)
         before = self._world.observation()
@@ -151,7 +146,7 @@ class _Session:
         self._found.turned.append(abs(after.heading - before.heading))
 
     def _go(self, course: float, speed: float, turn: float) -> None:
-        """Walk in a direction of the house, whichever way the body faces."""
+        """Walk in a world direction, whichever way the body faces."""
         angle = course - self._world.observation().heading
         self._step(Move(speed * math.cos(angle), speed * math.sin(angle), turn))
 
@@ -171,7 +166,7 @@ class _Session:
 
 
 def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A point of the floor with nothing around it."""
+    """Sample a point of the floor with free space around it."""
     around = [ROOM * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.5)]
     while True:
         point = house.navmesh.sample(rng)
@@ -180,7 +175,7 @@ def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """A point of the floor that is too far away to be reached during a retreat."""
+    """Sample a point of the floor that is too far away to be reached during a retreat."""
     while True:
         goal = house.navmesh.sample(rng)
         try:
@@ -191,7 +186,7 @@ def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator
 
 
 def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.random.Generator) -> Episode:
-    """The person anywhere in the house, and objects that fall onto a heap at a floor point (2,) m."""
+    """Place the person anywhere in the house, and objects that fall onto a heap at a floor point (2,) m."""
     start = house.navmesh.sample(rng)
     while np.linalg.norm(start - heap) < 1.0:
         start = house.navmesh.sample(rng)

@@ -1,4 +1,4 @@
-"""Pictures of `mjsim check`: every fault numbered where it is, and how disorderly an episode is."""
+"""Figures of `mjsim check` and `mjsim import episodes`."""
 
 import textwrap
 from collections import Counter
@@ -16,20 +16,20 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.views import Drawing
 from mjsim.support.files import replacing
 
-SIDE = 9.0  # inches of the longest side of a drawing
-LINES = 100  # findings below the drawing: more would make a picture that viewers do not open
-LETTERS = 13.0  # an inch
+SIDE = 9.0  # longest side of a drawing, inches
+MAX_LINES = 100  # of findings; image viewers refuse longer pictures
+LETTERS_PER_INCH = 13.0
 COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
 
 def draw_check(path: Path, report: CheckReport) -> None:
-    """Write a PNG with the views of a report and the numbers of its findings, as in its table."""
+    """Write a PNG with the views of a report and its numbered findings."""
     views = report.views or (Drawing("nothing could be compiled", (0, 1), ()),)
-    listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:LINES], 1)]
-    if len(report.findings) > LINES:
-        listed.append(f"and {len(report.findings) - LINES} more: `mjsim check` prints them all")
+    listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:MAX_LINES], 1)]
+    if len(report.findings) > MAX_LINES:
+        listed.append(f"and {len(report.findings) - MAX_LINES} more: `mjsim check` prints them all")
     wide = SIDE * (1.0 if len(views) == 1 else 1.4)
-    text = "\n".join(textwrap.fill(line, int(wide * LETTERS)) for line in listed) or "no findings"
+    text = "\n".join(textwrap.fill(line, int(wide * LETTERS_PER_INCH)) for line in listed) or "no findings"
     below = 0.3 + 0.145 * (text.count("\n") + 1)
     figure = Figure(figsize=(wide, SIDE * 0.7 + below), dpi=100)
     FigureCanvasAgg(figure)
@@ -71,16 +71,15 @@ def _draw_view(axes: Axes, view: Drawing, findings: tuple[Finding, ...]) -> None
 
 
 def _within(axes: Axes, x: float, y: float) -> tuple[float, float]:
-    """The point of the drawing nearest to a place."""
     return float(np.clip(x, *axes.get_xlim())), float(np.clip(y, *axes.get_ylim()))
 
 
-_KINDS = 15  # bars
+_KINDS = 15  # number of bars
 _BLUE = "#0072B2"
 
 
 def draw_disorder(path: Path, disorder: Disorder, kinds: Mapping[str, int]) -> None:
-    """Write a PNG; `kinds` holds how many of each kind of object are out of place."""
+    """Write a PNG. `kinds` has the number of misplaced objects of each kind."""
     figure = Figure(figsize=(11, 3.4), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     many, far, which = figure.subplots(1, 3)
@@ -90,7 +89,7 @@ def draw_disorder(path: Path, disorder: Disorder, kinds: Mapping[str, int]) -> N
     if disorder.distances:
         far.hist(disorder.distances, bins=np.arange(0, max(disorder.distances) + 0.5, 0.5), color=_BLUE)
         far.axvline(float(np.median(disorder.distances)), color="#D55E00", lw=1.5)
-    far.set(xlabel="to where it belongs, m (line: median)", ylabel="objects")
+    far.set(xlabel="distance from its place, m (line: median)", ylabel="objects")
     names = sorted(kinds, key=lambda kind: (-kinds[kind], kind))[:_KINDS][::-1]
     which.barh(names, [kinds[name] for name in names], color=_BLUE)
     which.tick_params(axis="y", labelsize=7)

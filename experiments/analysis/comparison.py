@@ -1,8 +1,8 @@
-"""Assistance conditions compared on the trials of a batch: pairs that differ in nothing but the assistance.
+"""Compares the assistance conditions of a batch on pairs of trials that differ only in the assistance.
 
-The effect size of a pair of conditions is d_z, the mean difference over the standard deviation of the differences.
-Its confidence interval inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002);
-that of the mean difference is Student's.
+The effect size of a pair of conditions is d_z, the mean difference over the standard deviation of the differences. Its
+confidence interval inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002). The
+mean difference has Student's interval.
 """
 
 import itertools
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from experiments.analysis.statistics.noncentral import t_interval
+from experiments.analysis.statistics.effects import t_interval
 from experiments.errors import ConfigError, RecordError
 from experiments.record.phases import origin_of
 from experiments.trials.design import counted
@@ -37,7 +37,7 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
-HUGE = 1e12  # no metric reaches it
+HUGE = 1e12  # larger than any valid metric
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None
@@ -45,32 +45,43 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Block:
-    """Trials under the same circumstances: seeds -> row, by assistance condition."""
+    """Trials under the same circumstances. `rows` are by condition, then by seeds and values of the person."""
 
-    label: str  # its difference from the other blocks of the batch
-    # condition -> the three seeds and the values of the person -> row
+    label: str
     rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Two conditions compared in one metric."""
+    """Two conditions compared in one metric.
 
-    block: str  # label of the circumstances
-    metric: str  # name of the column
-    conditions: tuple[str, str]  # the two
-    pairs: int  # number of pairs in which the metric is known
-    means: tuple[float, float]  # mean of the pairs under either condition
-    difference: float  # mean of second minus first
-    interval: Interval  # its 95 % confidence interval; None for fewer than two pairs
-    # mean difference in standard deviations of the differences, d_z; None where they do not vary
+    Attributes:
+        means: Mean of the pairs in each condition.
+        difference: Mean of second minus first.
+        interval: 95 % confidence interval of the difference; None for fewer than two pairs.
+        effect: Effect size d_z; None, like its interval and p, if the differences do not vary.
+        p: Two-sided p of the paired t test.
+    """
+
+    block: str
+    metric: str
+    conditions: tuple[str, str]
+    pairs: int
+    means: tuple[float, float]
+    difference: float
+    interval: Interval
     effect: float | None
-    effect_interval: Interval  # its 95 % confidence interval, or None
-    p: float | None  # of the paired t test, two-sided; None where the differences do not vary
+    effect_interval: Interval
+    p: float | None
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """The trials of a batch by circumstances, in the order of its table; errors if they are of one condition only."""
+    """Read the trials of a batch by circumstances, in the order of its table.
+
+    Raises:
+        RecordError: The table is not usable.
+        ConfigError: The batch has only one condition.
+    """
     path = folder / f"{NAME}.parquet"
     rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
@@ -79,13 +90,13 @@ def read_blocks(folder: Path) -> list[Block]:
     if not all(isinstance(row["assistance"], str) for row in rows):
         raise RecordError(f"{path}: assistance is not a name in every row; correct it")
     if len({row["assistance"] for row in rows}) < 2:
-        raise ConfigError(f"{folder} holds fewer than two assistance conditions; there is nothing to compare")
-    # Two persons with the same seed are no pair.
+        raise ConfigError(f"{folder} has fewer than two assistance conditions; there is nothing to compare")
+    # Trials of two people with the same seed are not a pair.
     identity = (*SEEDS, *(name for name in rows[0] if name.startswith("person_") and name not in SEEDS))
     varying = [name for name in CIRCUMSTANCES if len({row[name] for row in rows}) > 1]
     blocks: dict[str, dict[str, dict[tuple[Any, ...], Row]]] = defaultdict(lambda: defaultdict(dict))
     for row in rows:
-        # The time limit follows from the number of objects where none was given.
+        # The default time limit follows from the number of objects.
         label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
         person = tuple(row[name] for name in identity)
         if blocks[label][row["assistance"]].setdefault(person, row) is not row:
@@ -97,13 +108,12 @@ def read_blocks(folder: Path) -> list[Block]:
 
 
 def batch_origin(blocks: Sequence[Block]) -> str:
-    """Whether the people of a batch were simulated, as in `experiments.record.phases`."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     return origin_of(row["user"] for row in rows)
 
 
 def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
-    """A line for every two conditions that do not have the same trials otherwise."""
+    """Yield a line for each two conditions without the same trials."""
     conditions = list(dict.fromkeys(name for block in blocks for name in block.rows))
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
@@ -122,7 +132,7 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """A line for every metric that is unknown in pairs of two conditions: in some, then in all."""
+    """Yield a line for each metric that is unknown in some pairs, then for each that is unknown in all."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
     for d in differences:
         block = next(block for block in blocks if block.label == d.block)
@@ -139,14 +149,18 @@ def unknown_metrics(
 
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
-    """Every two conditions in every metric, on the pairs that are complete; a ConfigError where there are none."""
+    """Compare each two conditions in every metric, on the complete pairs.
+
+    Raises:
+        ConfigError: A metric is unknown or has an impossible value, or there are no pairs.
+    """
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:
         if name not in known:
             raise ConfigError(f"no metric {name!r}; there are {', '.join(known)}")
         if huge := next((row[name] for row in rows if HUGE < abs(row[name] or 0) < math.inf), None):
-            raise ConfigError(f"{name} has the value {huge:g}, which cannot be; correct or remove that row")
+            raise ConfigError(f"{name} has the impossible value {huge:g}; correct or remove that row")
     found = [
         difference
         for block in blocks
@@ -162,7 +176,6 @@ def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]
 
 
 def _is_number(value: object) -> bool:
-    """Whether it is one, or not known."""
     return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
@@ -171,7 +184,7 @@ def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Differen
     values = np.array(
         [(one[key][metric], other[key][metric]) for key in _common(block, conditions)], float
     ).reshape(-1, 2)
-    values = values[np.isfinite(values).all(axis=1)]  # null, and so NaN, where a metric is not known
+    values = values[np.isfinite(values).all(axis=1)]  # unknown metrics are null, which is NaN here
     if not len(values):
         return None
     gaps = values[:, 1] - values[:, 0]
@@ -189,13 +202,12 @@ def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Differen
 
 
 def _common(block: Block, conditions: tuple[str, str]) -> list[tuple[Any, ...]]:
-    """Seeds and persons of the trials that both conditions have."""
     one, other = (block.rows[name] for name in conditions)
     return sorted(one.keys() & other.keys())
 
 
 def mean_interval(values: NDArray[np.float64]) -> Interval:
-    """Student's 95 % confidence interval of the mean of values (n,); None for fewer than two."""
+    """Return Student's 95 % confidence interval of the mean of values (n,), or None for fewer than two."""
     if len(values) < 2:
         return None
     half = float(t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
@@ -203,7 +215,7 @@ def mean_interval(values: NDArray[np.float64]) -> Interval:
 
 
 def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | None]:
-    """d_z, its confidence interval, and the p of the paired t test, from differences (n,)."""
+    """Return d_z, its confidence interval, and the p of the paired t test, from differences (n,)."""
     count = len(gaps)
     spread = float(gaps.std(ddof=1)) if count > 1 else 0.0
     if spread <= 1e-12 * max(1.0, float(np.abs(gaps).max())):

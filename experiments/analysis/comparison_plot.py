@@ -1,4 +1,4 @@
-"""Figure of a comparison: every pair as a line, and the mean of each condition with its confidence interval."""
+"""Draws a comparison: each pair as a line, and the mean of each condition with its confidence interval."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from experiments.analysis.comparison import Block, batch_origin, mean_interval
 from mjsim.support.files import replacing
 
-PANEL = (2.6, 2.4)  # inches
+PANEL = (2.6, 2.4)  # size, inches
 PAIR, MEAN = "#9AA5B1", "#0072B2"
 LABELS = {"ipl_locations": "inverse path length", "nd_feasible": "normalized deviations"}
 UNITS = {"_s": "s", "_m": "m"}
@@ -19,7 +19,7 @@ CAPTION = "grey: a person under each condition; blue: mean and 95 % confidence i
 
 
 def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str]) -> None:
-    """Write the figure: a row of panels per block, a panel per metric. The suffix of `path` says the format."""
+    """Write a figure with a row of panels per block and a panel per metric. The suffix of `path` selects the format."""
     size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.5
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
@@ -33,13 +33,12 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
     figure.supxlabel(CAPTION, fontsize=7)
     mark_origin(figure, batch_origin(blocks))
     with replacing(path) as temporary:
-        # No date in the file: equal batches give equal figures.
+        # Without dates, equal batches give equal files.
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
         figure.savefig(temporary, dpi=150, metadata=metadata)
 
 
 def axis_label(metric: str) -> str:
-    """The words of a column, and its unit."""
     unit = UNITS.get(metric[-2:])
     words = LABELS.get(metric, (metric[:-2] if unit else metric).replace("_", " "))
     return f"{words} ({unit})" if unit else words
@@ -75,5 +74,5 @@ def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
 
 
 def mark_origin(figure: Figure, origin: str) -> None:
-    """Say above a figure whether people were simulated."""
+    """Write above a figure whether people were simulated."""
     figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")

@@ -1,4 +1,1 @@
-"""The subcommands of `mjsim`, one module each.
-
-Serves users at a terminal; commands import the rest only when they run, so that help is quick.
-"""
+"""The subcommands of `mjsim`, one module each. They import most code only when they run, so that `--help` is fast."""

@@ -1,10 +1,10 @@
-"""`mjsim batch`: the trials of a design on all cores."""
+"""`mjsim batch`: run the trials of a design."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
-from experiments.cli.batch_progress import add_workers, run_with_progress
+from experiments.cli.batch_progress import add_shards, add_workers, run_share, run_with_progress
 from experiments.cli.options import (
     NAMES,
     PERSON_VALUES,
@@ -17,7 +17,6 @@ from experiments.cli.options import (
     text_list,
     trial_options,
 )
-from experiments.cli.shards import add_shards, run_share
 from experiments.errors import ConfigError
 from experiments.participants.registry import DEFAULT_PARTICIPANT
 from experiments.trials.design import Design, counted, factorial, read_design
@@ -26,26 +25,23 @@ OBJECTS = 6
 ASSISTANCE = ("none", "highlight", "optimal")
 
 DESCRIPTION = """\
-Run the trials of a design file, or one for every combination of --objects, --assistance, --user and --seeds, without
-video, one process per core. Each trial is a run directory under OUT/trials; OUT/trials.parquet and OUT/trials.csv hold
-one row per trial. Finished trials are not run again: give the command once more to continue after an interruption, or
-with more values to extend the design. The records do not depend on --workers.
---packed stores trials in a few SQLite archives, which the other commands read like run directories."""
+Run the trials of a design file, or one trial for every combination of --objects, --assistance, --user and --seeds, with
+one process per core and without video. Each trial becomes a run directory under OUT/trials. OUT/trials.parquet and
+OUT/trials.csv have one row per trial.
+
+Finished trials are not run again: repeat the command to continue after an interruption, or add values to extend the
+design. The records do not depend on --workers. --packed stores the trials in a few SQLite archives, which the other
+commands read like run directories."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands,
-        "batch",
-        run,
-        description=DESCRIPTION,
-    )
+    parser = add_command(commands, "batch", run, description=DESCRIPTION)
     parser.add_argument(
         "design",
         nargs="?",
         type=Path,
         metavar="DESIGN.toml",
-        help="design with its own cells (docs/batches.md)",
+        help="design file (docs/batches.md)",
     )
     numbers = f"numbers of misplaced objects, such as 6,12,18,24 (default: {OBJECTS})"
     add_setting(parser, "objects", type=int_list, metavar="N,..", help=numbers)
@@ -55,7 +51,7 @@ def add_parser(commands: Any) -> None:
         "--seeds",
         type=int_list,
         metavar="A:B",
-        help="seeds, such as 1,2,5 or 0:10, which ends with 9 (default: 0:10)",
+        help="seeds, such as 1,2,5 or 0:10, which excludes 10 (default: 0:10)",
     )
     add_setting(parser, "user", type=text_list, metavar="NAME,..")
     add_trial_options(parser)
@@ -65,13 +61,11 @@ def add_parser(commands: Any) -> None:
 
 
 def _design(arguments: argparse.Namespace) -> Design:
-    """The design's file, or the factorial of the options."""
-
     if arguments.design is not None:
         names = ("objects", "assistance", "seeds", "user", *TRIAL_OPTIONS, *PERSON_VALUES)
         if given := given_options(arguments, names):
             options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-            raise ConfigError(f"{arguments.design} says what to run; leave out {options}, or write it there")
+            raise ConfigError(f"{arguments.design} sets {options}; leave them out, or change the file")
         return read_design(arguments.design)
     same = trial_options(arguments)
     return factorial(
@@ -84,7 +78,6 @@ def _design(arguments: argparse.Namespace) -> Design:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the batch with a progress bar; 1 if a trial failed."""
     from experiments.cli.terminal import error_console
 
     design = _design(arguments)

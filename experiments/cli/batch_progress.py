@@ -1,4 +1,4 @@
-"""Running the trials of a design with a progress bar."""
+"""Options of commands that run the trials of a design, with progress bars and shards (docs/batches.md)."""
 
 import argparse
 import os
@@ -8,37 +8,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options import add_call_limit
-from experiments.trials.design import Design
+from experiments.errors import ConfigError
+from experiments.trials.design import Design, counted
 from experiments.trials.shards import Shard
 from experiments.trials.workers import EXECUTORS, PROCESSES
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.progress import Progress
 
     from experiments.trials.trial_reader import OnRead
 
+MAX_SHARDS_SHOWN = 100  # in the list of shards to repeat
+
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add `--workers`, `--executor`, `--packed` and `--call-limit`."""
     add_call_limit(parser)
     parser.add_argument(
         "--workers",
         type=int,
         metavar="N",
-        help=f"trials at a time (default: one per core; {os.cpu_count()} here, all of a Ray cluster)",
+        help=f"number of trials at a time (default: one per core, here {os.cpu_count()}; all cores of a Ray cluster)",
     )
     parser.add_argument(
         "--executor",
         choices=EXECUTORS,
         default=PROCESSES,
-        help="processes of this machine, or the Ray cluster at RAY_ADDRESS whose machines share OUT "
+        help="run in processes on this machine, or on the Ray cluster at RAY_ADDRESS, whose machines share OUT "
         "(default: %(default)s)",
     )
     parser.add_argument(
         "--packed",
         action="store_true",
-        help="store the trials in OUT/trials/*.sqlar, one file per worker, instead of a folder each: for batches of "
+        help="store the trials in OUT/trials/*.sqlar, a file per worker, instead of a folder per trial; for batches of "
         "many thousands (`mjsim unpack --help`)",
     )
 
@@ -52,7 +53,7 @@ def run_with_progress(
     what: str = "trials",
     shard: Shard | None = None,
 ) -> tuple[list[Mapping[str, Any]], int]:
-    """Run what is missing of a design; all rows of the folder, and how many trials failed. `what` precedes the bar."""
+    """Run the unfinished trials of a design. Return all rows of the folder and the number of failed trials."""
     from experiments.trials.batch import BatchProgress, run_batch
 
     failed = 0
@@ -84,36 +85,86 @@ def run_with_progress(
 
 
 @contextmanager
-def progress_of_reading() -> "Iterator[tuple[Console, OnRead]]":
-    """Yield the console next to a progress bar, and a function that shows how many trials are read."""
-    with _progress_bars() as (bars, show_reading):
-        yield bars.console, show_reading
-
-
-@contextmanager
 def _progress_bars() -> "Iterator[tuple[Progress, OnRead]]":
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    """Yield progress bars, and a function that shows how many finished trials were read."""
+    from experiments.cli.terminal import counting_bars
 
-    from experiments.cli.terminal import error_console, progress_bars
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with progress_bars(error_console(), *columns) as bars:
+    with counting_bars("{task.description}") as bars:
         reading = bars.add_task("reading finished trials", total=None, visible=False)
 
         def show_reading(number: int, total: int) -> None:
             bars.update(reading, total=total, completed=number, visible=number < total)
 
         yield bars, show_reading
+
+
+def add_shards(parser: argparse.ArgumentParser) -> None:
+    modes = parser.add_mutually_exclusive_group()
+    modes.add_argument(
+        "--shard",
+        type=_shard,
+        metavar="K/N",
+        help="run only share K of N equal shares (from 1), and write no tables; all shards may use the same OUT "
+        "(docs/batches.md)",
+    )
+    modes.add_argument(
+        "--merge",
+        nargs="*",
+        type=Path,
+        metavar="PART",
+        help="run nothing: merge the folders of shards into OUT (without PART, OUT has all shards already), write the "
+        "tables, and list incomplete shards",
+    )
+
+
+def _shard(text: str) -> Shard:
+    try:
+        return Shard.parse(text)
+    except ConfigError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def run_share(design: Design, arguments: argparse.Namespace, what: str = "trials") -> int | None:
+    """Run a shard or merge shards, as the options say. Return the exit code, or None if neither option is given."""
+    from experiments.cli.terminal import error_console
+
+    out: Path = arguments.out
+    if arguments.merge is not None:
+        return _merge(design, out, arguments.merge, arguments.workers)
+    if arguments.shard is None:
+        return None
+    rows, failed = run_with_progress(
+        design, out, arguments.workers, arguments.executor, arguments.packed, what, arguments.shard
+    )
+    error_console().print(
+        f"shard {arguments.shard}: {counted(len(rows), 'trial')} in {out}; {failed} failed; --merge writes the tables"
+    )
+    return 1 if failed else 0
+
+
+def _merge(design: Design, out: Path, parts: list[Path], workers: int | None) -> int:
+    from experiments.trials.merge import merge_shards
+
+    with _progress_bars() as (bars, on_read):
+        console = bars.console
+
+        def note(line: str) -> None:
+            console.print(line, style="yellow", soft_wrap=True)
+
+        merged = merge_shards(
+            design, out, parts, workers=workers or os.cpu_count() or 1, on_note=note, on_read=on_read
+        )
+    others = len(merged.rows) - (len(design.trials) - len(merged.missing))
+    extra = f", {others} of them not of this design" if others else ""
+    written = f" in {out}/trials.parquet and .csv" if merged.rows else "; no tables were written"
+    console.print(f"{counted(len(merged.rows), 'trial')}{extra}{written}", soft_wrap=True)
+    if not merged.missing:
+        return 0
+    incomplete = [f"--shard {shard} ({count})" for shard, count in merged.shards.items()]
+    more = f" and {len(incomplete) - MAX_SHARDS_SHOWN} more" if len(incomplete) > MAX_SHARDS_SHOWN else ""
+    shards = (
+        f"{', '.join(incomplete[:MAX_SHARDS_SHOWN])}{more}" if incomplete else "the shards that hold them"
+    )
+    lost = f"{len(merged.missing)} of {len(design.trials)} trials are missing"
+    console.print(f"mjsim: {lost}: run again {shards}, then merge again", style="red", soft_wrap=True)
+    return 1

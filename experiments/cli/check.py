@@ -1,4 +1,4 @@
-"""`mjsim check`: what is wrong with a house, an object or an episode, and what to change."""
+"""`mjsim check`: check a house, an object or an episode."""
 
 import argparse
 import dataclasses
@@ -6,18 +6,18 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
-from experiments.cli.requirements import require_extra
 
 if TYPE_CHECKING:
     from mjsim.house.check import CheckReport
 
-UNUSABLE = 2
+UNUSABLE = 2  # exit code
 
 DESCRIPTION = """\
-Check a house, an object, a receptacle or an episode against every convention of docs/models.md, and say what to change.
-A house is also sampled once. The exit code is 0 where it can be used, warnings or not, and 2 where it cannot.
-Loading refuses by the same rules."""
+Check a house, an object, a receptacle or an episode against all conventions of docs/models.md, and list what to change.
+For a house, one episode is sampled as well. The exit code is 0 if the subject can be used, even with warnings, and 2 if
+it cannot: loading it would fail by the same rules."""
 
 
 def add_parser(commands: Any) -> None:
@@ -25,18 +25,17 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "path",
         metavar="PATH",
-        help="catalogue.toml of a house, its folder or its name; MJCF file of an object or a receptacle; episode.json",
+        help="name, folder or catalogue.toml of a house, MJCF file of an object or a receptacle, or an episode.json",
     )
-    parser.add_argument(
-        "--house",
-        metavar="NAME",
-        help="house of an episode, if not its own",
-    )
+    parser.add_argument("--house", metavar="NAME", help="house to check an episode in (default: its own)")
     parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument(
-        "--picture", type=Path, metavar="FILE.png", help="draw it, with every finding numbered where it is"
+        "--picture",
+        type=Path,
+        metavar="FILE.png",
+        help="draw the subject, with numbers that mark the findings",
     )
-    add_force(parser, "replace a picture that exists")
+    add_force(parser, "replace an existing picture")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -60,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def as_json(report: "CheckReport") -> dict[str, Any]:
-    """The report without its drawings, as JSON values."""
+    """Return the report as JSON values, without its drawings."""
     return {
         "path": report.path,
         "kind": report.kind,
@@ -73,6 +72,8 @@ def as_json(report: "CheckReport") -> dict[str, Any]:
 def _print(report: "CheckReport") -> None:
     from rich.console import Console
     from rich.table import Table
+
+    from experiments.trials.design import counted
 
     console = Console(highlight=False)
     for name, fact in report.facts.items():
@@ -88,10 +89,6 @@ def _print(report: "CheckReport") -> None:
         console.print(table)
     bad = sum(finding.severity == "error" for finding in report.findings)
     verdict = "can be used" if report.usable else "cannot be used"
-    counts = f"{_counted(bad, 'error')}, {_counted(len(report.findings) - bad, 'warning')}"
+    counts = f"{counted(bad, 'error')}, {counted(len(report.findings) - bad, 'warning')}"
     text = f"{report.kind} {report.path} {verdict}: {counts}"
     console.print(text, markup=False, soft_wrap=True)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""`mjsim compare`: the assistance conditions of a batch, paired by seed."""
+"""`mjsim compare`: compare the assistance conditions of a batch, paired by seed."""
 
 import argparse
 import csv
@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.cli.options import add_command, text_list
-from experiments.cli.requirements import require_extra
+from experiments.cli.doctor import require_extra
+from experiments.cli.options import add_command, add_force, text_list
 from experiments.errors import ConfigError
 from mjsim.support.files import replacing
 
@@ -17,23 +17,18 @@ if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval
 
 METRICS = ("completion_time_s", "task_distance_m", "ipl_locations", "nd_feasible", "total_regret_m")
-FORMATS = (".png", ".svg", ".pdf")  # of a figure
-WIDTH = 160  # characters, where there is no terminal
+FORMATS = (".png", ".svg", ".pdf")  # suffixes of a figure
+WIDTH = 160  # width of the output without a terminal, in characters
 
 DESCRIPTION = """\
-Compare every two assistance conditions of a batch. Trials are paired that differ in nothing but the assistance: the
-same three seeds, number of objects, participant, house and so on. Shows for each metric the means, the mean
-difference (second minus first) with its 95 % confidence interval, and the effect size d_z (the difference in standard
-deviations of the differences) with its own. Trials without a counterpart are named and left out."""
+Compare each pair of assistance conditions in a batch. Two trials form a pair if they differ only in the assistance:
+they have the same three seeds, number of objects, participant, house and so on. For each metric, print the means, the
+mean difference (second minus first) and the effect size d_z (the difference in standard deviations of the differences),
+both with 95 % confidence intervals. Trials without a counterpart are listed and left out."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands,
-        "compare",
-        run,
-        description=DESCRIPTION,
-    )
+    parser = add_command(commands, "compare", run, description=DESCRIPTION)
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a batch")
     parser.add_argument(
         "--metrics",
@@ -42,9 +37,9 @@ def add_parser(commands: Any) -> None:
         metavar="NAME,..",
         help="columns of trials.parquet to compare (docs/metrics.md)",
     )
-    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure to write: .png, .svg or .pdf")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="table to write")
-    parser.add_argument("--force", action="store_true", help="replace files that exist")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="figure to write (.png, .svg or .pdf)")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="CSV table to write")
+    add_force(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

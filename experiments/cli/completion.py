@@ -1,36 +1,36 @@
-"""`mjsim completion`: commands, options and files at the tab key."""
+"""`mjsim completion`: print a completion script for a shell."""
 
 import argparse
 import re
 from pathlib import Path
 from typing import Any
 
-DESCRIPTION = "Print a script that lets a shell complete commands, options, their values and names of files."
+DESCRIPTION = "Print a script with which a shell completes commands, options, their values and file names."
 
 EPILOG = """\
 examples:
   mjsim completion bash > ~/.local/share/bash-completion/completions/mjsim
-      for every new bash
+      for new bash shells
   mjsim completion zsh > ~/.zfunc/_mjsim
-      for zsh, where ~/.zfunc is in fpath"""
+      for zsh, if fpath contains ~/.zfunc"""
 
 
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "completion",
-        help=None,  # lets it list itself
+        help=None,  # lets completion list this command
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("shell", choices=("bash", "zsh"), help="the shell")
+    parser.add_argument("shell", choices=("bash", "zsh"), help="shell that will run the script")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     import shtab
 
-    from experiments.cli.main import COMMANDS, parser  # which loads this module
+    from experiments.cli.main import COMMANDS, parser  # imported here because it loads this module
 
     top = parser(*COMMANDS)
     _complete_files(top, shtab.FILE)
@@ -39,8 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    """Complete names of files where a command takes a path, or a file or `-`."""
-    for action in parser._actions:  # argparse has no public list of them
+    for action in parser._actions:  # argparse has no public list of actions
         if action.type is Path or re.search(r"\.[a-z]", str(action.metavar)):
             action.complete = files  # type: ignore[attr-defined]
         elif isinstance(action, argparse._SubParsersAction):

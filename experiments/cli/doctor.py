@@ -1,12 +1,22 @@
-"""`mjsim doctor`: is everything there that a run needs?"""
+"""`mjsim doctor`, and checks for what a command needs beyond the base installation."""
 
 import argparse
-from typing import Any
+import importlib
+import importlib.util
+from typing import Any, NoReturn
+
+from experiments.errors import ConfigError
 
 DESCRIPTION = """\
-Show versions, the EGL vendor and the GL renderer, whether rendering happens in software, and what to install when
-something is missing. Names other software whose packages are called planner, hud or experiments as ours are.
-Exits with 1 when frames cannot be rendered, something is missing, or Python imports another package than ours."""
+Show versions, the EGL vendor, the GL renderer, and whether rendering happens in software. List missing software and how
+to install it, and other installed packages that are also named planner, hud or experiments. The exit code is 1 if
+frames cannot be rendered, software is missing, or Python imports another package in place of one of ours."""
+
+# Extra -> modules that it installs
+EXTRAS = {
+    "study": ("matplotlib", "statsmodels"),
+    "people": ("argon2", "httpx", "prometheus_client"),
+}
 
 
 def add_parser(commands: Any) -> None:
@@ -19,10 +29,38 @@ def add_parser(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - every subcommand takes them
+def run(arguments: argparse.Namespace) -> int:  # noqa: ARG001 - the signature of all subcommands
     from mjsim.render.diagnostics import environment_report
 
     report = environment_report()
     for line in report.lines():
         print(line)
     return 0 if report.usable else 1
+
+
+def require_extra(extra: str) -> None:
+    for module in EXTRAS[extra]:
+        if importlib.util.find_spec(module) is None:
+            raise ConfigError(f"this needs {module}, which is not installed: pip install 'mjsim[{extra}]'")
+
+
+def add_checkout_command(commands: Any, name: str, module: str) -> None:
+    """Add the subcommand of a module that may exist only in the source checkout, or one that reports its absence."""
+    try:
+        importlib.import_module(module).add_parser(commands)
+    except ModuleNotFoundError as error:
+        if not module.startswith(str(error.name)):
+            raise
+        # Without a prefix for options, the parser accepts any arguments.
+        parser = commands.add_parser(
+            name, help="needs the source checkout", add_help=False, prefix_chars="\0"
+        )
+        parser.add_argument("options", nargs="*")
+        parser.set_defaults(run=_refuse)
+
+
+def _refuse(_: argparse.Namespace) -> NoReturn:
+    raise ConfigError(
+        "this command needs the source checkout, which the installed package lacks: clone the repository and "
+        "install it with `pip install --editable .`"
+    )

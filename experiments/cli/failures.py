@@ -1,4 +1,4 @@
-"""How a command ends that failed: one line and an exit code; where the fault may be ours, a report as well."""
+"""The end of a failed command: an error line, an exit code and, if the fault may be in mjsim, a report."""
 
 import os
 import platform
@@ -14,39 +14,43 @@ from pathlib import Path
 FAILED = 1
 USAGE_ERROR = 2
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
-_NULL = ("embedded null byte", "embedded null character")  # what Python says of a path that holds one
-BROKEN_PIPE = 141  # what shells show for a program that SIGPIPE ended
+_NULL = ("embedded null byte", "embedded null character")  # Python's errors for a path with a null character
+BROKEN_PIPE = 141  # shells' exit code for a program ended by SIGPIPE
 
 DISTRIBUTIONS = ("mjsim", "mujoco", "numpy", "numba", "ortools", "opencv-python-headless", "pyarrow")
 _SECRET = re.compile(r"(--?[\w-]*(?:token|password|secret|key)[\w-]*)(=|\x00)[^\x00]+", re.IGNORECASE)
 
 
 def end_with(error: Exception, words: Sequence[str]) -> int:
-    """Say on standard error what went wrong, in one line; the exit code. `words` is the command line, for a report."""
+    """Print an error in one line to standard error. Return the exit code. `words` is the command line, for a report."""
     if isinstance(error, BrokenPipeError):  # the reader of the output closed it
         drop_output()
         return BROKEN_PIPE
     flush_output()
+    from experiments.errors import UserCodeError, user_code_location
+
     code, text = exit_code(error), message(error)
-    if code == USAGE_ERROR and (own := _own_place(error)):  # a user's own code could not be loaded
-        code, text = FAILED, f"{text}{own}; traceback in {_report(error, words)}"
+    if code == USAGE_ERROR and (
+        location := user_code_location(error.__cause__)
+    ):  # custom code was not loadable
+        code, text = FAILED, f"{text}{location}; traceback in {_report(error, words)}"
     elif code is None:
         text = f"internal error ({type(error).__name__}: {text}); please send in the report {_report(error, words)}"
-    elif _is_user_code(error):
+    elif isinstance(error, UserCodeError):
         text += f"; traceback in {_report(error, words)}"
     print(f"mjsim: {text}", file=sys.stderr)
     return INTERNAL_ERROR if code is None else code
 
 
 def exit_code(error: Exception) -> int | None:
-    """The exit code of an error whose message is enough for the user; None for a bug of ours."""
-    # Imported only on errors, so that `mjsim plan` starts fast.
+    """Return the exit code of an error whose message is enough for the user, or None for a bug in mjsim."""
+    # Imported only after an error, so that `mjsim plan` starts fast.
     from experiments.errors import ExperimentError, ReplayError, UserCodeError
     from hud.errors import HudError
     from mjsim.values.errors import MjsimError, PhysicsError, RenderError
     from planner.errors import PlannerError
 
-    # A full disk, a missing driver, a broken installation: no other command line would help.
+    # Errors such as a full disk or a missing driver, which no other command line would avoid
     failures = (PhysicsError, RenderError, ReplayError, UserCodeError, OSError, MemoryError, ImportError)
     if isinstance(error, failures):
         return FAILED
@@ -56,7 +60,6 @@ def exit_code(error: Exception) -> int | None:
 
 
 def message(error: Exception) -> str:
-    """What an error says, in one line."""
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename is not None else error.strerror
     elif isinstance(error, MemoryError):
@@ -73,14 +76,12 @@ def message(error: Exception) -> str:
 
 
 def drop_output() -> None:
-    """Let standard output lead nowhere, so that Python does not fail once more when it ends."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.close(null)
 
 
 def flush_output() -> None:
-    """Write what waits; where nothing takes it, drop it."""
     if sys.stdout is not None:
         try:
             sys.stdout.flush()
@@ -88,23 +89,11 @@ def flush_output() -> None:
             drop_output()
 
 
-def _is_user_code(error: Exception) -> bool:
-    from experiments.errors import UserCodeError
-
-    return isinstance(error, UserCodeError)
-
-
-def _own_place(error: Exception) -> str:
-    """File and line of a user's own code that raised the cause of an error, empty if there is none."""
-    from experiments.errors import place
-
-    return place(error.__cause__)
-
-
 def _report(error: Exception, words: Sequence[str]) -> str:
-    """Write a report; its path."""
     text = _report_text(error, words)
-    for folder in (_report_folder(), Path(tempfile.gettempdir())):
+    from platformdirs import user_log_path
+
+    for folder in (user_log_path("mjsim", appauthor=False), Path(tempfile.gettempdir())):
         try:
             folder.mkdir(parents=True, exist_ok=True)
             handle, name = tempfile.mkstemp(prefix=time.strftime("%Y%m%d-%H%M%S-"), suffix=".txt", dir=folder)
@@ -114,12 +103,6 @@ def _report(error: Exception, words: Sequence[str]) -> str:
             continue
         return name
     return "(which could not be written)"
-
-
-def _report_folder() -> Path:
-    from platformdirs import user_log_path
-
-    return user_log_path("mjsim", appauthor=False)
 
 
 def _report_text(error: Exception, words: Sequence[str]) -> str:

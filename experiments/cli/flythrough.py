@@ -17,8 +17,8 @@ from experiments.errors import ConfigError
 from experiments.session.film_config import FilmConfig
 
 DESCRIPTION = """\
-Film a tidy house as its guests see it before the task: a camera at eye height goes through all rooms, looks around each
-of them, and rests on each bin; captions name room and bin. Equal options give equal frames."""
+Film a tidy house as participants see it before the task: a camera at eye height moves through all rooms, looks around
+in each, and pauses at each bin. Captions name the room and the bin. Equal options give equal frames."""
 
 
 def add_parser(commands: Any) -> None:
@@ -29,7 +29,7 @@ def add_parser(commands: Any) -> None:
         "--seconds",
         type=seconds,
         metavar="S",
-        help="how long the film is, 1 or more (default: as long as it takes at walking speed)",
+        help="length of the film, at least 1 s (default: as long as it takes at walking speed)",
     )
     add_force(parser)
     add_frame(parser)
@@ -56,25 +56,16 @@ def film_house(
     seconds: float | None = None,
     language: str = "en",
 ) -> str:
-    """Film the house with a name and captions in a language, with a progress bar; the SHA-256 of the frames."""
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
-    from experiments.cli.terminal import error_console, progress_bars
+    """Film a house with a progress bar. Return the SHA-256 of the frames."""
+    from experiments.cli.terminal import counting_bars
     from experiments.house import House
     from experiments.session.film import write_flythrough
 
-    columns = (
-        TextColumn("frames of the film"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
     house = House.load(name)
-    with progress_bars(error_console(), *columns) as bars:
+    with counting_bars("frames of the film") as bars:
         bar = bars.add_task("frames", total=None)
         return write_flythrough(
-            house.in_language(language, house.texts),  # captions are labels only
+            house.in_language(language, house.texts),  # captions have only labels, no HUD texts
             path,
             film or FilmConfig(),
             seconds=seconds,

@@ -1,7 +1,9 @@
-"""`mjsim house`: write a disorganized house as MJCF or glTF, generate a house, export one, or show many."""
+"""`mjsim house`: write a disorganized house, generate or export a house, or make a gallery."""
 
 import argparse
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,25 +16,25 @@ GENERATE, EXPORT, GALLERY = "generate", "export", "gallery"
 HABITAT, PROCTHOR = "habitat", "procthor"
 
 DESCRIPTION = """\
-Sample a disorganized house and write it, with the episode as JSON beside it, in the format that the ending of --out
-names:
+Sample a disorganized house and write it, with its episode as JSON next to it. The suffix of --out selects the format:
 
-  .xml  self-contained MJCF, with meshes and textures in a folder beside it. Stock MuJoCo loads it:
+  .xml  self-contained MJCF, with meshes and textures in a folder next to it. Stock MuJoCo loads it:
         python -m mujoco.viewer --mjcf=house.xml
-  .glb  what one sees of it as one file of binary glTF 2.0, for Blender, three.js and others (docs/import.md)
+  .glb  the visible geometry as binary glTF 2.0, for Blender, three.js and other software (docs/import.md)
 
-With `generate`: make the house of the seed --seed as the folder --out, with MJCF, textures, catalogue.toml, recipe, a
-floor plan and a picture of each room. --house generated:SEED?rooms=N names the same house (docs/generated-houses.md).
+`mjsim house generate` generates the house of --seed in the folder --out: MJCF, textures, catalogue.toml, recipe, a
+floor plan and a picture of each room. Other commands call the same house --house generated:SEED?rooms=N
+(docs/generated-houses.md).
 
-With `export`: write the house --house for another simulator. --format habitat makes a scene dataset in the folder
---out, with --episodes episodes of rearrangement from --seed on; --format procthor makes a file of the floor plan.
-`mjsim import house` reads both back (docs/generated-houses.md).
+`mjsim house export` writes --house for another simulator. --format habitat writes a scene dataset to the folder --out,
+with --episodes rearrangement episodes whose seeds start at --seed. --format procthor writes a floor plan to a file.
+`mjsim import house` reads both formats (docs/generated-houses.md).
 
-With `gallery SOURCE...`: draw homes into the folder --out: contact sheets of ten homes each (sheet_1.png, ...) with a
-floor plan and two views at eye height, and index.html, which lists them by rooms and area and opens each in three
-dimensions, without a server. A SOURCE is a house, or generated ones of a range of seeds whose end is not included:
-`mjsim house gallery apartment my-house generated:0:20 'generated:7?rooms=5' --out runs/gallery`. The same command
-continues after an interruption; homes that are there are not drawn again."""
+`mjsim house gallery SOURCE...` draws homes to the folder --out: contact sheets of ten homes each (sheet_1.png, ...),
+with a floor plan and two views at eye height, and index.html, which lists the homes by rooms and area and shows each in
+3D without a server. A SOURCE is a house, or a range of seeds that excludes its end: `mjsim house gallery apartment
+my-house generated:0:20 'generated:7?rooms=5' --out runs/gallery`. Repeat the command to continue after an interruption;
+finished homes are not drawn again."""
 
 
 def add_parser(commands: Any) -> None:
@@ -41,15 +43,15 @@ def add_parser(commands: Any) -> None:
         "what",
         nargs="?",
         choices=[GENERATE, EXPORT, GALLERY],
-        help="make a new house, export one, or show many",
+        help="generate a house, export one, or make a gallery (default: write a disorganized house)",
     )
     parser.add_argument(
-        "sources", nargs="*", metavar="SOURCE", help="of gallery: a house, or a range of seeds"
+        "sources", nargs="*", metavar="SOURCE", help="for gallery: a house, or a range of seeds"
     )
     parser.add_argument(
-        "--objects", type=int, default=12, metavar="N", help="misplaced objects, 1 to --points"
+        "--objects", type=int, default=12, metavar="N", help="number of misplaced objects, 1 to --points"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the house or episode")
     add_setting(parser, "points", default=POINTS)
     add_setting(parser, "house", default="apartment")
     parser.add_argument(
@@ -57,28 +59,35 @@ def add_parser(commands: Any) -> None:
         type=Path,
         required=True,
         metavar="PATH",
-        help="file to write, which ends in .xml or .glb; of generate, gallery and --format habitat, a folder",
+        help="file to write (.xml or .glb); for generate, gallery and --format habitat, a folder",
     )
     parser.add_argument(
         "--rooms",
         type=int,
         metavar="N",
-        help="rooms of the house to generate, 1 to 10 (default: as the seed says)",
+        help="for generate: number of rooms, 1 to 10 (default: drawn from the seed)",
     )
     parser.add_argument(
-        "--format", choices=[HABITAT, PROCTHOR], default=HABITAT, help="of export (default: %(default)s)"
+        "--format",
+        choices=[HABITAT, PROCTHOR],
+        default=HABITAT,
+        help="for export: format (default: %(default)s)",
     )
     parser.add_argument(
-        "--episodes", type=int, default=1, metavar="N", help="of export (default: %(default)s)"
+        "--episodes",
+        type=int,
+        default=1,
+        metavar="N",
+        help="for export: number of episodes (default: %(default)s)",
     )
     parser.add_argument(
         "--workers",
         type=int,
         default=os.cpu_count(),
         metavar="N",
-        help="of gallery: homes at a time (default: one per core, %(default)s here)",
+        help="for gallery: number of homes at a time (default: one per core, here %(default)s)",
     )
-    parser.add_argument("--no-pictures", action="store_true", help="generate without pictures")
+    parser.add_argument("--no-pictures", action="store_true", help="for generate: write no pictures")
     add_force(parser)
 
 
@@ -91,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _gallery(arguments)
     if arguments.sources:
         raise ConfigError(
-            f"{arguments.sources[0]!r} is one word too many; only gallery takes names of houses here"
+            f"{arguments.sources[0]!r} is not expected here; only gallery takes names of houses"
         )
     if arguments.what == GENERATE:
         return _generate(arguments)
@@ -113,30 +122,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _gallery(arguments: argparse.Namespace) -> int:
-    """Draw homes, with a progress bar; 1 if one of them failed."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.cli.terminal import counting_bars
     from experiments.trials.design import counted
     from experiments.web.viewing.gallery import homes_of, write_gallery
 
     if not arguments.sources:
-        raise ConfigError("a gallery needs houses: name some, such as apartment or generated:0:20")
+        raise ConfigError("gallery needs houses; name some, such as apartment or generated:0:20")
     homes, out = homes_of(arguments.sources), arguments.out
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with progress_bars(error_console(), "homes", *columns) as bars:
+    with counting_bars("homes") as bars:
         bar = bars.add_task("homes", total=len(homes))
 
         def show(failure: str | None) -> None:
@@ -151,33 +144,24 @@ def _gallery(arguments: argparse.Namespace) -> int:
 
 
 def _generate(arguments: argparse.Namespace) -> int:
-    """Write the house of a seed into a folder, checked, with pictures: whole or not at all."""
     from experiments.house import House
     from experiments.session.house_pictures import draw_house
     from mjsim.house.catalogue.model_files import copy_house
-    from mjsim.support.files import exchange, work_folder
 
     out: Path = arguments.out
     if out.exists() and not (arguments.force and (out / "recipe.json").is_file()):
         raise ConfigError(f"{out} exists; name a new folder, or replace a generated house with --force")
     rooms = "" if arguments.rooms is None else f"?rooms={arguments.rooms}"
     house = House.load(f"generated:{arguments.seed}{rooms}")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with work_folder(out.parent) as folder:
+    with _replaced(out) as folder:
         copy_house(house.catalogue.house_path, folder)
         if not arguments.no_pictures:
             draw_house(house, folder)
-        folder.chmod(0o755)
-        if out.exists():
-            exchange(folder, out)
-        else:
-            folder.rename(out)
     print(f"{out} ({house.catalogue.name}: {len(house.rooms.labels)} rooms, {house.rooms.area:.0f} m2)")
     return 0
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    """Write a house for another simulator: whole or not at all."""
     import json
 
     from experiments.house import House
@@ -186,7 +170,7 @@ def _export(arguments: argparse.Namespace) -> int:
     from mjsim.generator.home_cache import load_catalogue
     from mjsim.generator.recipe import floor_plan_of
     from mjsim.importing import require_extra
-    from mjsim.support.files import exchange, work_folder, write_text_atomically
+    from mjsim.support.files import write_text_atomically
 
     out: Path = arguments.out
     if arguments.format == PROCTHOR:
@@ -195,7 +179,7 @@ def _export(arguments: argparse.Namespace) -> int:
         write_text_atomically(out, json.dumps(procthor_house(plan), indent=1) + "\n")
         print(f"{out} ({len(plan.rooms)} rooms, {len(plan.doors)} doors, {len(plan.windows)} windows)")
         return 0
-    require_extra()  # then trimesh is loaded
+    require_extra()  # before trimesh is imported
     from mjsim.formats.habitat_writer import export_habitat
 
     if arguments.episodes < 0:
@@ -207,20 +191,28 @@ def _export(arguments: argparse.Namespace) -> int:
     episodes = [
         house.sample_episode(objects=arguments.objects, seed=seed, points=arguments.points) for seed in seeds
     ]
+    with _replaced(out) as folder:
+        name = export_habitat(house.catalogue, episodes, folder)
+    print(f"{out / 'scenes' / name}.scene_instance.json ({len(episodes)} episodes)")
+    return 0
+
+
+@contextmanager
+def _replaced(out: Path) -> Iterator[Path]:
+    """Yield a working folder that takes the place of `out` atomically when the block succeeds."""
+    from mjsim.support.files import exchange, work_folder
+
     out.parent.mkdir(parents=True, exist_ok=True)
     with work_folder(out.parent) as folder:
-        name = export_habitat(house.catalogue, episodes, folder)
+        yield folder
         folder.chmod(0o755)
         if out.exists():
             exchange(folder, out)
         else:
             folder.rename(out)
-    print(f"{out / 'scenes' / name}.scene_instance.json ({len(episodes)} episodes)")
-    return 0
 
 
 def _write(scene: Any, path: Path) -> None:
-    """Write a composed scene in the format that the ending of the path names."""
     from mjsim.formats.gltf.export import export_episode
     from mjsim.formats.mjcf_writer import export_house
     from mjsim.support.files import replacing

@@ -1,4 +1,4 @@
-"""The `mjsim` command: a module of `experiments.cli` for each subcommand, or one of the checkout."""
+"""The `mjsim` command, which loads a module of `experiments.cli`, or of the source checkout, for each subcommand."""
 
 import argparse
 import faulthandler
@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from experiments.cli.doctor import add_checkout_command
 from experiments.cli.failures import USAGE_ERROR, drop_output, end_with, flush_output
-from experiments.cli.requirements import add_checkout_command
 from experiments.session.signals import exit_code, exit_raised, signal_of, signals_raised
 from mjsim.support.environment import postpone_gl
 from mjsim.values.errors import brief
@@ -19,31 +19,31 @@ from mjsim.values.errors import brief
 COMMANDS = {
     "run": "run one trial and film it",
     "play": "tidy the apartment yourself, in a browser",
-    "replay": "replay and verify a recorded run; film it in another view",
-    "view": "look at a recorded run in the browser",
-    "batch": "run the trials of a design on all cores; resumes",
-    "metrics": "compute the metrics of a run or a batch anew",
+    "replay": "replay and verify a recorded run, or film it from another view",
+    "view": "view a recorded run in the browser",
+    "batch": "run the trials of a design on all cores",
+    "metrics": "recompute the metrics of a run or a batch",
     "unpack": "turn packed trials of a batch into run directories",
     "compare": "compare the assistance conditions of a batch",
-    "study": "simulate and analyse studies, score them against the published one, plan them",
+    "study": "plan, run, simulate and analyse studies",
     "plan": "solve a routing problem from a JSON file",
-    "house": "write a disorganized house as MJCF; generate, export and show houses",
+    "house": "write, generate, export or show houses",
     "flythrough": "film the rooms and bins of a house",
     "check": "check a house, an object or an episode",
-    "import": "make objects from mesh files",
-    "gallery": "make the pictures of the documentation",
-    "bench": "run a benchmark of the source checkout",
-    "doctor": "show versions and whether rendering works",
-    "completion": "print the completion script of a shell",
+    "import": "import objects, houses and episodes",
+    "gallery": "draw the figures of the documentation",
+    "bench": "run a benchmark",
+    "doctor": "show versions and check that rendering works",
+    "completion": "print a completion script for a shell",
 }
-MODULES = {"import": "import_"}  # where a module cannot be called as its command
-CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # modules outside the wheel
+MODULES = {"import": "import_"}  # modules that cannot have the name of their command
+CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # not in the wheel
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
 
-A person walks through a disorganized apartment in first person, picks up misplaced objects, at most two at a time,
-and puts each into its bin. A heads-up display, driven by an optimal planner, assists."""
+A person walks through a disorganized apartment in first person, picks up misplaced objects, at most two at a time, and
+puts each into its bin. A heads-up display, driven by an optimal planner, assists."""
 
 EPILOG = """\
 examples:
@@ -52,25 +52,25 @@ examples:
   mjsim play --objects 6 --assistance optimal --seed 0
       tidy the apartment yourself, in a browser
   mjsim view runs/demo
-      look at a run in the browser: timeline, any camera, any speed
+      view a run in the browser: timeline, any camera, any speed
   mjsim batch --objects 6,12 --assistance none,highlight,optimal --seeds 0:10 --out runs/batch
-      run a factorial design on all cores; the same command continues after an interruption
+      run a factorial design on all cores; repeat the command after an interruption
   mjsim compare runs/batch
       compare its assistance conditions, paired by seed, with effect sizes
   mjsim study analyze runs/study
-      analyse a study between subjects: figures, tests, a report in one file
+      analyse a between-subjects study: figures, tests and a report in one file
   mjsim house --objects 12 --seed 3 --out house.xml
-      write a disorganized house as MJCF for stock MuJoCo, or (house.glb) as glTF
+      write a disorganized house as MJCF for stock MuJoCo, or as glTF (house.glb)
   mjsim check my_house/catalogue.toml --picture faults.png
-      say what is wrong with a house, an object or an episode, and what to change
+      check a house, an object or an episode, and mark the faults in a picture
   mjsim plan problem.json
       solve a pickup-and-delivery problem, with a proof of optimality where possible
   mjsim doctor
-      show versions, and whether off-screen rendering works"""
+      show versions and check that off-screen rendering works"""
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """The command line: with the options of these commands, or else with one line about each command."""
+    """Return the parser, with the options of the loaded commands or, without any, a line about each command."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -91,7 +91,7 @@ def parser(*loaded: str) -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Prints the version; looked up only then, so that all else starts fast."""
+    """Prints the version, which is looked up only then, for a fast start."""
 
     def __init__(self, option_strings: Sequence[str], dest: str) -> None:
         super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
@@ -104,23 +104,23 @@ class _Version(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """Says in one line what is wrong with a command line."""
+    """A parser that reports errors in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(USAGE_ERROR, f"mjsim: {brief(message)}; `{self.prog} --help` lists the options\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; 0 done, 1 failed, 2 bad input, 70 a bug of ours, 128 + n stopped by signal n."""
+    """Run the command line. Exit codes: 0 success, 1 failure, 2 bad input, 70 a bug in mjsim, 128 + n signal n."""
     words = sys.argv[1:] if argv is None else list(argv)
     if argv is None and not sys.warnoptions:
-        warnings.simplefilter("ignore")  # of libraries, about lines of code that users do not know
+        warnings.simplefilter("ignore")  # those of libraries mean nothing to users
     postpone_gl()
-    if sys.stderr is None:  # closed; messages must not go to standard output
+    if sys.stderr is None:  # closed: messages must not go to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
     if argv is None:
-        faulthandler.enable(all_threads=False)  # names file and line of code that crashes the process
-    if sys.stdout is None:  # closed; what is written there is lost, and must not seem to have arrived
+        faulthandler.enable(all_threads=False)  # reports file and line if the process crashes
+    if sys.stdout is None:  # closed: writing must fail, or output would be lost silently
         os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
@@ -130,7 +130,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _stopped(stop)
         except Exception as error:
             if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
-                return _stopped(error.__cause__)  # the signal came while compiled code returned
+                return _stopped(error.__cause__)  # the signal arrived while compiled code returned
             return end_with(error, words)
 
 
@@ -147,10 +147,10 @@ def _run(words: list[str]) -> int:
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
-        sys.path.append(here)  # where a user's participants, conditions and planners may be
+        sys.path.append(here)  # for custom participants, conditions and planners
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
-        commands.error(f"{bad} gives no value")  # argparse would take it for a list
+        commands.error(f"{bad} has no value")  # argparse would read an empty list
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

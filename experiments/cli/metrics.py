@@ -1,4 +1,4 @@
-"""`mjsim metrics`: compute the metrics of runs and batches anew."""
+"""`mjsim metrics`: recompute the metrics of runs and batches."""
 
 import argparse
 import csv
@@ -15,42 +15,35 @@ from experiments.study.data.copies import note_derived
 from mjsim.support.files import write_text_atomically
 
 DESCRIPTION = """\
-Compute the metrics of a run directory, of a batch folder or of the folder of `mjsim play` anew, from event log and
-trajectory alone. A run is printed with a name and a value per line, others as CSV with a row per trial; --out writes
-CSV or JSON instead.
+Compute the metrics of a run, a batch or the visits of `mjsim play` from event log and trajectory. For a run, print one
+metric per line. Otherwise, print CSV with one row per trial. --out writes CSV or JSON to a file instead.
 
-Each file that is read must have the SHA-256 with which it was written (`mjsim replay` checks everything). Metrics that
-can be defined in several ways are shown side by side:
+The SHA-256 of each file that is read must match the recorded one (`mjsim replay` verifies everything). Metrics with
+several definitions are listed side by side:
 
-  nd_strict_2n     visits that differ from the suggested next one, over two per object
-  nd_feasible      the same, over the visits at which another one was feasible
-  nd_bin_tied      as nd_feasible, but which object goes first into one bin is no choice
-  nd_regret_10cm   as nd_feasible, but only deviations that cost more than 0.1 m
-  ipl_locations    distances between the places of visits, over the metres walked (the paper's; can exceed 1)
-  ipl_stand        shortest walks between where the person stood, over the metres walked (never exceeds 1)
+  nd_strict_2n     visits that differ from the suggested one, over twice the number of objects
+  nd_feasible      visits that differ from the suggested one, over the visits with a feasible alternative
+  nd_bin_tied      as nd_feasible, but not counting which object goes into a bin first
+  nd_regret_10cm   as nd_feasible, but counting only deviations that cost more than 0.1 m
+  ipl_locations    distances between the places of visits, over the distance walked (the paper's; can exceed 1)
+  ipl_stand        shortest walks between the positions at visits, over the distance walked (at most 1)
 
-docs/metrics.md defines all of them, docs/data.md lists every field of every file."""
+docs/metrics.md defines all metrics. docs/data.md lists the fields of all files."""
 FORMATS = (".csv", ".json")
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands,
-        "metrics",
-        run,
-        description=DESCRIPTION,
+    parser = add_command(commands, "metrics", run, description=DESCRIPTION)
+    parser.add_argument(
+        "directory", type=Path, metavar="DIR", help="run directory, or folder of a batch or of `mjsim play`"
     )
     parser.add_argument(
-        "directory", type=Path, metavar="DIR", help="run directory, or folder of a batch or of mjsim play"
+        "--out", type=_table_file, metavar="FILE", help=f"file to write ({' or '.join(FORMATS)})"
     )
-    parser.add_argument(
-        "--out", type=_table_file, metavar="FILE", help=f"write to a file: {' or '.join(FORMATS)}"
-    )
-    add_force(parser, "replace a file that exists")
+    add_force(parser, "replace an existing file")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print or write the metrics; 1 if a trial of a batch cannot be measured."""
     from experiments.record.archive import archive_of, run_paths
     from experiments.record.phases import TASK
     from experiments.record.run_directory import TRIALS, check_file, is_batch, is_run, visit_folders
@@ -87,12 +80,11 @@ def run(arguments: argparse.Namespace) -> int:
 def _table_file(text: str) -> Path:
     path = Path(text)
     if path.suffix not in FORMATS:
-        raise argparse.ArgumentTypeError(f"{text!r} ends neither in .csv nor in .json")
+        raise argparse.ArgumentTypeError(f"{text!r} does not end in .csv or .json")
     return path
 
 
 def _measured(path: Path) -> Mapping[str, Any]:
-    """Metrics of one run; says so where its `metrics.json` says something else."""
     from experiments.record.archive import opened_run
     from experiments.record.verify import check_log
     from experiments.trials.batch_folder import read_trial
@@ -101,12 +93,14 @@ def _measured(path: Path) -> Mapping[str, Any]:
         check_log(run)
         trial = read_trial(run)
     if not trial.as_measured:
-        print(f"mjsim: {path}: metrics.json does not say this; these follow from the log", file=sys.stderr)
+        print(
+            f"mjsim: {path}: metrics.json differs from these metrics, which follow from the log",
+            file=sys.stderr,
+        )
     return trial.row
 
 
 def _measure_all(runs: Mapping[Path, Mapping[str, Any]]) -> tuple[list[Mapping[str, Any]], int]:
-    """Metrics of runs, each after further columns, and how many cannot be measured."""
     rows: list[Mapping[str, Any]] = []
     failures = 0
     for path, columns in runs.items():

@@ -1,4 +1,4 @@
-"""Option types and options that several subcommands share. Nothing here loads the simulator: `--help` is quick."""
+"""Option types and options of several subcommands. Nothing here loads the simulator, so that `--help` is fast."""
 
 import argparse
 import math
@@ -20,15 +20,15 @@ from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solvers import SOLVERS
 
-PERSON_VALUES = {  # options of their own, because they are changed most
-    "walking_speed": "usual walk",
+PERSON_VALUES = {  # the most used parameters of a person, each with an option
+    "walking_speed": "preferred walking speed",
     "turning_speed": "fastest turn of the body",
-    "reach": "how far away, from the body's axis, something can be picked or placed",
-    "field_of_view": "horizontal field of view of the picture and of what the participant perceives",
-    "reading_time": "for how long the participant stands and reads before each visit",
+    "reach": "largest distance, from the body's axis, for picking and placing",
+    "field_of_view": "horizontal field of view of the picture and of the participant's perception",
+    "reading_time": "how long the participant stands and reads before each visit",
 }
-PAGE_SETTINGS = ("draw", "field_of_view_range")  # of the page of `mjsim play`
-# The settings that run, batch and play have in common.
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the page of `mjsim play`
+# The settings that run, batch and play have in common
 TRIAL_OPTIONS = tuple(
     name
     for name in SETTINGS
@@ -38,7 +38,7 @@ _TYPES = typing.get_type_hints(TrialConfig)
 
 
 def int_list(text: str) -> list[int]:
-    """Parse `6,12` or `0:10` (the end not included) or a mix of both."""
+    """Parse `6,12`, `0:10` (which excludes 10), or a mix of both."""
     try:
         return numbers(text)
     except ConfigError as error:
@@ -46,12 +46,11 @@ def int_list(text: str) -> list[int]:
 
 
 def text_list(text: str) -> list[str]:
-    """Parse `none,highlight`."""
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
 def frame_size(text: str) -> tuple[int, int]:
-    """Parse `640x480`; even, because H.264 needs that."""
+    """Parse `640x480`. Both numbers must be even, as H.264 requires."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
@@ -64,18 +63,18 @@ def frame_size(text: str) -> tuple[int, int]:
 
 
 def seconds(text: str) -> float:
-    """Parse a time, s, finite and not negative."""
+    """Parse a finite time of at least 0 s."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds from 0 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds of at least 0")
     return value
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefaultsHelpFormatter):
-    """Keeps line breaks of descriptions, and names the default of every option that has one."""
+    """Keeps line breaks in descriptions and shows the default of each option that has one."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         has_default = action.option_strings and action.default is not None and action.nargs != 0
@@ -90,7 +89,7 @@ def add_command(
     description: str,
     summary: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a subcommand; `summary` is its line in a list of subcommands (`mjsim --help` has its own)."""
+    """Add a subcommand. `summary` is its line in a list of subcommands (`mjsim --help` has its own)."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=summary, description=description, formatter_class=HelpFormatter
     )
@@ -98,32 +97,30 @@ def add_command(
     return parser
 
 
-def add_force(parser: argparse.ArgumentParser, text: str = "replace files that exist") -> None:
-    """Add `--force`."""
+def add_force(parser: argparse.ArgumentParser, text: str = "replace existing files") -> None:
     parser.add_argument("--force", action="store_true", help=text)
 
 
 def add_call_limit(parser: argparse.ArgumentParser) -> None:
-    """Add `--call-limit`."""
     parser.add_argument(
         "--call-limit",
         type=seconds,
         action=_CallLimit,
         metavar="S",
-        help="longest time that a call of a participant, condition or planner of your own may take, s; the trial then "
+        help="time limit for one call of a custom participant, condition or planner, s; a trial that exceeds the limit "
         f"ends with an error (default: {CALL_LIMIT}, else no limit)",
     )
 
 
 class _CallLimit(argparse.Action):
-    """Workers take the limit from the environment, as it is no property of a trial."""
+    """Sets an environment variable, which workers inherit, because the limit is not a setting of a trial."""
 
     def __call__(self, _parser: Any, _namespace: Any, value: Any, _option: Any = None) -> None:
         os.environ[CALL_LIMIT] = str(value)
 
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:
-    """Add the option of a setting, described as in `TrialConfig`; it is None where it is not given."""
+    """Add the option of a setting, described as in `TrialConfig`. Its value is None if it is not given."""
     extra, option = dict(SETTINGS[name].extra or {}), f"--{name.replace('_', '-')}"
     text = f"{str(SETTINGS[name].description).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text
@@ -138,10 +135,10 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     parser.add_argument(option, **{**arguments, **changes})
 
 
-NAMES: dict[str, Callable[[], str]] = {  # what can be named, for help
+NAMES: dict[str, Callable[[], str]] = {  # setting -> its possible values, for its help
     "user": lambda: (
-        f": {', '.join(participant_names())}, or package.module:attribute; follower uses whatever guidance is shown, "
-        "in any condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
+        f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
+        "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
     ),
     "assistance": lambda: (
         f": {', '.join(CONDITIONS)}, or package.module:attribute; "
@@ -156,16 +153,19 @@ NAMES: dict[str, Callable[[], str]] = {  # what can be named, for help
 
 
 def add_task_options(parser: argparse.ArgumentParser, objects: int) -> None:
-    """Add `--objects`, `--assistance` and `--seed` of a single trial."""
     add_setting(parser, "objects", help=f"number of misplaced objects, 1 to --points (default: {objects})")
     add_setting(parser, "assistance", default="optimal")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="seed of the house, the participant and the list"
+        "--seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="seed of the house, the participant and the task list",
     )
 
 
 def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
-    """Add the settings that run, batch and play have in common; options without a default are None if not given."""
+    """Add the settings that run, batch and play have in common. Options without a default are None if not given."""
     for name in TRIAL_OPTIONS:
         add_setting(parser, name, **({"default": defaults[name]} if name in defaults else {}))
     usual = PersonParameters()
@@ -180,15 +180,14 @@ def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
 
 
 def given_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[str, Any]:
-    """The options of these names that are given."""
     return {name: value for name in names if (value := getattr(arguments, name)) is not None}
 
 
 def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """The options of `add_trial_options` that are given, as arguments of `TrialConfig`.
+    """Return the given options of `add_trial_options` as arguments of `TrialConfig`.
 
     Raises:
-        ConfigError: An episode is given together with what it decides, or no such person is possible.
+        ConfigError: An option contradicts the episode, or no such person is possible.
         EpisodeError: The episode cannot be read.
     """
     options = given_options(arguments, tuple(name for name in TRIAL_OPTIONS if name != "person"))
@@ -200,7 +199,7 @@ def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
         return options
     if arguments.objects is not None or arguments.house_seed is not None or arguments.points is not None:
         raise ConfigError(
-            "--episode says which objects lie where; leave out --objects, --points and --house-seed"
+            "--episode sets the objects and their places; leave out --objects, --points and --house-seed"
         )
     return {**episode_settings(Path(arguments.episode)), **options}
 
@@ -212,7 +211,7 @@ def add_frame(
     profile: str = FAST.name,
     otherwise: str = "",
 ) -> None:
-    """Add `--size` and `--profile` with these defaults; `otherwise` tells what no size means."""
+    """Add `--size` and `--profile` with these defaults. `otherwise` describes the size if there is no default."""
     default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
         "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"
@@ -223,13 +222,9 @@ def add_frame(
 
 
 def add_language(parser: argparse.ArgumentParser) -> None:
-    """Add `--language`."""
-    parser.add_argument(
-        "--language", default="en", metavar="LANG", help="language of the words in the film (default: en)"
-    )
+    parser.add_argument("--language", default="en", metavar="LANG", help="language of the texts in the film")
 
 
 def film_config(arguments: argparse.Namespace) -> FilmConfig:
-    """The options of `add_frame`."""
     width, height = arguments.size
     return FilmConfig(width, height, arguments.profile)

@@ -1,4 +1,4 @@
-"""`mjsim plan`: solve a routing problem from a file."""
+"""`mjsim plan`: solve a routing problem from a JSON file."""
 
 import argparse
 import gc
@@ -20,30 +20,32 @@ from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, p
 from planner.solvers import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, Solver, solver
 
 T = TypeVar("T")
-GRACE = 0.15  # s beyond a time limit that a planner may take to stop
-REPORT_EVERY = 5.0  # s
+GRACE_S = 0.15  # how long a planner may take to stop after the time limit
+REPORT_PERIOD_S = 5.0  # between progress reports
 
 DESCRIPTION = """\
-Solve a capacitated pickup-and-delivery problem with an open tour. Input, from FILE or - for standard input:
+Solve a capacitated pickup-and-delivery problem with an open tour. The input comes from FILE.json, or from standard
+input if it is -:
   {"capacity": 2, "start": 0, "distances": [[0, 3, 5], [3, 0, 4], [5, 4, 0]],
    "shipments": [{"pickup": 1, "delivery": 2}], "onboard": [2]}
-Indices count rows of the symmetric matrix distances, in metres or any other unit; onboard holds the delivery index of
-each object that is carried at the start.
-Output, on standard output:
+Indices refer to rows of the symmetric matrix distances, in metres or any other unit. onboard has the delivery index of
+each object that is carried at the start. The answer goes to standard output:
   {"visits": [1, 2, 2], "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "seconds": 0.001}
-"optimal" says that no tour is shorter than cost by more than a billionth of it, whatever the scale of the distances.
-The exact planner proves tours for capacity 1 and 2, up to 40 objects and distances that keep the triangle inequality.
-OR-Tools plans all other problems, without a proof; a line on standard error says so.
-Progress of a long search goes to standard error. Ctrl-C or SIGTERM ends it with the best tour so far. Malformed input
-exits with 2 and one line that names the fault.
+"optimal" means that no tour is shorter than cost by more than a billionth of it, whatever the scale of the distances.
+The exact planner proves tours for capacity 1 and 2, up to 40 objects and distances that satisfy the triangle
+inequality. OR-Tools plans all other problems without a proof, and a line on standard error says so.
 
---certificate OUT.json also writes the visits by object and what proves the lower bound. --check OUT.json replays such
-a tour against the constraints, derives the bound anew and examines every state through which a shorter tour could run,
-with code that shares nothing with the planners (about a second at 24 objects). It answers
+Progress of a long search goes to standard error. Ctrl-C or SIGTERM ends the search with the best tour so far. Malformed
+input gives exit code 2 and one line that describes the fault.
+
+--certificate OUT.json also writes the visits by object and the proof of the lower bound. --check OUT.json verifies such
+a certificate with code that is independent of the planners: it checks the tour against the constraints, derives the
+bound again, and examines every state through which a shorter tour could lead (about a second for 24 objects). It
+prints:
   {"holds": true, "cost": 7.0, "lower_bound": 7.0, "status": "optimal", "verified_bound": 7.0, "verified_optimal": true,
    "unverified": ""}
-verified_bound is what the check has derived; where it is below lower_bound, unverified says why. A claim that
-does not hold exits with 1."""
+verified_bound is the bound that was derived. If it is below lower_bound, unverified says why. A certificate that does
+not hold gives exit code 1."""
 
 
 def add_parser(commands: Any) -> None:
@@ -53,26 +55,29 @@ def add_parser(commands: Any) -> None:
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("file", metavar="FILE.json", help="problem to solve, - for standard input")
+    parser.add_argument("file", metavar="FILE.json", help="problem to solve, or - for standard input")
     parser.add_argument(
-        "--planner", default=DEFAULT_SOLVER, metavar="NAME", help=f"{', '.join(SOLVERS)} ({DEFAULT_SOLVER})"
+        "--planner",
+        default=DEFAULT_SOLVER,
+        metavar="NAME",
+        help=f"{', '.join(SOLVERS)}, or package.module:attribute (default: {DEFAULT_SOLVER})",
     )
     parser.add_argument(
         "--time-limit",
         type=float,
         metavar="S",
-        help="seconds from start to answer, to half a second; without it, the planner's own budget of work",
+        help="time limit, s, accurate to half a second (default: none, but a limit on the planner's work)",
     )
     claim = parser.add_mutually_exclusive_group()
     claim.add_argument(
-        "--certificate", type=Path, metavar="OUT.json", help="write what the answer claims and what proves it"
+        "--certificate", type=Path, metavar="OUT.json", help="also write the answer with its proof"
     )
     claim.add_argument(
         "--check",
         metavar="OUT.json",
-        help="plan nothing: check what --certificate wrote, - for standard input",
+        help="plan nothing: verify a certificate, or - for standard input",
     )
-    parser.add_argument("--force", action="store_true", help="replace a certificate that exists")
+    parser.add_argument("--force", action="store_true", help="replace an existing certificate")
     parser.set_defaults(run=run)
 
 
@@ -82,14 +87,14 @@ def run(arguments: argparse.Namespace) -> int:
             raise ConfigError("--check plans nothing; leave out --time-limit")
         return _check(arguments.file, arguments.check)
     if arguments.certificate is not None:
-        from experiments.record.run_directory import check_file  # loaded only where it is needed
+        from experiments.record.run_directory import check_file  # imported late for a fast start
 
         check_file(arguments.certificate, replace=arguments.force)
     started, seconds = time.perf_counter(), arguments.time_limit
     if seconds is not None and not 0 < seconds < math.inf:
         raise ConfigError(f"--time-limit {seconds:g} must be positive and finite; give seconds")
     problem, planner = _read(arguments.file, problem_from_json), _planner(arguments.planner)
-    search = _Search(planner, problem, started, seconds)
+    search = _PlanningThread(planner, problem, started, seconds)
     try:
         plan = search.wait()
     except KeyboardInterrupt:
@@ -99,10 +104,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise
     finally:
         search.end()
-        gc.freeze()  # at its end the process would collect the garbage of all of numba: 0.2 s
+        gc.freeze()  # saves 0.2 s at exit, when Python would collect the garbage of numba
     if not search.answered:
         print(
-            f"mjsim: {arguments.planner} gave no plan in time; this tour goes to the nearest first",
+            f"mjsim: {arguments.planner} gave no plan in time; this tour always visits the nearest place next",
             file=sys.stderr,
         )
     reason = planner.why_not(problem) if hasattr(planner, "why_not") else ""
@@ -115,13 +120,18 @@ def run(arguments: argparse.Namespace) -> int:
 def _planner(name: str) -> Solver:
     if name in SOLVERS:
         return solver(name)
-    from experiments.session.own_planner import planner_named  # loaded only where it is needed
+    from experiments.session.own_planner import planner_named  # imported late for a fast start
 
     return planner_named(name, exact=False)
 
 
-class _Search(threading.Thread):
-    """Plans in a thread, so that time limits and signals hold while a planner computes; `best` is the last plan."""
+class _PlanningThread(threading.Thread):
+    """A thread that plans, so that time limits and signals take effect while a planner computes.
+
+    Attributes:
+        best: The last plan, or None.
+        answered: True if the planner itself gave a plan in time.
+    """
 
     def __init__(
         self, planner: Solver, problem: RoutingProblem, started: float, seconds: float | None
@@ -131,25 +141,27 @@ class _Search(threading.Thread):
         self.answered = False
         self._error: BaseException | None = None
         self._stop_planning = threading.Event()
-        self._over = threading.Event()  # a `join` that a signal interrupts takes the thread for over
+        self._over = threading.Event()  # not `join`, which ends when a signal arrives
         self._planner, self._problem = planner, problem
         self._since, self._seconds = started, seconds
 
     def run(self) -> None:
         try:
             for plan in self._plans():
-                self.answered = self.best is not None or self._seconds is None  # the first is not its own
+                self.answered = (
+                    self.best is not None or self._seconds is None
+                )  # with a time limit, the first plan is greedy
                 self.best = plan
-        except BaseException as error:  # of a user's own planner, too
+        except BaseException as error:  # custom planners can raise anything
             self._error = error
         finally:
             self._over.set()
 
     def _plans(self) -> Iterator[Plan]:
-        """Better and better plans, within a time or a large budget of the exact planner's work."""
+        """Yield better and better plans, within the time limit or a large limit on the exact planner's work."""
         seconds = self._seconds
         if seconds is not None:
-            from planner.greedy_solver import first_plan  # loaded only where it is needed
+            from planner.greedy_solver import first_plan  # imported late for a fast start
 
             yield first_plan(self._problem)
             seconds = max(0.001, self._since + seconds - time.perf_counter())
@@ -161,19 +173,15 @@ class _Search(threading.Thread):
             yield self._planner.solve(self._problem, limit=limit)
 
     def wait(self) -> Plan:
-        """The best plan, once there is none better to come or the time is over.
-
-        Raises:
-            Exception: The planner failed.
-        """
+        """Return the best plan when the search has ended or timed out. Raises an `Exception` if the planner failed."""
         self.start()
-        ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE
-        report = self._since + REPORT_EVERY
+        ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE_S
+        report = self._since + REPORT_PERIOD_S
         while not self._over.is_set() and (self.best is None or time.perf_counter() < ends):
             self._over.wait(max(0.01, min(ends, report) - time.perf_counter()))
             if time.perf_counter() >= report:
                 self._report()
-                report += REPORT_EVERY
+                report += REPORT_PERIOD_S
         if self._error is not None:
             raise self._error
         if self.best is None:
@@ -181,7 +189,7 @@ class _Search(threading.Thread):
         return self.best
 
     def end(self) -> None:
-        """Stop planning; a planner in the middle of a step may take a moment."""
+        """Stop planning. A planner in the middle of a step may take a moment."""
         self._stop_planning.set()
         self._over.wait(1.0)
 
@@ -195,17 +203,16 @@ class _Search(threading.Thread):
 
 def _publish(problem: RoutingProblem, plan: Plan, certificate: Path | None) -> None:
     if certificate is not None:
-        from mjsim.support.files import write_text_atomically  # loaded only where it is needed
+        from mjsim.support.files import write_text_atomically  # imported late for a fast start
 
         write_text_atomically(certificate, claim_to_json(problem, plan) + "\n")
     print(plan_to_json(problem, plan))
 
 
 def _check(problem_name: str, claim_name: str) -> int:
-    """Check a claim about a problem; 1 where it does not hold."""
     if problem_name == claim_name == "-":
         raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
-    from planner.checker import verify_optimal  # loaded only where it is needed
+    from planner.checker import verify_optimal  # imported late for a fast start
 
     problem = _read(problem_name, problem_from_json)
     plan = _read(claim_name, lambda text: claim_from_json(text, problem))

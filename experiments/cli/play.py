@@ -1,10 +1,13 @@
-"""`mjsim play`: a person at the keyboard, in a browser."""
+"""`mjsim play`: tidy the apartment yourself, in a browser."""
 
 import argparse
 import asyncio
 import socket
+import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import msgspec
 
 from experiments.cli.options import (
     PAGE_SETTINGS,
@@ -16,7 +19,6 @@ from experiments.cli.options import (
     seconds,
     trial_options,
 )
-from experiments.cli.play_phases import questions_of, shown_phases
 from experiments.cli.server import (
     add_server_options,
     check_public_url,
@@ -28,9 +30,11 @@ from experiments.cli.server import (
 )
 from experiments.cli.study.database import DATABASE, sqlite_url
 from experiments.errors import ConfigError
-from experiments.record.phases import HUMAN, PHASES, TASK
+from experiments.record.phases import FLYTHROUGH, HUMAN, PHASES, STORY, TASK, phases_of
 from experiments.trials.trial_config import TrialConfig
+from experiments.visit.texts.items import Item
 from hud.conditions import condition
+from mjsim.support.files import read_text
 from planner.solvers import SOLVERS, solver
 
 if TYPE_CHECKING:
@@ -39,16 +43,16 @@ if TYPE_CHECKING:
 OBJECTS = 6
 
 DESCRIPTION = """\
-Start a server on which people tidy the apartment in a browser: by keyboard and mouse, gamepad or touch. Prints its URL
-on a separate line and opens it. A visit is a story, a film of the house (if --film names one), a training with one
-object, the task, and a page with the result; --phases leaves some out.
+Start a server on which people tidy the apartment in a browser, with keyboard and mouse, gamepad or touch. Print its URL
+on a separate line and open it. A visit consists of a story, a film of the house (with --film), a training with one
+object, the task, and a results page. --phases leaves some out.
 
-Every input is kept in --out at once: after a reload, a lost connection, or a crash of browser or server, the same link
-resumes in the same state. A finished trial leaves a run directory as `mjsim run` does, DIR/<visit>/task and
-DIR/<visit>/training, which `mjsim replay` verifies and films.
+Every input is saved in --out immediately. After a reload, a lost connection, or a crash of browser or server, the same
+link resumes in the same state. Finished trials leave run directories like those of `mjsim run`, DIR/VISIT/task and
+DIR/VISIT/training, which `mjsim replay` verifies and films.
 
-The server is reached from this machine alone unless --host is given; docs/deploy.md explains how to host it for others.
-Ctrl-C ends it; the same command resumes."""
+The server accepts only connections from this machine unless --host is given. docs/deploy.md explains how to host it for
+others. Ctrl-C stops the server; the same command resumes."""
 
 
 def add_parser(commands: Any) -> None:
@@ -59,60 +63,60 @@ def add_parser(commands: Any) -> None:
     for name in PAGE_SETTINGS:
         add_setting(parser, name)
     parser.add_argument(
-        "--xr", action="store_true", help="offer a button for a headset, where there is one (experimental)"
+        "--xr", action="store_true", help="show a button for a connected headset (experimental)"
     )
     group = parser.add_argument_group("server")
     add_server_options(group)
     group.add_argument(
-        "--out", type=Path, default=Path("runs/play"), metavar="DIR", help="folder of visits and their runs"
+        "--out", type=Path, default=Path("runs/play"), metavar="DIR", help="folder for visits and their runs"
     )
     group.add_argument(
         "--sessions",
         type=number(1, 1000),
         default=1,
         metavar="N",
-        help="how many people can play at a time; others wait",
+        help="number of people who can play at a time; others wait",
     )
     group.add_argument(
         "--idle",
         type=seconds,
         default=1800.0,
         metavar="S",
-        help="seconds without a sign of the person after which the place is given to another one",
+        help="seconds without a heartbeat after which a person's slot is given to another person",
     )
+    group.add_argument("--language", default="en", metavar="TAG", help="language of the pages: en or de")
     group.add_argument(
-        "--language", default="en", metavar="TAG", help="language of the pages: en or de (default: en)"
+        "--film", type=Path, metavar="FILE.mp4", help="film of the house to show before the task"
     )
-    group.add_argument("--film", type=Path, metavar="FILE.mp4", help="film of the house to show first")
     group.add_argument(
         "--minimum",
         type=_minimum,
         default={},
         metavar="PHASE=S,..",
-        help="seconds before which story, flythrough and training cannot be ended (docs/browser.md)",
+        help="minimum durations of story, flythrough and training, s (docs/browser.md)",
     )
     group.add_argument(
         "--questions",
         type=Path,
         metavar="FILE",
-        help="TOML file of questions about the story, which have to be answered correctly (docs/browser.md)",
+        help="TOML file of questions about the story that must be answered correctly (docs/browser.md)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     task = task_of(arguments)
     if arguments.film is not None and not arguments.film.is_file():
-        raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
+        raise ConfigError(f"film {arguments.film} does not exist; leave out --film, or name an MP4 file")
     check_public_url(arguments.public_url)
-    questions_of(arguments)  # before anything is started
+    questions = questions_of(arguments)
     with listen(arguments.host, arguments.port) as listener, locked(arguments.out):
-        _serve(arguments, task, listener)
+        _serve(arguments, task, questions, listener)
     return 0
 
 
 def task_of(arguments: argparse.Namespace) -> TrialConfig:
     if arguments.user != HUMAN:
-        raise ConfigError(f"`mjsim play` is for a person; user {arguments.user} belongs to `mjsim run`")
+        raise ConfigError(f"`mjsim play` is for people; user {arguments.user} belongs to `mjsim run`")
     task = TrialConfig(
         assistance=arguments.assistance,
         seed=arguments.seed,
@@ -127,22 +131,28 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
-    if task.planner not in SOLVERS:  # those are loaded by the workers
+    if task.planner not in SOLVERS:  # the workers load those
         solver(task.planner)
     return task
 
 
-def _serve(arguments: argparse.Namespace, task: TrialConfig, listener: socket.socket) -> None:
-    from experiments.web.server.pool import WorkerPool  # imported here, so that other commands start fast
+def _serve(
+    arguments: argparse.Namespace, task: TrialConfig, questions: tuple[Item, ...], listener: socket.socket
+) -> None:
+    from experiments.web.server.pool import WorkerPool
 
     prepare_process()
     pool = WorkerPool(task.house)
-    pool.warm_up()  # in parallel to the imports that follow
-    asyncio.run(_serve_visits(arguments, task, pool, listener))
+    pool.warm_up()  # in parallel with the imports below
+    asyncio.run(_serve_visits(arguments, task, questions, pool, listener))
 
 
 async def _serve_visits(
-    arguments: argparse.Namespace, task: TrialConfig, pool: "WorkerPool", listener: socket.socket
+    arguments: argparse.Namespace,
+    task: TrialConfig,
+    questions: tuple[Item, ...],
+    pool: "WorkerPool",
+    listener: socket.socket,
 ) -> None:
     import numpy as np
 
@@ -154,7 +164,8 @@ async def _serve_visits(
 
     store = await Store.open(sqlite_url(arguments.out / DATABASE), NAME, "0" * 64)
     folders = VisitFolders(arguments.out.absolute())
-    procedure = Procedure(plan_of_play(arguments, task), store, folders, np.random.default_rng())
+    plan = plan_of_play(arguments, task, shown_phases(arguments), questions)
+    procedure = Procedure(plan, store, folders, np.random.default_rng())
     await procedure.adopt()
     options = ServerOptions(proxies=arguments.trusted_proxy, workers=arguments.sessions)
     app = VisitServer(procedure, pool, options).app(arguments.host, arguments.public_url)
@@ -166,3 +177,43 @@ def _minimum(text: str) -> dict[str, float]:
     if unknown := [name for name in parts if name not in PHASES or name == TASK]:
         raise argparse.ArgumentTypeError(f"no phase {unknown[0]!r} before the task in {text!r}")
     return {name: seconds(value) for name, value in parts.items()}
+
+
+def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Return the phases of a visit. The fly-through is left out without a film.
+
+    Raises:
+        ConfigError: There is no such phase.
+    """
+    return tuple(
+        name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
+    )
+
+
+def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
+    """Read the questions of --questions: tables [[question]] with `text`, `choices` and `answer`.
+
+    Raises:
+        ConfigError: The file is not usable, or an option refers to a phase that is not shown.
+    """
+    path: Path | None = arguments.questions
+    named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
+    if missing := [name for name in named if name not in shown_phases(arguments)]:
+        raise ConfigError(f"--minimum or --questions refers to the phase {missing[0]}, which is not shown")
+    if path is None:
+        return ()
+    try:
+        asked = tomllib.loads(read_text(path)).get("question") or []
+        items = [
+            {"name": f"question_{number}", "kind": "choice", "text": one["text"]}
+            | {"choices": one["choices"], "right": one["answer"]}
+            for number, one in enumerate(asked, 1)
+        ]
+        found: tuple[Item, ...] = msgspec.convert(
+            items, Annotated[tuple[Item, ...], msgspec.Meta(min_length=1)]
+        )
+        return found
+    except OSError as error:
+        raise ConfigError(f"cannot read the questions {path}: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, msgspec.ValidationError) as error:
+        raise ConfigError(f"{path} has no valid questions: {error}") from error

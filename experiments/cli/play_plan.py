@@ -1,4 +1,4 @@
-"""The plan of the visits of `mjsim play`: the smallest study, with an open link and without pay."""
+"""The plan of a visit of `mjsim play`: a minimal study with an open link and without payments."""
 
 import argparse
 import math
@@ -9,7 +9,6 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from experiments.cli.play_phases import questions_of, shown_phases
 from experiments.record.phases import STORY, TRAINING
 from experiments.session.familiarise import story_text
 from experiments.trials.training import trials_of
@@ -18,30 +17,29 @@ from experiments.visit.plan import COMPREHENSION, RESULT, Device, Limits, VisitP
 from experiments.visit.recruiter import OpenLink
 from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
+from experiments.visit.texts.items import Item
 
 NAME = "play"  # name of the study in the database
 MINUTES = 15.0
-DAY = 86400.0  # seconds
+DAY_S = 86400.0
 MAX_VISITS = 1_000_000
-PLACES = ("title", "institution", "contact", "minutes")  # places in the texts of studies
+PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # in the texts of studies
 _NOTHING = Section({})
 
 
-def _texts(arguments: argparse.Namespace) -> dict[str, Section]:
-    """Return the texts of a study with those of `mjsim play` in place of some of them."""
-    empty = dict.fromkeys(PLACES, "")
-    words = read_texts(arguments.language, None, empty)["play"].words
-    texts = dict(read_texts(arguments.language, None, {**empty, "contact": words["contact"]}))
+def _texts(language: str, questions: tuple[Item, ...]) -> dict[str, Section]:
+    empty = dict.fromkeys(PLACEHOLDERS, "")
+    words = read_texts(language, None, empty)["play"].words
+    texts = dict(read_texts(language, None, {**empty, "contact": words["contact"]}))
     for name, text in texts["play"].words.items():
         section, _, word = name.partition("_")
         if word in texts.get(section, _NOTHING).words:
             texts[section] = replace(texts[section], words={**texts[section].words, word: text})
-    texts[COMPREHENSION] = replace(texts[COMPREHENSION], items=questions_of(arguments))
+    texts[COMPREHENSION] = replace(texts[COMPREHENSION], items=questions)
     return texts
 
 
 def _story(arguments: argparse.Namespace, words: Section, assistance: str, phases: Sequence[str]) -> str:
-    """Return the story and what the HUD will show."""
     if STORY not in phases:
         return ""
     path = arguments.story or story_file(arguments.language)
@@ -55,16 +53,19 @@ def _story(arguments: argparse.Namespace, words: Section, assistance: str, phase
     return "\n\n".join([story_text(None if path is None else Path(path)), *more])
 
 
-def plan_of_play(arguments: argparse.Namespace, task: TrialConfig) -> VisitPlan:
-    """Return the plan of a visit, which is the smallest study."""
-    shown = [*shown_phases(arguments), RESULT]
-    if arguments.questions:
+def plan_of_play(
+    arguments: argparse.Namespace, task: TrialConfig, phases: Sequence[str], questions: tuple[Item, ...]
+) -> VisitPlan:
+    shown = [*phases, RESULT]
+    if questions:
         shown.insert(shown.index(STORY) + 1, COMPREHENSION)
-    texts = _texts(arguments)
-    again = task.episode is None  # else there is only one, whose best way the result shows
+    texts = _texts(arguments.language, questions)
+    again = (
+        task.episode is None
+    )  # a fixed episode is not repeated because the result page shows its shortest way
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
-        """Each visit has an order seed of its own, so that not all start with the same arrangement of hands."""
+        """Give each visit its own order seed, so that the arrangement of hands varies."""
         order, house = task.order_seed + place.person_id - 1, place.house_seed
         seeds = {"order_seed": order % (MAX_SEED + 1), "house_seed": house % (MAX_SEED + 1)}
         return trials_of(msgspec.structs.replace(task, **seeds))
@@ -79,7 +80,10 @@ def plan_of_play(arguments: argparse.Namespace, task: TrialConfig) -> VisitPlan:
         arguments.minimum,
         frozenset(),
         Limits(
-            idle=max(arguments.idle, 1.0), abandoned_after=DAY, timed_out_after=math.inf, attempts=MAX_VISITS
+            idle=max(arguments.idle, 1.0),
+            abandoned_after=DAY_S,
+            timed_out_after=math.inf,
+            attempts=MAX_VISITS,
         ),
         Device(),
         MINUTES,

@@ -1,10 +1,10 @@
-"""`mjsim replay`: simulate a recorded run again, verify it, film it in another view."""
+"""`mjsim replay`: replay and verify a recorded run, or film it from another view."""
 
 import argparse
 import math
 import tempfile
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,21 +24,16 @@ if TYPE_CHECKING:
     from experiments.trials.replay.replay import ReplayReport
 
 DESCRIPTION = """\
-Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one
-bit for bit. DIR is a run directory or a packed trial (OUT/trials/NAME), however the run ended. Prints for every file of
-it what was checked, and exits with 0, or names the first step that differs and exits with 1. Of a session of
-`mjsim play` that is not over, the run is made from its journal, as far as it goes, and replayed.
+Simulate a recorded run again and verify at every control step that the state of the physics equals the recorded one bit
+for bit. DIR is a run directory or a packed trial (OUT/trials/NAME), even of a run that ended early. The result of the
+verification is printed for each file. The exit code is 0, or 1 if a step differs; the first such step is named. An
+unfinished session of `mjsim play` is replayed from its journal.
 
-With --video, the replay is filmed: as it was, or in another size, from another camera, with another HUD."""
+With --video, film the replay: as recorded, or in another size, from another camera, or with another HUD."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands,
-        "replay",
-        run,
-        description=DESCRIPTION,
-    )
+    parser = add_command(commands, "replay", run, description=DESCRIPTION)
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
         "--from",
@@ -46,26 +41,26 @@ def add_parser(commands: Any) -> None:
         type=seconds,
         default=0.0,
         metavar="T",
-        help="simulated seconds: start at the last checkpoint at or before T",
+        help="start at the last checkpoint at or before T simulated seconds",
     )
     parser.add_argument(
         "--house",
         metavar="CATALOGUE",
-        help="catalogue.toml of the run's house, where it does not lie where it was; its content must be the same",
+        help="catalogue.toml of the run's house, if it was moved; its content must be the same",
     )
     parser.add_argument("--video", type=Path, metavar="FILE.mp4", help="film the replay")
-    parser.add_argument("--camera", choices=CAMERAS, default=FIRST_PERSON, help="the view that is filmed")
+    parser.add_argument("--camera", choices=CAMERAS, default=FIRST_PERSON, help="camera of the film")
     parser.add_argument(
         "--eye",
         type=point,
         metavar="X,Y,Z",
-        help="position of a free camera, m (default: it circles the house)",
+        help="position of a free camera, m (default: circles the house)",
     )
     parser.add_argument(
         "--target",
         type=point,
         metavar="X,Y,Z",
-        help="point that a free camera looks at, m (default: the middle of the floor)",
+        help="target of a free camera, m (default: the middle of the floor)",
     )
     parser.add_argument(
         "--assistance",
@@ -75,18 +70,14 @@ def add_parser(commands: Any) -> None:
     add_frame(
         parser,
         size=None,
-        otherwise=" (default: 640x480; of a session that a browser drew, the shape of its page)",
+        otherwise=" (default: 640x480, or the shape of the page if a browser drew the session)",
     )
     add_language(parser)
-    add_force(parser, "replace a video that exists")
+    add_force(parser, "replace an existing video")
 
 
 def point(text: str) -> tuple[float, float, float]:
-    """Parse `1.5,2,8`.
-
-    Raises:
-        argparse.ArgumentTypeError: It is not three finite numbers.
-    """
+    """Parse `1.5,2,8`."""
     try:
         x, y, z = (float(part) for part in text.split(","))
         if not all(map(math.isfinite, (x, y, z))):
@@ -97,15 +88,7 @@ def point(text: str) -> tuple[float, float, float]:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay with a progress bar.
-
-    Raises:
-        ConfigError: A camera is given, but no film.
-        ReplayError: Something differs from the record.
-    """
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
-    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.cli.terminal import counting_bars
     from experiments.record.run_directory import check_file
     from experiments.study.data.copies import note_derived
     from experiments.trials.replay.replay import ReplayFilm, replay
@@ -126,12 +109,11 @@ def run(arguments: argparse.Namespace) -> int:
         )
     elif arguments.camera != FIRST_PERSON or arguments.eye or arguments.target:
         raise ConfigError("a camera needs a film; name the file with --video FILE.mp4")
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
     try:
-        with ExitStack() as stack, progress_bars(error_console(), "replay", *columns) as bars:
+        with run_of(arguments) as directory, counting_bars("steps") as bars:
             bar = bars.add_task("replay", total=None)
             report = replay(
-                stack.enter_context(run_of(arguments)),
+                directory,
                 start=arguments.start,
                 film=film,
                 assistance=arguments.assistance,
@@ -152,18 +134,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
-    """The run directory; that of a packed trial, or of a session which is not over, is made while it is needed.
+    """Yield the run directory of a command. It is temporary for a packed trial or an unfinished session.
 
     Raises:
-        RecordError: Nothing was played.
+        RecordError: The session has no recorded steps.
     """
     from experiments.house import House
     from experiments.record.archive import opened_run
     from experiments.record.run_directory import is_run
-    from experiments.web.worker.live_session import (  # imported late: most runs have no journal
-        journal_of,
-        save_run,
-    )
+    from experiments.web.worker.live_session import journal_of, save_run
 
     journal = None if is_run(arguments.directory) else journal_of(arguments.directory)
     if journal is None:
@@ -179,7 +158,7 @@ def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
 def _summary(report: "ReplayReport") -> str:
     text = "\n".join(map(str, report.verdicts)) + f"\n{report.steps} steps verified"
     if report.first:
-        text += f" from the checkpoint at step {report.first} on"
+        text += f" from the checkpoint at step {report.first}"
     text += f"; the run ended with {report.ended!r}"
     if report.failure:
         text += f", and so does the replay: {report.failure}"

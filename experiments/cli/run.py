@@ -1,4 +1,4 @@
-"""`mjsim run`: one trial, filmed."""
+"""`mjsim run`: run one trial and film it."""
 
 import argparse
 import signal
@@ -42,23 +42,23 @@ SHOWN_METRICS = (
 )
 
 OBJECTS = 6
-PROGRESS_PERIOD = 1.0  # s of simulated time between updates of the progress bar
+PROGRESS_PERIOD_S = 1.0  # simulated time between updates of the progress bar
 
 DESCRIPTION = """\
-Run one trial: a simulated person tidies a disorganized apartment under an assistance condition. Writes to --out
+Run one trial: a simulated participant tidies a disorganized apartment under an assistance condition. Write to --out:
   episode.json     the disorganized house            metrics.json   the paper's metrics and the health of the physics
-  events.jsonl     everything that happened          plan.json      every plan that was made
+  events.jsonl     all events                        plan.json      all plans
   trajectory.npz   poses and actions, 25 per second  topdown.png    floor plan with planned and walked path
-  recording.npz    hashes and states for replays     video.mp4      what the person saw
-Equal options and seeds give equal frames and files, except for the wall time in metrics.json.
-Files at --out are not touched. However a run ends (Ctrl-C, SIGTERM, an error in a participant of your own),
-what was simulated until then is kept there, and "ended" in metrics.json says how.
+  recording.npz    hashes and states for replays     video.mp4      the participant's view
+Equal options and seeds give equal frames and files, except for the wall time in metrics.json. Existing files are never
+overwritten without --force. If a run ends early (by Ctrl-C, SIGTERM, or an error in a custom participant), the part
+that was simulated is kept, and "ended" in metrics.json gives the reason.
 
-With --live the assistant plans in real time, as with a human participant. Before the clock starts it plans the task
-and proves the plan optimal. After a deviation it shows a plan within about 50 ms and keeps looking for a shorter one in
-a background thread; no control step waits for that. The result depends on the machine, so such a run is not
-reproducible. events.jsonl and plan.json hold every plan that was shown ("improved" marks a shorter plan for the same
-task, which is no replan), and `mjsim replay` shows the same plans again."""
+With --live, the assistant plans in real time, as with a human participant. It proves its first plan optimal before the
+clock starts. After a deviation, it shows a plan within about 50 ms and searches for a shorter one in a background
+thread, while the simulation continues. The result depends on the machine, so such a run is not reproducible. But
+events.jsonl and plan.json hold every plan that was shown, and `mjsim replay` shows the same plans again. There,
+"improved" marks a shorter plan for the same state of the task, which does not count as a replan."""
 
 
 def add_parser(commands: Any) -> None:
@@ -68,17 +68,18 @@ def add_parser(commands: Any) -> None:
     add_trial_options(parser)
     add_setting(parser, "live")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="run directory to write")
-    add_force(parser, "replace an earlier run at --out, and nothing else")
-    parser.add_argument("--no-video", action="store_true", help="do not film; about 10 times faster")
+    add_force(parser, "replace an earlier run at --out, but no other files")
+    parser.add_argument("--no-video", action="store_true", help="do not film (about 10 times faster)")
     parser.add_argument(
-        "--no-floor-plan", action="store_true", help="draw no floor plan; without video, no OpenGL is needed"
+        "--no-floor-plan",
+        action="store_true",
+        help="do not draw the floor plan; with --no-video, OpenGL is not needed",
     )
     add_frame(parser)
     add_call_limit(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the trial, show progress, then the metrics."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 
     from experiments.cli.terminal import error_console, progress_bars
@@ -94,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
             **trial_options(arguments),
         },
     )
-    film = film_config(arguments)  # refuses a profile that there is not, even where nothing is filmed
+    film = film_config(arguments)  # checks the profile even if nothing is filmed
     console = error_console()
     warnings: list[str] = []
     columns = (
@@ -106,11 +107,11 @@ def run(arguments: argparse.Namespace) -> int:
     )
     with progress_bars(console, *columns) as bars:
         bar = bars.add_task(f"{config.assistance}, {config.user}", total=config.objects, clock=0.0)
-        last = SessionProgress(-PROGRESS_PERIOD, 0, 0)
+        last = SessionProgress(-PROGRESS_PERIOD_S, 0, 0)
 
         def show(progress: SessionProgress) -> None:
             nonlocal last
-            if progress.delivered != last.delivered or progress.time >= last.time + PROGRESS_PERIOD:
+            if progress.delivered != last.delivered or progress.time >= last.time + PROGRESS_PERIOD_S:
                 last = progress
                 bars.update(bar, completed=progress.delivered, clock=progress.time)
 
@@ -125,7 +126,9 @@ def run(arguments: argparse.Namespace) -> int:
         )
     _show_metrics(console, metrics, arguments.out)
     for warning in warnings:
-        console.print(f"mjsim: {warning}; all else is in {arguments.out}", soft_wrap=True, markup=False)
+        console.print(
+            f"mjsim: {warning}; everything else is in {arguments.out}", soft_wrap=True, markup=False
+        )
     if metrics["ended"] == INTERRUPTED:
         return exit_code(signal.Signals[metrics["signal"]])
     return 1 if warnings else 0

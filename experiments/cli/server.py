@@ -1,49 +1,51 @@
-"""What the commands that serve pages share: where they listen, who may reach them, how they run."""
+"""Options, sockets, locks and logs of the commands that run a server."""
 
 import argparse
 import asyncio
 import fcntl
+import json
+import logging
 import os
 import resource
 import socket
 import threading
+import traceback
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from experiments.cli.logs import begin_logging
 from experiments.errors import ConfigError, RecordError
 
 PORT = 8000
-BACKLOG = 1024  # connections that wait to be taken
-MAX_FILES = 16384  # open files, sockets included
+BACKLOG = 1024  # connections that wait to be accepted
+MAX_FILES = 16384  # limit on open files, sockets included
 
 
 def add_server_options(group: Any) -> None:
-    """Add the options of a server to a group of a parser."""
-    group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port; 0 for any that is free")
+    group.add_argument("--port", type=number(0, 65535), default=PORT, help="TCP port, or 0 for any free port")
     group.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at")
     group.add_argument(
-        "--public-url", metavar="URL", help="URL under which a proxy makes the server public (docs/deploy.md)"
+        "--public-url", metavar="URL", help="public URL of the server behind a proxy (docs/deploy.md)"
     )
     group.add_argument(
         "--trusted-proxy",
         type=_networks,
         default=(),
         metavar="ADDRESS,..",
-        help="addresses or networks of proxies whose X-Forwarded-For tells who asks (docs/deploy.md)",
+        help="addresses or networks of proxies whose X-Forwarded-For header is trusted (docs/deploy.md)",
     )
-    group.add_argument("--log-json", action="store_true", help="write the log as a JSON object a line")
-    group.add_argument("--no-open", action="store_true", help="open no browser")
+    group.add_argument("--log-json", action="store_true", help="write the log as JSON, one object per line")
+    group.add_argument("--no-open", action="store_true", help="do not open a browser")
 
 
 def prepare_process() -> None:
-    """Let this process keep what it writes to itself, and open many sockets."""
-    os.umask(0o077)  # what people did is nobody else's business
+    """Make new files private to this user, and raise the limit on open files."""
+    os.umask(0o077)  # participants' data are confidential
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
 
@@ -52,24 +54,24 @@ async def serve(
     app: Any,
     listener: socket.socket,
     arguments: argparse.Namespace,
-    beside: Sequence[tuple[Any, socket.socket]] = (),
+    others: Sequence[tuple[Any, socket.socket]] = (),
 ) -> None:
-    """Print the URL of an ASGI application, open it, and serve until a signal comes, as well as those `beside`.
+    """Print the URL of an ASGI application, open it, and serve it and `others` until a signal arrives.
 
-    Where those listen is printed a line each. The first application starts first and ends last.
+    The URLs of `others` are printed one per line. The applications stop in the reverse order.
     """
     begin_logging(as_json=arguments.log_json)
     url = arguments.public_url or url_of(listener)
-    print(url, *(url_of(at) for _, at in beside), sep="\n", flush=True)
+    print(url, *(url_of(at) for _, at in others), sep="\n", flush=True)
     if not arguments.no_open:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    # Each hears a signal once the one after it has ended.
-    await asyncio.gather(*(http_server(one).serve([at]) for one, at in ((app, listener), *beside)))
+    # Uvicorn servers pass a signal on, from the last started to the first.
+    await asyncio.gather(*(http_server(one).serve([at]) for one, at in ((app, listener), *others)))
 
 
 def http_server(app: Any) -> Any:
-    """A server of an ASGI application, with the limits that all servers here have."""
-    import uvicorn  # imported here, so that other commands start fast
+    """Return a server of an ASGI application, with the limits of all our servers."""
+    import uvicorn  # imported late for a fast start
 
     from experiments.web.protocol import MAX_TEXT
     from experiments.web.server.guards import TimedConnection
@@ -78,10 +80,10 @@ def http_server(app: Any) -> Any:
         uvicorn.Config(
             app,
             log_config=None,
-            access_log=False,  # paths hold tokens
+            access_log=False,  # paths contain tokens
             log_level="warning",
             server_header=False,
-            proxy_headers=False,  # the guards believe those that are named
+            proxy_headers=False,  # handled by our middleware, which trusts only named proxies
             http=TimedConnection,
             ws="websockets-sansio",
             ws_max_size=MAX_TEXT,
@@ -101,13 +103,13 @@ def listen(host: str, port: int) -> socket.socket:
     except OSError as error:
         place = f"cannot listen at {host}, port {port}"
         raise OSError(
-            error.errno, f"{place}: {error.strerror}; name another --port (0 for any) or --host"
+            error.errno, f"{place}: {error.strerror}; choose another --port (0 for any) or --host"
         ) from error
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other servers away from a folder."""
+    """Lock a folder against other servers."""
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -120,7 +122,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def check_public_url(url: str | None) -> None:
-    """Raise a ConfigError unless a URL is that of a whole site; None is none."""
+    """Raise a `ConfigError` unless the URL is None or that of a whole site."""
     if url is None:
         return
     parts = urlsplit(url)
@@ -129,7 +131,7 @@ def check_public_url(url: str | None) -> None:
 
 
 def url_of(listener: socket.socket) -> str:
-    """The URL at which this machine reaches a socket that listens."""
+    """Return the URL of a listening socket on this machine."""
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
@@ -143,7 +145,7 @@ def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
 
 
 def number(smallest: int, largest: int) -> Callable[[str], int]:
-    """Parser of a whole number in a range."""
+    """Return a parser of whole numbers in a range."""
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not smallest <= int(text) <= largest:
@@ -151,3 +153,31 @@ def number(smallest: int, largest: int) -> Callable[[str], int]:
         return int(text)
 
     return parse
+
+
+class JsonLines(logging.Formatter):
+    """Formats log records as JSON objects with time, level, logger and message.
+
+    Of an exception, only type and traceback are logged, because its message may contain personal data.
+    """
+
+    def format(self, record: logging.LogRecord) -> str:
+        line: dict[str, object] = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+        }
+        if record.exc_info and record.exc_info[0] is not None:
+            kind, _, trace = record.exc_info
+            line["error"] = kind.__name__
+            line["at"] = [f"{at.filename}:{at.lineno} {at.name}" for at in traceback.extract_tb(trace)]
+        return json.dumps(line)
+
+
+def begin_logging(*, as_json: bool) -> None:
+    handler = logging.StreamHandler()
+    handler.setFormatter(JsonLines() if as_json else logging.Formatter("%(asctime)s %(message)s", "%H:%M:%S"))
+    logging.basicConfig(handlers=[handler])
+    for name in ("mjsim.play", "mjsim.study"):
+        logging.getLogger(name).setLevel(logging.INFO)

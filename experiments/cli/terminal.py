@@ -1,4 +1,4 @@
-"""The terminal of a command: progress and results, on standard error."""
+"""Progress bars and results on standard error."""
 
 import contextlib
 import os
@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
 
-class _Tolerant:
-    """A stream whose reader may close it: later output is dropped, and the command continues."""
+class _TolerantStream:
+    """A stream that drops output after its reader has closed it."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream
@@ -30,15 +30,23 @@ class _Tolerant:
 
 
 def error_console() -> "Console":
-    """A console on standard error that never fails."""
+    """Return a console on standard error that never fails, even if the stream is closed."""
     from rich.console import Console
 
     stream = open(os.devnull, "w") if sys.stderr is None else sys.stderr  # noqa: PTH123, SIM115 - as long as the process
-    return Console(file=cast(IO[str], _Tolerant(stream)), highlight=False)
+    return Console(file=cast(IO[str], _TolerantStream(stream)), highlight=False)
 
 
 def progress_bars(console: "Console", *columns: "str | ProgressColumn") -> "Progress":
-    """Progress bars on a terminal; nothing in a log, where they would be in the way."""
+    """Return progress bars, which are hidden unless the console is a terminal."""
     from rich.progress import Progress
 
     return Progress(*columns, console=console, disable=not console.is_terminal)
+
+
+def counting_bars(label: str, *columns: "str | ProgressColumn") -> "Progress":
+    """Return progress bars with a label, a count, elapsed and remaining time, and further columns."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    counting = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())
+    return progress_bars(error_console(), label, *counting, *columns)

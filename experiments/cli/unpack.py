@@ -10,12 +10,12 @@ from experiments.errors import RecordError
 
 DESCRIPTION = """\
 Turn packed trials of a batch (`mjsim batch --packed`) into run directories under OUT/trials, with the same bytes as a
-batch without --packed writes. Each file is checked against its SHA-256, and a packed trial is removed only when its run
-directory is on the disk. Give the command again to continue after an interruption.
+batch without --packed writes. Each file is verified by its SHA-256, and a packed trial is deleted only after its run
+directory is on disk. Repeat the command to continue after an interruption.
 
 You rarely need this: `mjsim replay`, `view`, `metrics`, `compare` and `study analyze` read packed trials, and a batch
-may hold both kinds. Without mjsim, `sqlite3 OUT/trials/FILE.sqlar -A --list` lists the files of an archive, and
-`-A --extract` unpacks them."""
+may contain both kinds. Without mjsim, `sqlite3 OUT/trials/FILE.sqlar -A --list` lists the files of an archive, and the
+option `-A --extract` unpacks them."""
 
 
 def add_parser(commands: Any) -> None:
@@ -25,7 +25,6 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Unpack with a progress bar; 1 if a trial is damaged."""
     from experiments.cli.terminal import error_console, progress_bars
     from experiments.record.archive import adopt, run_paths, unpack_in_place
     from experiments.record.run_directory import PACKED, TRIALS
@@ -36,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not packed or not packed.keys() >= set(arguments.names):
         missing = ", ".join(sorted({*arguments.names} - packed.keys())) or "at all"
         raise RecordError(
-            f"{arguments.out} has no packed trial {missing}; give the --out of `mjsim batch --packed`"
+            f"{arguments.out} has no packed trial {missing}; name the --out of `mjsim batch --packed`"
         )
     wanted = {packed[name] for name in arguments.names or packed}
     with progress_bars(error_console()) as bars:

@@ -1,4 +1,4 @@
-"""`mjsim view`: look at a recorded run in the browser."""
+"""`mjsim view`: view a recorded run in the browser."""
 
 import argparse
 import tempfile
@@ -10,40 +10,32 @@ from experiments.cli.options import add_command, add_force
 from experiments.errors import ConfigError
 
 DESCRIPTION = """\
-Show a recorded run in the browser, drawn in three dimensions: a timeline with events and plans, the person's view with
-its HUD, a view from above and a free camera, the planned and the walked path, at any speed. DIR is a run directory, of
-`mjsim run`, a batch, a study or `mjsim play`; a session that is not over is shown as far as it goes. The run is
-simulated again and verified first, as by `mjsim replay`.
+Show a recorded run in 3D in the browser: a timeline with events and plans, the participant's view with its HUD, a view
+from above, a free camera, and the planned and walked paths, at any speed. DIR is a run directory of `mjsim run`, a
+batch, a study or `mjsim play`. An unfinished session is shown as far as it was recorded. The run is first simulated
+again and verified, as by `mjsim replay`.
 
-The page is one HTML file without any other: --out keeps it, to be sent or attached to a paper. It needs a browser with
-WebGL 2, and neither a server nor mjsim."""
+The page is a single HTML file, which --out saves, for example to attach it to a paper. It needs a browser with WebGL 2,
+but no server and no mjsim."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(commands, "view", run, description=DESCRIPTION)
     parser.add_argument("directory", type=Path, metavar="DIR", help="run directory or packed trial")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE.html", help="write the page to a file, and open nothing"
+        "--out", type=Path, metavar="FILE.html", help="write the page to a file instead of opening it"
     )
     parser.add_argument(
         "--house",
         metavar="CATALOGUE",
-        help="catalogue.toml of the run's house, where it does not lie where it was; its content must be the same",
+        help="catalogue.toml of the run's house, if it was moved; its content must be the same",
     )
-    add_force(parser, "replace a page that exists")
+    add_force(parser, "replace an existing page")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make the page, then keep or open it.
-
-    Raises:
-        ConfigError: The file has another ending.
-        ReplayError: The run differs from its record.
-    """
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
     from experiments.cli.replay import run_of
-    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.cli.terminal import counting_bars
     from experiments.record.run_directory import check_file
     from experiments.study.data.copies import note_derived
     from experiments.web.viewing.page import view_page
@@ -53,8 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.out.suffix != ".html":
             raise ConfigError(f"cannot write a page to {arguments.out}: name a file that ends in .html")
         check_file(arguments.out, replace=arguments.force)
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("steps"), TimeElapsedColumn())
-    with run_of(arguments) as directory, progress_bars(error_console(), "replay", *columns) as bars:
+    with run_of(arguments) as directory, counting_bars("steps") as bars:
         bar = bars.add_task("replay", total=None)
         page = view_page(
             directory,

@@ -1,7 +1,7 @@
-"""Packed trials: SQLite archives that hold run directories, in the schema that `sqlite3 -A` reads.
+"""Packed trials: SQLite archives of run directories, in the schema that `sqlite3 -A` reads.
 
-Each process that runs trials writes to an archive of its own. SQLite's exclusive lock on the archive lasts as long as
-the process, so an archive without a lock is finished. Its name is hidden until `adopt` gives it the final one.
+Each worker process writes its own archive under a hidden name and holds SQLite's exclusive lock until it ends. An
+archive without a lock is finished, and `adopt` renames it to its final name.
 """
 
 import itertools
@@ -22,7 +22,7 @@ from experiments.record.files import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.run_directory import PACKED, is_run
 from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 
-WAIT_S = 60.0  # how long to wait for another process that changes the same archive
+WAIT_S = 60.0  # lock timeout when another process is writing to the archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
 _DAMAGED = "if it is damaged, move it away: its trials are run again"
 _OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # 0 is the character after the slash
@@ -38,13 +38,13 @@ def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
         database.executescript(
             f"PRAGMA auto_vacuum=FULL; PRAGMA locking_mode=EXCLUSIVE; PRAGMA synchronous=FULL; {_SCHEMA};"
         )
-        if path.exists():  # else it was adopted before it was locked
+        if path.exists():  # otherwise another process adopted it before it was locked
             return database
         database.close()
 
 
 def pack(run: Path, database: sqlite3.Connection) -> None:
-    """Add a run directory to an archive in one transaction; a `RecordError` if it cannot be written."""
+    """Add a run directory to an archive in one transaction. Raises a `RecordError` if the archive cannot be written."""
     rows = []
     for path in sorted(path for path in run.rglob("*") if path.is_file()):
         content, status = path.read_bytes(), path.stat()
@@ -59,7 +59,7 @@ def pack(run: Path, database: sqlite3.Connection) -> None:
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
-    """Give archives whose writer has ended their final names. Return the number of those still being written.
+    """Rename finished archives to their final names. Return the number of archives still being written.
 
     A run that a killed writer did not commit is rolled back.
     """
@@ -70,7 +70,7 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
                 database.execute(_SCHEMA)
                 database.execute("BEGIN EXCLUSIVE")
                 empty = database.execute("SELECT 1 FROM sqlar").fetchone() is None
-                if path.exists():  # else another process adopted it before this one had the lock
+                if path.exists():  # otherwise another process adopted it first
                     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
                     path.unlink() if empty else path.rename(path.with_name(path.name[1:]))
         except sqlite3.Error as error:
@@ -82,10 +82,13 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
 
 
 def run_paths(folder: Path, prefix: str = "") -> list[Path]:
-    """List the runs of a batch's folder of trials by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
+    """List the runs in a batch's `trials` folder by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
 
-    Only archives whose names begin with `prefix` are read. Of a packed run and a run directory with the same name, the
-    run directory is listed. A damaged archive raises a `RecordError`.
+    A run directory takes precedence over a packed run of the same name. Only archives whose names begin with `prefix`
+    are read.
+
+    Raises:
+        RecordError: An archive is damaged.
     """
     found = {name: archive / name for archive in _archives(folder, prefix) for name in packed_names(archive)}
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
@@ -94,7 +97,6 @@ def run_paths(folder: Path, prefix: str = "") -> list[Path]:
 
 
 def packed_names(archive: Path) -> set[str]:
-    """Names of the runs in an archive."""
     with _opened(archive) as database:
         rows = database.execute("SELECT name FROM sqlar WHERE name GLOB ?", (f"*/{records.EVENTS}",))
         return {name.partition("/")[0] for (name,) in rows}
@@ -102,7 +104,7 @@ def packed_names(archive: Path) -> set[str]:
 
 @contextmanager
 def opened_run(path: Path) -> Iterator[Path]:
-    """Yield a run directory as it is, or a temporary one of a packed run; raises a `RecordError` as `unpack`."""
+    """Yield a run directory, unpacked to a temporary folder if it is packed. Raises `RecordError` like `unpack`."""
     archive = None if is_run(path) else archive_of(path)
     if archive is None:
         yield path
@@ -113,30 +115,34 @@ def opened_run(path: Path) -> Iterator[Path]:
 
 
 def unpack(archive: Path, name: str, folder: Path) -> None:
-    """Write a packed run to `folder/name`; a `RecordError` names a file that is not as its checksum says."""
-    places = set[Path]()
+    """Write a packed run to `folder/name`.
+
+    Raises:
+        RecordError: The run is missing, or a file does not match its checksum.
+    """
+    directories = set[Path]()
     with _opened(archive) as database:
         members = f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}"  # nosec B608 - a constant
         for member, mtime, size, data in database.execute(members, (name, name)):
             path = folder / member
             if not path.resolve().is_relative_to(folder.resolve()):
-                raise RecordError(f"{archive}: {member} is not the name of a file of a run")
+                raise RecordError(f"{archive}: {member} is not a valid file name in a run")
             content = _content(archive, member, size, data)
             path.parent.mkdir(parents=True, exist_ok=True)
-            places.add(path.parent)
+            directories.add(path.parent)
             path.write_bytes(content)
             os.utime(path, (mtime, mtime))
-    if not places:
-        raise RecordError(f"{archive} holds no run {name}")
-    for place in sorted(places):
-        sums = read_checksums(place)
-        for path in {*map(place.joinpath, sums), *filter(Path.is_file, place.iterdir())}:
+    if not directories:
+        raise RecordError(f"{archive} has no run {name}")
+    for directory in sorted(directories):
+        sums = read_checksums(directory)
+        for path in {*map(directory.joinpath, sums), *filter(Path.is_file, directory.iterdir())}:
             if path.name != CHECKSUMS and (not path.exists() or sums.get(path.name) != sha256_of(path)):
-                raise RecordError(f"{archive}: {path.relative_to(folder)} is damaged: it is not as written")
+                raise RecordError(f"{archive}: {path.relative_to(folder)} is damaged: its checksum differs")
 
 
 def read_file(path: Path, file: str) -> bytes:
-    """Read a file of a run, packed or not, without checking it; raises `OSError` or `RecordError`."""
+    """Read a file of a run, packed or not, without verifying it. Raises `OSError` or `RecordError`."""
     if path.parent.suffix != PACKED:
         return read_bytes(path / file)
     member = f"{path.name}/{file}"
@@ -146,7 +152,7 @@ def read_file(path: Path, file: str) -> bytes:
 
 
 def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None]:
-    """Turn packed runs into run directories in `folder`. Yield None for each, or a message if it is damaged."""
+    """Replace packed runs by run directories in `folder`. Yield None for each, or a message if it is damaged."""
     for archive, paths in itertools.groupby(sorted(runs), lambda path: path.parent):
         done = set()
         for path in paths:
@@ -196,7 +202,6 @@ def copy(folder: Path, names: Collection[str], target: Path) -> None:
 
 
 def archive_of(path: Path) -> Path | None:
-    """The archive that holds the run of this path, or None."""
     if path.suffix == PACKED and path.is_file():
         raise RecordError(f"{path} holds packed runs; name one of them: {path.parent / 'NAME'}")
     if path.parent.suffix == PACKED and path.parent.is_file():

@@ -1,4 +1,4 @@
-"""The columns of a record: one row per control step in `trajectory.npz`, hashes and checkpoints in `recording.npz`."""
+"""The columns of a record: a row per control step in `trajectory.npz`, hashes and checkpoints in `recording.npz`."""
 
 import hashlib
 import math
@@ -15,9 +15,9 @@ from mjsim.values.errors import ActionError
 from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.world.state import WorldState
 
-OBJECTS = -1  # in a shape: the number of objects
+OBJECTS = -1  # stands for the number of objects in the shapes below
 
-# Row t is the state before action t. Type and shape of a row of each column:
+# Column -> type and shape of a row. Row t holds the state before action t.
 TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "time": ("f8", ()),  # s
     "position": ("f8", (2,)),  # m
@@ -27,23 +27,23 @@ TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "object_position": ("f8", (OBJECTS, 3)),  # m
     "object_quaternion": ("f8", (OBJECTS, 4)),  # wxyz
     "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
-    # kind (0 move, 1 pick, 2 place), object index or -1, then forward, left (m/s), turn, look (rad/s); an object index
-    # of n + i means the i-th of `unknown_objects`: names in actions that are no object of the house
+    # Kind (0 move, 1 pick, 2 place), object index or -1, forward and left (m/s), turn and look (rad/s). Object index
+    # n + i is entry i of `unknown_objects`, the names in actions that match none of the n objects.
     "action": ("f8", (6,)),
-    # as in `HealthSample`, NaN where there is none
+    # Fields of `HealthSample`, NaN if not measured
     "penetration_m": ("f8", ()),
     "trunk_penetration_m": ("f8", ()),
     "weld_error_m": ("f8", (2,)),
     "weld_error_rad": ("f8", (2,)),
     "settle_s": ("f8", ()),
 }
-# Further columns while a record is written: hash of the state, and entries of the log before the control step.
+# Extra columns while a record is being written: hash of the state, number of log entries before the control step
 _WRITTEN = {"state_hash": ("u8", ()), "logged": ("i8", ())}
 HEALTH = ("penetration_m", "trunk_penetration_m", "weld_error_m", "weld_error_rad", "settle_s")
 STATUSES = (ObjectStatus.LOOSE, ObjectStatus.CARRIED, ObjectStatus.DELIVERED)
 
-# Arrays of `recording.npz`. The hash of a state or action has a row per control step; size and hash of the log before
-# each control step have one more for the end.
+# Arrays of `recording.npz`. `state_hash` and `action_hash` have a row per control step. `log_size` and `log_hash`
+# describe the log before each control step, and have an extra row for its end.
 RECORDING_LAYOUT: dict[str, Layout] = {
     "state_hash": ("u8", (None,)),
     "action_hash": ("u8", (None,)),
@@ -57,7 +57,7 @@ RECORDING_LAYOUT: dict[str, Layout] = {
 
 
 def trajectory_layout(objects: int) -> dict[str, Layout]:
-    """Types and shapes of the arrays of `trajectory.npz`."""
+    """Return type and shape of each array in `trajectory.npz`."""
     rows: dict[str, Layout] = {
         name: (kind, (None, *row_shape(row, objects))) for name, (kind, row) in TRAJECTORY_COLUMNS.items()
     }
@@ -65,18 +65,17 @@ def trajectory_layout(objects: int) -> dict[str, Layout]:
 
 
 def row_shape(shape: tuple[int, ...], objects: int) -> tuple[int, ...]:
-    """The shape of a row for a number of objects."""
     return tuple(objects if size == OBJECTS else size for size in shape)
 
 
 def row_type(objects: int) -> np.dtype[Any]:
-    """The type of a row while a record is written, for a number of objects."""
+    """Return the row type of a record that is being written."""
     columns = {**TRAJECTORY_COLUMNS, **_WRITTEN}
     return np.dtype([(name, kind, row_shape(row, objects)) for name, (kind, row) in columns.items()])
 
 
 def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
-    """The columns that states determine, shape (n, ...)."""
+    """Yield name and values, shape (n, ...), of the columns that states determine."""
     columns = states._asdict()
     health = columns.pop("health")
     yield from columns.items()
@@ -89,7 +88,7 @@ def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """`hash64` of each row of actions (T, 6), shape (T,)."""
+    """Return `hash64` of each row of actions (T, 6), shape (T,)."""
     content, size, sha1 = actions.tobytes(), actions.itemsize * 6, hashlib.sha1
     rows = (content[i : i + size] for i in range(0, len(content), size))
     digests = [sha1(row, usedforsecurity=False).digest()[:8] for row in rows]
@@ -97,7 +96,7 @@ def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArray[Any]]:
-    """The arrays of `recording.npz` that hold the checkpoints before these control steps."""
+    """Return the checkpoint arrays of `recording.npz` for states by control step."""
     states = list(checkpoints.values())
     return {
         "checkpoint_step": np.array(list(checkpoints), np.int64),
@@ -108,22 +107,22 @@ def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArra
 
 
 def decode_action(row: NDArray[Any], names: Sequence[str]) -> StepAction:
-    """The action of a row (6,) of a trajectory.
+    """Decode a row (6,) of the action column.
 
     Args:
-        row: kind, object index, forward, left, turn, look.
+        row: The row.
         names: Names of the objects, then the `unknown_objects`.
 
     Raises:
-        RecordError: The row describes no action.
+        RecordError: The row is not a valid action.
     """
     kind, number = float(row[0]), float(row[1])
     if kind == 0.0:
         try:
             return Move(*(float(v) for v in row[2:]))
         except ActionError as error:
-            raise RecordError(f"an action is unusable: {error}") from error
+            raise RecordError(f"an action is not usable: {error}") from error
     if kind not in (1.0, 2.0) or not number.is_integer() or not -1 <= number < len(names):
-        raise RecordError(f"{row.tolist()} describes no action of an episode with {len(names)} object names")
+        raise RecordError(f"{row.tolist()} is not an action in an episode with {len(names)} object names")
     name = None if number < 0 else names[int(number)]
     return Pick(name) if kind == 1.0 else Place(name)

@@ -1,4 +1,4 @@
-"""Arrays, JSON and checksums on disk: written atomically, and read with errors that name the file."""
+"""Arrays, JSON and checksums on disk, written atomically. Errors name the file."""
 
 import hashlib
 import json
@@ -15,24 +15,24 @@ from experiments.errors import RecordError
 from mjsim.support.files import check_input, read_bytes, read_text, replacing, write_text_atomically
 from mjsim.support.files import read_json as strict_json
 
-# NumPy's name of an array's type (or `TEXT`), and its shape; None where any length will do.
+# Data type (a NumPy name or `TEXT`) and shape of an array. None stands for any length.
 Layout = tuple[str, tuple[int | None, ...]]
 TEXT = "U"
-_LEVEL = 3  # of compression
+_LEVEL = 3  # compression level
 
 
 def read_arrays(
     path: Path, layouts: Mapping[str, Layout] | None = None, *, only: Collection[str] | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Read the arrays of an NPZ by name.
+    """Read the arrays of an NPZ file, by name.
 
     Args:
         path: The file.
-        layouts: Type and shape of each array that must be there; None for no check.
-        only: Names of arrays to read; None for all.
+        layouts: Type and shape of each required array, or None for no check.
+        only: Names of the arrays to read, or None for all.
 
     Raises:
-        RecordError: The file is missing, cut short, damaged or incomplete; the message names it.
+        RecordError: The file is missing, damaged or incomplete.
     """
     try:
         check_input(path)
@@ -41,7 +41,7 @@ def read_arrays(
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
     except Exception as error:  # zipfile and NumPy raise a dozen types on damaged files
-        raise RecordError(f"{path} is cut short or damaged: {error}") from error
+        raise RecordError(f"{path} is truncated or damaged: {error}") from error
     bad = sorted(
         n for n, layout in (layouts or {}).items() if n not in arrays or not _fits(arrays[n], layout)
     )
@@ -61,10 +61,10 @@ def _fits(array: NDArray[Any], layout: Layout) -> bool:
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool = False) -> None:
-    """Write arrays of any shape to a compressed NPZ, atomically.
+    """Write arrays to a compressed NPZ file, atomically.
 
-    As `np.savez_compressed`, whose level takes twice the time for files smaller by a tenth. With `small`, LZMA takes
-    ten times the time for files smaller by a quarter.
+    Compared with `np.savez_compressed`, files are a tenth larger but take half the time. `small` selects LZMA, which
+    takes ten times as long for files that are a quarter smaller.
     """
     method = zipfile.ZIP_LZMA if small else zipfile.ZIP_DEFLATED
     with (
@@ -77,16 +77,12 @@ def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool =
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write indented JSON, whole or not at all."""
+    """Write indented JSON, atomically."""
     write_text_atomically(path, json.dumps(value, indent=2) + "\n")
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file.
-
-    Raises:
-        RecordError: The file is missing or not JSON; the message names it.
-    """
+    """Read a JSON file. Raises a `RecordError` if the file is missing or not JSON."""
     try:
         return strict_json(read_text(path))
     except OSError as error:
@@ -100,7 +96,7 @@ _LINE = re.compile(r"([0-9a-f]{64})  ([^/\\]+)")
 
 
 def write_checksums(folder: Path, names: Iterable[str]) -> None:
-    """Write `SHA256SUMS` for those of the files that exist; `sha256sum -c SHA256SUMS` checks it."""
+    """Write `SHA256SUMS`, readable by `sha256sum -c`, for those of the files that exist."""
     found = sorted(name for name in names if (folder / name).is_file())
     write_text_atomically(
         folder / CHECKSUMS, "".join(f"{sha256_of(folder / name)}  {name}\n" for name in found)
@@ -108,11 +104,7 @@ def write_checksums(folder: Path, names: Iterable[str]) -> None:
 
 
 def read_checksums(folder: Path) -> dict[str, str]:
-    """SHA-256 by file name, as written with the run.
-
-    Raises:
-        RecordError: The file is missing or damaged; the message names it.
-    """
+    """Read `SHA256SUMS` as SHA-256 by file name. Raises a `RecordError` if the file is missing or damaged."""
     path = folder / CHECKSUMS
     try:
         lines = read_bytes(path).decode("ascii").split("\n")
@@ -121,12 +113,11 @@ def read_checksums(folder: Path) -> dict[str, str]:
     found = [_LINE.fullmatch(line) for line in lines[:-1]]
     sums = {match[2]: match[1] for match in found if match}
     if lines[-1] or len(sums) != len(found):
-        raise RecordError(f"{path} is not as written: a line is not a checksum and a file name")
+        raise RecordError(f"{path} is damaged: a line is not a checksum and a file name")
     return sums
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's content, in hexadecimal digits."""
     check_input(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,7 +1,7 @@
-"""The journal of a session: its record as a file that is appended to while the session runs.
+"""The journal of a session: its record, appended to a file while the session runs.
 
-A header, then entries, each with its length and checksum. What is in it when `sync` returns survives the death of the
-process and of the machine. An entry that was cut off by either is dropped when the journal is opened again.
+The file has a header and entries, each with its length and checksum. What `sync` has flushed survives a crash of the
+process or the machine. An incomplete last entry is dropped when the journal is opened again.
 """
 
 import errno
@@ -18,16 +18,16 @@ import msgspec
 
 from experiments.errors import RecordError
 
-JOURNAL = "journal.bin"  # in the folder of a session
+JOURNAL = "journal.bin"  # file in the folder of a session
 MAGIC = b"mjsim journal 2\n"
 MAX_ENTRY = 64 * 1024 * 1024  # bytes
-LOCK_TIMEOUT = 10.0  # s that a process which has the journal open is given to end
+LOCK_TIMEOUT_S = 10.0  # how long to wait for another process to close the journal
 _OTHER_VERSION = "another version of mjsim; use that version to continue the session"
-_HEAD = struct.Struct("<II")  # length of an entry, bytes, and its CRC-32
+_HEAD = struct.Struct("<II")  # length in bytes and CRC-32 of the entry that follows
 
 
-class Header(msgspec.Struct, frozen=True, tag=True):
-    """First entry: what is recorded.
+class Header(msgspec.Struct, frozen=True, tag="Header"):
+    """First entry of a journal.
 
     Attributes:
         settings: Settings of the trial.
@@ -39,21 +39,21 @@ class Header(msgspec.Struct, frozen=True, tag=True):
 
 
 class Checkpoint(msgspec.Struct, frozen=True):
-    """A state from which to continue: the control step that follows it, its physics (float64), and the rest as JSON."""
+    """A state from which to continue: number of the next control step, physics (float64), other state as JSON."""
 
     step: int
     physics: bytes
     details: str
 
 
-class Entry(msgspec.Struct, frozen=True, tag=True):
-    """What was recorded since the entry before.
+class JournalEntry(msgspec.Struct, frozen=True, tag="Entry"):
+    """What was recorded since the previous entry.
 
     Attributes:
-        rows: Control steps, of `columns.row_type`.
-        events: Lines of the log.
-        unknown: Names in actions that are no object of the house, so far.
-        checkpoints: States that the world was set to.
+        rows: Control steps, of type `columns.row_type`.
+        events: New lines of the log.
+        unknown: All names in actions so far that match no object.
+        checkpoints: New checkpoints.
         participant: State of the participant.
     """
 
@@ -65,21 +65,18 @@ class Entry(msgspec.Struct, frozen=True, tag=True):
 
 
 _encode = msgspec.msgpack.Encoder().encode
-_DECODER: msgspec.msgpack.Decoder[Header | Entry] = msgspec.msgpack.Decoder(Header | Entry)
+_DECODER: msgspec.msgpack.Decoder[Header | JournalEntry] = msgspec.msgpack.Decoder(Header | JournalEntry)
 
 
 class Journal:
-    """A journal that is open for appending, by one process at a time; the file is made if it is not there.
-
-    Args:
-        path: The file.
+    """A journal file open for appending, by one process at a time. A missing file is created.
 
     Attributes:
-        entries: The entries that it had when it was opened; a reader of them may drop them.
+        entries: The entries that were in the file when it was opened. Readers may clear this to free memory.
 
     Raises:
-        RecordError: The file is no journal, or another process keeps it open.
-        OSError: It cannot be read or written.
+        RecordError: The file is not a journal, or another process keeps it open.
+        OSError: The file cannot be read or written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -99,11 +96,11 @@ class Journal:
             os.close(self._file)
             raise
 
-    def append(self, entry: Header | Entry) -> None:
-        """Append an entry; it is safe once `sync` has returned.
+    def append(self, entry: Header | JournalEntry) -> None:
+        """Append an entry, which is durable once `sync` returns.
 
         Raises:
-            OSError: It cannot be written (a full disk); nothing of it stays in the file.
+            OSError: The entry cannot be written (a full disk). The file is left unchanged.
         """
         end, content = self.size, _encode(entry)
         try:
@@ -117,7 +114,7 @@ class Journal:
         return os.fstat(self._file).st_size
 
     def sync(self) -> None:
-        """Wait until everything appended so far is on the disk."""
+        """Flush all appended entries to disk."""
         os.fdatasync(self._file)
 
     def close(self) -> None:
@@ -132,13 +129,12 @@ class Journal:
         self.close()
 
 
-def read_entries(path: Path) -> tuple[Header | Entry, ...]:
-    """The intact entries of a journal; raises `RecordError` and `OSError` as `Journal` does."""
+def read_entries(path: Path) -> tuple[Header | JournalEntry, ...]:
     return _intact(path.read_bytes(), path)[0]
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder, or the content of a file, are on the disk."""
+    """Fsync a file, or the names in a folder."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -146,29 +142,29 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def _intact(content: bytes, path: Path) -> tuple[tuple[Header | Entry, ...], int]:
-    """Entries up to the first one that is cut off or damaged, and where it starts; the rest was never acknowledged."""
+def _intact(content: bytes, path: Path) -> tuple[tuple[Header | JournalEntry, ...], int]:
+    """Return the entries before the first damaged one, and the offset at which they end."""
     if not MAGIC.startswith(content[: len(MAGIC)]):
         if content.startswith(MAGIC[:-2]):
             raise RecordError(f"{path} is a journal of {_OTHER_VERSION}")
         raise RecordError(f"{path} is not the journal of a session")
-    place, entries = len(MAGIC), list[Header | Entry]()
-    while place + _HEAD.size <= len(content):
-        length, checksum = _HEAD.unpack_from(content, place)
-        entry = content[place + _HEAD.size : place + _HEAD.size + length]
+    offset, entries = len(MAGIC), list[Header | JournalEntry]()
+    while offset + _HEAD.size <= len(content):
+        length, checksum = _HEAD.unpack_from(content, offset)
+        entry = content[offset + _HEAD.size : offset + _HEAD.size + length]
         if length > MAX_ENTRY or len(entry) < length or zlib.crc32(entry) != checksum:
             break
         try:
             entries.append(_DECODER.decode(entry))
         except msgspec.DecodeError as error:
             raise RecordError(f"{path} is a journal of {_OTHER_VERSION} ({error})") from error
-        place += _HEAD.size + length
-    return tuple(entries), place
+        offset += _HEAD.size + length
+    return tuple(entries), offset
 
 
 def _lock(file: int, path: Path) -> None:
-    """Wait until no other process has the file open, as one that lost its server takes a moment to end."""
-    until = time.monotonic() + LOCK_TIMEOUT
+    """Wait until no other process has the file open. A worker that lost its server takes a moment to end."""
+    until = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,5 +1,6 @@
-"""The objective measures of a trial, from the event log and the trajectory alone (PAPER section 6, docs/metrics.md)."""
+"""The objective measures of a trial, computed from event log and trajectory (PAPER section 6, docs/metrics.md)."""
 
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -7,71 +8,63 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.record.displays import displays
-from experiments.record.health import summarise_health
+from experiments.record.columns import HEALTH
 from experiments.record.phases import FLYTHROUGH, is_simulated
 from experiments.record.records import PARTICIPANT, PHASE_ENDED, Event
+from mjsim.values.actions import EventKind
 from mjsim.values.motion_parameters import GROUPS
 
-REGRETFUL = 0.01  # m; smaller regrets are ties
-COSTLY = 0.1  # m; what a deviation must cost to count in `nd_regret_10cm`
-# Fields of the start event that say what was recorded, not how the trial was set up.
-PROVENANCE = frozenset(
-    {
-        "t",
-        "event",
-        "format",
-        "versions",
-        "model",
-        "world",
-        "inputs",
-        "episode_sha256",
-        "order",
-        "person",
-        "behaviour",
-    }
-)
-# Fields of `metrics.json` that do not follow from log and trajectory; the checksum of the file protects them.
+REGRETFUL_M = 0.01  # smaller regrets are ties
+COSTLY_M = 0.1  # smallest cost of a deviation that counts in `nd_regret_10cm`
+# Fields of the start event that describe the record, not the settings of the trial
+PROVENANCE = {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order"}
+PROVENANCE |= {"person", "behaviour"}
+# Fields of `metrics.json` that do not follow from log and trajectory. Only the file's checksum protects them.
 CIRCUMSTANCES = ("frames_sha256", "renderer", "wall_s")
+# Metric -> kind of event that it counts
+COUNTED = {
+    "ejections": EventKind.EJECTED,
+    "tunnellings": EventKind.TUNNELLED,
+    "grips_lost": EventKind.GRIP_LOST,
+}
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """Objective measures of one trial; docs/metrics.md defines each.
+    """Objective measures of one trial, defined in docs/metrics.md.
 
     Attributes:
         ended: Why the trial ended.
-        delivered: Objects in their receptacle at the end.
-        visits: Successful picks and places.
-        nd_strict_2n: Visits that differ from the suggested next one, over two per object of the task; None, as are
-            the other deviations and inverse path lengths, where no visit was made.
-        nd_feasible: Visits that differ from the suggested next one, over the visits at which another one was feasible;
-            0 when there was never a choice.
-        nd_bin_tied: As `nd_feasible`, but which of two objects goes first into the same bin is no choice.
-        nd_regret_10cm: As `nd_feasible`, but only deviations that make the rest of the task more than 0.1 m longer
-            than the best visit count, over the visits whose regret is known; None where none is known.
-        ipl_locations: Sum of the distances between the places of consecutive visits (where objects lay, where one
-            stands at a bin) over the distance walked: the paper's inverse path length. It can exceed 1.
-        ipl_stand: Sum of the shortest walks between where the person stood at consecutive visits over the distance
-            walked; 1 is perfect and never exceeded.
+        delivered: Number of objects in their receptacle at the end.
+        visits: Number of successful picks and places.
+        nd_strict_2n: Visits that differ from the suggested one, over twice the number of objects; None, as are the
+            other deviations and inverse path lengths, if no visit was made.
+        nd_feasible: Visits that differ from the suggested one, over the visits with a feasible alternative; 0 if there
+            was never a choice.
+        nd_bin_tied: As `nd_feasible`, but not counting which of two objects goes into the same bin first.
+        nd_regret_10cm: As `nd_feasible`, but counting only deviations with a regret above 0.1 m, over the visits with a
+            known regret; None if no regret is known.
+        ipl_locations: The paper's inverse path length: distances between the places of consecutive visits (objects and
+            bins) over the distance walked. It can exceed 1.
+        ipl_stand: Shortest walks between the positions at consecutive visits over the distance walked; at most 1.
         task_distance_m: Distance walked, m.
-        completion_time_s: Time until the last object was delivered, or until the end if some are left, s.
-        completion_over_familiarisation: Completion time over the duration of the fly-through; None where there was
-            none.
-        planned_distance_m: Length of the plan at the start, from place to place, m. Who reaches walks less.
-        reach_bound_m: Lower bound on walking at maximum reach, m; None where nothing was planned.
-        replans: How often the plan was made anew after the first, because the task was no longer as planned.
-        refusals: Infeasible attempts.
-        failures: Picks and places that started but did not succeed in the physics, and objects lost from a hand.
-        mean_regret_m: By how much a visit makes the rest of the task longer than the best one at that moment, m; the
-            mean of all visits whose regret is known, None if there is none.
-        total_regret_m: Their sum, m: how much longer the walk is for the order of visits alone; or None.
-        regretful_visits: Visits with a regret of more than 1 cm, None if none is known. The
-            others are optimal or tie with the optimal one.
-        unjudged_visits: Visits whose regret is not known: the planner could not prove it, or it was not asked for.
-        mean_suggestion_gap_m: Regret of what was suggested, m: the mean of all suggestions whose regret is known, None
-            if there is none. It measures the planner, as `mean_regret_m` measures the person.
-        max_suggestion_gap_m: The largest of them, m, or None.
+        completion_time_s: Time until the last delivery, or until the end if objects are left, s.
+        completion_over_familiarisation: Completion time over the duration of the fly-through; None without a
+            fly-through.
+        planned_distance_m: Length of the first plan, from place to place, m. Reaching for objects saves some of it.
+        reach_bound_m: Lower bound on walking at maximum reach, m; None if nothing was planned.
+        replans: Number of plans that replaced the previous one because the task no longer matched it.
+        refusals: Number of infeasible attempts.
+        failures: Number of picks and places that started but failed in the physics, and of objects lost from a hand.
+        mean_regret_m: Mean regret of the visits, m: how much longer each makes the remaining task compared with the
+            best visit at that moment; None if no regret is known.
+        total_regret_m: Sum of these regrets, m: the extra walk caused by the order of visits; None if no regret is
+            known.
+        regretful_visits: Visits with a regret above 1 cm; None if no regret is known. The others are optimal or tied.
+        unjudged_visits: Visits with unknown regret, because the planner could not prove it or it was not computed.
+        mean_suggestion_gap_m: Mean regret of the suggested visits, m; None if none is known. It measures the planner as
+            `mean_regret_m` measures the person.
+        max_suggestion_gap_m: Largest regret of a suggested visit, m; None if none is known.
     """
 
     ended: str | None
@@ -100,14 +93,11 @@ class Metrics:
 
 
 def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Everything that a log and a trajectory say about a trial: its settings, its metrics, the health of the physics.
+    """Return the rows of `metrics.json` that follow from log and trajectory: settings, metrics, health of the physics.
 
     Args:
         events: The event log in order, from `start` to `end`.
-        arrays: The trajectory, columns as in `TRAJECTORY_COLUMNS`; at least one row.
-
-    Returns:
-        Rows of `metrics.json`.
+        arrays: The trajectory, columns as in `TRAJECTORY_COLUMNS`, with at least one row.
     """
     settings = {name: value for name, value in events[0].items() if name not in PROVENANCE}
     ending = {name: events[-1][name] for name in ("signal", "error") if name in events[-1]}
@@ -124,10 +114,10 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
 
 
 def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> Metrics:
-    """Measure a trial.
+    """Compute the metrics of a trial.
 
     Args:
-        events: The event log in order; it ends with `end`, at the moment of the last delivery if that is why.
+        events: The event log in order. Its `end` is at the moment of the last delivery, if that ended the trial.
         positions: Floor position at every control step, m, shape (T, 2).
     """
     visits = [e for e in events if e["event"] == "visit"]
@@ -156,7 +146,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
         failures=_count(events, "pick_failed", "place_failed", "grip_lost"),
         mean_regret_m=sum(known) / len(known) if known else None,
         total_regret_m=sum(known) if known else None,
-        regretful_visits=sum(regret > REGRETFUL for regret in known) if known else None,
+        regretful_visits=sum(regret > REGRETFUL_M for regret in known) if known else None,
         unjudged_visits=len(visits) - len(known),
         mean_suggestion_gap_m=sum(gaps.values()) / len(gaps) if gaps else None,
         max_suggestion_gap_m=max(gaps.values(), default=None),
@@ -164,10 +154,10 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 
 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
-    """The participant's values, but for those of the hands, as columns: `person_walking_speed` and so on."""
-    told: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
-    body = {f"person_{name}": value for name, value in told["person"].items() if name not in GROUPS}
-    model = told.get("behaviour") or {}
+    """Return the participant's values, except those of the hands, as columns such as `person_walking_speed`."""
+    logged: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
+    body = {f"person_{name}": value for name, value in logged["person"].items() if name not in GROUPS}
+    model = logged.get("behaviour") or {}
     return body | {f"behaviour_{name.replace('.', '_')}": value for name, value in model.items()}
 
 
@@ -184,7 +174,6 @@ def _path_length(visits: Sequence[Event], between: str, walked: float) -> float 
 
 
 def _choices(visits: Sequence[Event]) -> list[Event]:
-    """Visits at which another one was feasible."""
     return [visit for visit in visits if visit["alternatives"] > 0]
 
 
@@ -201,18 +190,102 @@ def _nd_regret(visits: Sequence[Event], regrets: Mapping[int, float]) -> float |
     judged = [(v, regrets[k]) for k, v in enumerate(visits) if v["alternatives"] > 0 and k in regrets]
     if not regrets:
         return None
-    return _over(sum(v["deviated"] and regret > COSTLY for v, regret in judged), len(judged))
+    return _over(sum(v["deviated"] and regret > COSTLY_M for v, regret in judged), len(judged))
 
 
 def _over_familiarisation(events: Sequence[Event], completion: float) -> float | None:
-    """The fly-through is the paper's familiarisation."""
     ended = [e for e in events if e["event"] == PHASE_ENDED and e["phase"] == FLYTHROUGH]
     watched = sum(float(event["duration_s"]) for event in ended)
     return completion / watched if watched > 0 else None
 
 
 def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dict[int, float]:
-    """Regrets that are known by number of the visit, m: logged with the visit, or later under its number."""
+    """Return the known regrets in metres by number of the visit, logged with the visit or in a later `regret` event."""
     found = {k: visit.get(name) for k, visit in enumerate(visits)}
     found |= {e["visit"]: e[name] for e in events if e["event"] == "regret" and name in e}
     return {k: float(regret) for k, regret in found.items() if regret is not None}
+
+
+def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict[str, float | int]:
+    """Summarize the health of the physics in a trial (docs/metrics.md).
+
+    Weld errors are sampled while a hand carries something, settling times once per release, penetration at every
+    control step. Without samples, a value is 0.
+
+    Args:
+        events: The event log.
+        arrays: The trajectory, columns as in `TRAJECTORY_COLUMNS`.
+
+    Returns:
+        Rows of `metrics.json`: maximum, 99th percentile and mean of each quantity, and counts of faults.
+    """
+    summary: dict[str, float | int] = {}
+    for name in HEALTH:
+        values = arrays[name][~np.isnan(arrays[name])]
+        for label, value in (
+            ("max", values.max(initial=0.0)),
+            ("p99", np.percentile(values, 99) if values.size else 0.0),
+            ("mean", values.mean() if values.size else 0.0),
+        ):
+            summary[f"{label}_{name}"] = float(value)
+    summary["releases_settled"] = int(np.count_nonzero(~np.isnan(arrays["settle_s"])))
+    for name, kind in COUNTED.items():
+        summary[name] = sum(event["event"] == kind.value for event in events)
+    return summary
+
+
+@dataclass(frozen=True)
+class Displays:
+    """How well a person saw a trial: medians over its `display` events, logged every 5 s.
+
+    Attributes:
+        drawn_by_browser: Share of these events in which the browser drew the view. Otherwise it showed server frames.
+        display_renderer: Most frequent renderer.
+        display_width: Width of the view, CSS px.
+        display_height: Height of the view, CSS px.
+        display_pixel_ratio: Screen pixels per CSS pixel.
+        display_frames_per_s: Frames shown per second.
+        display_frame_ms_95: 95th percentile of the time between two frames, ms.
+        display_latency_ms: Time from an input to the frame that shows it, ms; None if nothing was pressed.
+        display_dropped: Share of the received frames that were not shown.
+        display_field_of_view: Horizontal field of view, rad; None if the person could not choose it.
+    """
+
+    drawn_by_browser: float
+    display_renderer: str
+    display_width: float
+    display_height: float
+    display_pixel_ratio: float
+    display_frames_per_s: float
+    display_frame_ms_95: float
+    display_latency_ms: float | None
+    display_dropped: float
+    display_field_of_view: float | None
+
+
+def displays(events: Sequence[Event]) -> dict[str, Any]:
+    """Return the columns of `Displays` for an event log, or an empty dictionary if it has no `display` events."""
+    reports = [event for event in events if event["event"] == "display"]
+    if not reports:
+        return {}
+
+    def median(name: str) -> float:
+        return float(statistics.median(event[name] for event in reports))
+
+    shown = sum(5.0 * event["frames_per_s"] for event in reports)
+    dropped = sum(event["dropped"] for event in reports)
+    waits = [event["latency_ms"] for event in reports if event["latency_ms"] is not None]
+    angles = [angle for event in reports if (angle := event.get("field_of_view")) is not None]
+    found = Displays(
+        drawn_by_browser=sum(event.get("draw") == "browser" for event in reports) / len(reports),
+        display_renderer=statistics.mode(event["renderer"] for event in reports),
+        display_width=median("width"),
+        display_height=median("height"),
+        display_pixel_ratio=median("pixel_ratio"),
+        display_frames_per_s=median("frames_per_s"),
+        display_frame_ms_95=median("frame_ms_95"),
+        display_latency_ms=float(statistics.median(waits)) if waits else None,
+        display_dropped=dropped / (shown + dropped) if dropped else 0.0,
+        display_field_of_view=float(statistics.median(angles)) if angles else None,
+    )
+    return asdict(found)

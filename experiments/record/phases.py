@@ -1,21 +1,21 @@
-"""Phases of a session, where a recorded run comes from, and why it ended."""
+"""Names of phases, origins of recorded runs, and reasons why a session ended."""
 
 from collections.abc import Iterable
 
 from experiments.errors import ConfigError
 
 STORY, FLYTHROUGH, TRAINING, TASK = PHASES = ("story", "flythrough", "training", "task")
-HUMAN = "human"  # name of the participant that nothing simulates
-REHEARSAL = "rehearsal"  # name of the simulated participants of `mjsim study rehearse`
+HUMAN = "human"  # participant name of a person
+REHEARSAL = "rehearsal"  # participant name in `mjsim study rehearse`
 REHEARSED = "Rehearsed, with answers drawn at random"
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
 def phases_of(text: str) -> tuple[str, ...]:
-    """The phases that a text such as `flythrough,task` names.
+    """Parse a list of phases such as `flythrough,task`.
 
     Raises:
-        ConfigError: There is no such phase, they are not in their order, or the task is missing.
+        ConfigError: A phase is unknown or out of order, or the task is missing.
     """
     names = tuple(part.strip() for part in text.split(","))
     unknown = [name for name in names if name not in PHASES]
@@ -30,12 +30,11 @@ def phases_of(text: str) -> tuple[str, ...]:
 
 
 def is_simulated(user: object) -> bool:
-    """Whether a participant of this name is simulated."""
     return user != HUMAN
 
 
 def origin_of(users: Iterable[object]) -> str:
-    """What trials by participants of these names are: `Simulated`, `Recorded from people`, and so on."""
+    """Return the origin of trials by participants of these names, such as `Simulated` or `Recorded from people`."""
     users = set(users)
     if users == {REHEARSAL}:
         return REHEARSED
@@ -47,14 +46,11 @@ ALL_DELIVERED = "all delivered"
 TIME_LIMIT = "time limit"
 INTERRUPTED = "interrupted"
 PHYSICS_ERROR = "physics error"
-ERROR = "error"  # anything else, such as an error in a user-supplied participant
+ERROR = "error"  # any other error, such as in a custom participant
 
-COMPLETE = (ALL_DELIVERED, TIME_LIMIT)  # nothing disturbed the session
-BROKEN_OFF = (
-    INTERRUPTED,
-    ERROR,
-)  # between two control steps, or in one: the last one recorded may not be complete
+COMPLETE = (ALL_DELIVERED, TIME_LIMIT)
+BROKEN_OFF = (INTERRUPTED, ERROR)  # the last recorded control step may be incomplete
 
 
-class LeaveSession(BaseException):  # not an Exception, as nothing failed
-    """Raised by a participant or a viewer to leave a session early; not a failure."""
+class LeaveSession(BaseException):  # not an Exception, so handlers of errors do not catch it
+    """Raised by a participant or a viewer to leave a session early. This is not a failure."""

@@ -1,4 +1,4 @@
-"""Reads the record of a session: from a run directory, or as far as a session that is not over has come."""
+"""Reads the record of a session from a run directory or a journal."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ from experiments.record.columns import (
     row_type,
     trajectory_layout,
 )
-from experiments.record.event_check import check_event
+from experiments.record.events import check_event
 from experiments.record.files import read_arrays
-from experiments.record.journal import Entry, Header
+from experiments.record.journal import Header, JournalEntry
 from experiments.record.records import Event, EventLog
 from mjsim.support.files import read_bytes
 from mjsim.values.actions import StepAction
@@ -37,14 +37,13 @@ from mjsim.world.state import WorldState
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """The record of a session: the content of the four files of a run directory from which all others follow.
+    """The record of a session: the four files of a run directory from which all others follow.
 
     Attributes:
-        episode: The disorganized house.
-        log: The lines of `events.jsonl`.
+        log: Content of `events.jsonl`.
         trajectory: Arrays of `trajectory.npz`, as in `columns.TRAJECTORY_COLUMNS`, and `unknown_objects`.
         recording: Arrays of `recording.npz`, as in `columns.RECORDING_LAYOUT`.
-        participant: State of the participant after the last control step, where the record is that of a journal.
+        participant: State of the participant after the last control step, if the record was read from a journal.
     """
 
     episode: Episode
@@ -59,26 +58,24 @@ class Record:
 
     @cached_property
     def steps_of_events(self) -> list[int]:
-        """The control step that logged each event."""
+        """The control step at which each event was logged."""
         steps = np.searchsorted(self.recording["log_size"][:-1], self._offsets, side="right") - 1
         return [int(step) for step in np.maximum(0, steps)]
 
     def events_before(self, step: int) -> int:
-        """Number of events that were logged before a control step."""
+        """Return the number of events logged before a control step."""
         return int(np.searchsorted(self._offsets, self.recording["log_size"][step]))
 
     def events_of(self, step: int) -> tuple[Event, ...]:
-        """The events that a control step logged; the first one has those before it, too."""
+        """Return the events logged at a control step. Those before the first step count to it."""
         return self.events[self.events_before(step) if step else 0 : self.events_before(step + 1)]
 
     @cached_property
     def _offsets(self) -> NDArray[np.int64]:
-        """Where each line of the log starts, bytes."""
         return np.cumsum([0, *(len(line) for line in self.log.splitlines(keepends=True)[:-1])])
 
     @cached_property
     def start(self) -> Event:
-        """The first event: configuration, versions, fingerprints."""
         start: Event = json.loads(self.log.split(b"\n", 1)[0])
         return start
 
@@ -92,10 +89,10 @@ class Record:
 
     @cached_property
     def person(self) -> PersonParameters:
-        """The participant, with every value that was drawn.
+        """The participant's parameters, drawn values included.
 
         Raises:
-            ReplayError: The log does not describe it.
+            ReplayError: The log does not describe the participant.
         """
         try:
             logged = next(event for event in self.events if event["event"] == records.PARTICIPANT)
@@ -106,12 +103,12 @@ class Record:
 
     @property
     def steps(self) -> int:
-        """Number of recorded control steps, including the final state."""
+        """Number of recorded control steps, plus one for the final state."""
         return len(self.recording["state_hash"])
 
     @property
     def reason(self) -> str | None:
-        """Why the session ended, or None while it is not over."""
+        """Why the session ended, or None if it has not ended."""
         return str(self.end.get("reason")) if self.end["event"] == "end" else None
 
     @cached_property
@@ -119,12 +116,14 @@ class Record:
         return tuple(placed.name for placed in self.episode.objects)
 
     def action(self, step: int) -> StepAction:
-        """The action of a control step; raises `RecordError` if the row is not an action."""
+        """Return the action of a control step. Raises `RecordError` if the row is invalid."""
         unknown = map(str, self.trajectory["unknown_objects"])
         return decode_action(self.trajectory["action"][step], [*self.names, *unknown])
 
     def observation(self, step: int) -> Observation:
-        """The state before a control step; eye height and velocity are nominal, as the assistant ignores them."""
+        """Return the state before a control step. Eye height and velocity are nominal because the assistant ignores
+        them.
+        """
         row = {name: column[step] for name, column in self.trajectory.items() if name in TRAJECTORY_COLUMNS}
         left, right = (None if i < 0 else self.names[i] for i in row["hands"])
         return Observation(
@@ -148,23 +147,23 @@ class Record:
         return [int(step) for step in self.recording["checkpoint_step"]]
 
     def checkpoint(self, step: int) -> WorldState:
-        """The checkpoint before a control step.
+        """Return the checkpoint before a control step.
 
         Raises:
-            StateError: It is not the state of a world of this version.
+            StateError: The checkpoint is of another version.
         """
         number = self.checkpoint_steps.index(step)
         physics, details = (self.recording[f"checkpoint_{part}"][number] for part in ("physics", "details"))
         return WorldState.from_json(physics, str(details))
 
     def checkpoint_before(self, time: float) -> int | None:
-        """The control step of the last checkpoint at or before a time, s, or None."""
+        """Return the control step of the last checkpoint at or before a time in seconds, or None."""
         times = self.trajectory["time"]
         return max((step for step in self.checkpoint_steps if times[step] <= time + 1e-9), default=None)
 
 
 def same_record(one: Record, other: Record) -> bool:
-    """Compare two records bit for bit, except for the state of the participant."""
+    """Compare two records bit for bit, ignoring the state of the participant."""
 
     def content(record: Record) -> list[Any]:
         arrays = [*record.trajectory.items(), *record.recording.items()]
@@ -182,7 +181,7 @@ def assemble(
     checkpoints: Mapping[int, WorldState],
     participant: Any = None,
 ) -> Record:
-    """The record of rows of `columns.row_type`, a log, unknown names in actions, and states by control step."""
+    """Build a record from rows of `columns.row_type`, a log, unknown names in actions, and checkpoints by step."""
     trajectory = {name: np.ascontiguousarray(rows[name]) for name in TRAJECTORY_COLUMNS}
     log_size, log_hash = log.at([*rows["logged"], log.entries])
     recording = {
@@ -190,15 +189,15 @@ def assemble(
         "action_hash": action_hashes(trajectory["action"]),
         "log_size": log_size,
         "log_hash": log_hash,
-        # An interruption can leave a checkpoint without its control step.
+        # An interrupted session can have a checkpoint whose control step is missing.
         **checkpoint_arrays({step: state for step, state in checkpoints.items() if step < len(rows)}),
     }
     names = {"unknown_objects": np.array(unknown, np.str_)}
     return Record(episode, log.content, {**trajectory, **names}, recording, participant)
 
 
-def read_journal(entries: Sequence[Header | Entry]) -> Record:
-    """The record of a journal, as far as its session has come.
+def read_journal(entries: Sequence[Header | JournalEntry]) -> Record:
+    """Build the record of a journal, which may be of an unfinished session.
 
     Raises:
         RecordError: The journal is empty.
@@ -206,7 +205,7 @@ def read_journal(entries: Sequence[Header | Entry]) -> Record:
     if not entries or not isinstance(entries[0], Header):
         raise RecordError("the journal is empty")
     episode, log = Episode.from_json(entries[0].episode), EventLog()
-    added = [entry for entry in entries if isinstance(entry, Entry)]
+    added = [entry for entry in entries if isinstance(entry, JournalEntry)]
     log.restore([json.loads(line) for entry in added for line in entry.events])
     rows = np.frombuffer(b"".join(entry.rows for entry in added), row_type(len(episode.objects)))
     checkpoints = {
@@ -219,11 +218,11 @@ def read_journal(entries: Sequence[Header | Entry]) -> Record:
 
 
 def read_run(directory: Path) -> Record:
-    """Read the record of a run directory; `verify` checks whether it is as written.
+    """Read the record of a run directory without verifying it (see `verify`).
 
     Raises:
-        RecordError: It is not a run directory.
-        ReplayError: A file cannot be read, or has the log format of another version.
+        RecordError: The folder is not a run directory.
+        ReplayError: A file cannot be read, or the log has the format of another version.
     """
     log = read_log(directory)
     try:
@@ -237,10 +236,10 @@ def read_run(directory: Path) -> Record:
 
 
 def read_log(directory: Path) -> bytes:
-    """The log of a run directory, if it has the format of this version.
+    """Read the log of a run directory.
 
     Raises:
-        RecordError: It is not a run directory.
+        RecordError: The folder is not a run directory.
         ReplayError: The log does not begin with a start event, or has the format of another version.
     """
     if not (directory / records.EVENTS).is_file():

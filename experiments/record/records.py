@@ -1,4 +1,4 @@
-"""The record of one trial: an append-only event log and a trajectory."""
+"""The event log of a session, and the names of the files of a run directory."""
 
 import hashlib
 import json
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.support.files import read_text
 
-# 7: groups of a person's values. 6: the participant. 5: distances between places, ties, gaps of suggestions.
-# 4: typed checkpoints. 3: untyped ones. 2: no health of the physics. 1: neither state hashes nor checkpoints.
+# Each version added: 2 state hashes, 3 health of the physics, 4 typed checkpoints, 5 distances between places, ties
+# and gaps of suggestions, 6 the participant, 7 groups of a person's values.
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
@@ -25,30 +25,26 @@ FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = 
     "topdown.png",
     "video.mp4",
 )
-PARTICIPANT = "participant"  # event with all values of the person
-PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events of what came before the task
-TRAINING = "training"  # run directory inside that of the task
+PARTICIPANT = "participant"  # event with the person's parameters
+PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events of phases before the task
+TRAINING = "training"  # run directory of the training, inside that of the task
 
 
 Event = Mapping[str, Any]
 
 
 class EventLog:
-    """The events of a session, in the order in which they happened."""
+    """The events of a session, in order."""
 
     def __init__(self) -> None:
         self._lines: list[dict[str, Any]] = []
 
     def append(self, time: float, event: str, **fields: Any) -> None:
-        """Log `event` at simulated `time` s, with JSON-ready fields; `RecordError` as `fill`."""
+        """Log `event` at simulated `time` in seconds, with JSON-ready fields. Raises like `fill`."""
         self.fill(self.reserve(), time, event, **fields)
 
     def fill(self, line: dict[str, Any], time: float, event: str, **fields: Any) -> None:
-        """Fill in a reserved place.
-
-        Raises:
-            RecordError: A value could not be read back, such as NaN.
-        """
+        """Fill in a reserved line. Raises a `RecordError` if a value is not valid JSON, such as NaN."""
         entry = {"t": round(time, 6), "event": event, **fields}
         try:
             json.dumps(entry, allow_nan=False)
@@ -57,7 +53,7 @@ class EventLog:
         line.update(entry)
 
     def reserve(self) -> dict[str, Any]:
-        """The place of an event that is filled in later, `t` and `event` included; left empty, it is no event."""
+        """Reserve a line for an event that is filled in later. A line that stays empty is not written."""
         self._lines.append({})
         return self._lines[-1]
 
@@ -67,21 +63,24 @@ class EventLog:
 
     @property
     def content(self) -> bytes:
-        """These events as lines of JSON, in ASCII."""
+        """All filled-in lines as JSON, in ASCII."""
         return b"".join(map(_encoded, self._lines))
 
     @property
     def entries(self) -> int:
-        """How many places are taken, reserved ones included."""
+        """Number of lines, reserved ones included."""
         return len(self._lines)
 
     @property
     def event_counts(self) -> NDArray[np.int64]:
-        """How many events there are among the first k entries, for each k, shape (entries + 1,)."""
+        """Number of filled-in lines among the first k lines, for each k, shape (entries + 1,)."""
         return np.cumsum([0, *map(bool, self._lines)])
 
     def at(self, entries: list[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
-        """Length of the content after these numbers of `entries`, bytes, and first 64 bits of its SHA-1, both (n,)."""
+        """Return size and hash of the content after each number of `entries`, both of shape (n,).
+
+        Sizes are in bytes, hashes are the first 64 bits of SHA-1.
+        """
         texts = [b"", *map(_encoded, self._lines)]
         digest, hashes = hashlib.sha1(usedforsecurity=False), list[bytes]()
         for text in texts:
@@ -91,7 +90,7 @@ class EventLog:
         return sizes[entries], np.frombuffer(b"".join(hashes), "<u8").astype(np.uint64)[entries]
 
     def restore(self, events: Sequence[Event]) -> None:
-        """Hold these events instead of those logged so far."""
+        """Replace the logged events."""
         self._lines = [dict(event) for event in events]
 
 
@@ -100,11 +99,7 @@ def _encoded(line: Event) -> bytes:
 
 
 def read_events(path: Path) -> list[Event]:
-    """Read an event log.
-
-    Raises:
-        RecordError: The file is missing, or a line is not JSON; the message names file and line.
-    """
+    """Read an event log. Raises a `RecordError` if the file is missing, or a line is not JSON."""
     try:
         lines = read_text(path).splitlines()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Where commands write: files that exist are kept, and a run directory is complete or absent."""
+"""Output paths of commands: existing files are kept, and a run directory is complete or absent."""
 
 import os
 import shutil
@@ -12,27 +12,26 @@ from experiments.record import records
 from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
-SHOWN_NAMES = 3  # of what is in the way
-SAMPLE = 100  # number of folders in a batch that are looked into; looking into all takes long over a network
-TRIALS = "trials"  # folder of a batch
+SHOWN_NAMES = 3  # number of existing files that an error names
+SAMPLE = 100  # folders of a batch that are inspected; inspecting all takes long on a network file system
+TRIALS = "trials"  # folder of runs in the folder of a batch
 PACKED = ".sqlar"  # suffix of an archive of runs
-VISIT = "visit.json"  # in the folder of each visit of `mjsim play`
+VISIT = "visit.json"  # file in the folder of each visit of `mjsim play`
 JOURNALS = "journals"  # folder of journals in the folder of a visit
 
 
 def is_run(directory: Path) -> bool:
-    """Whether `directory` holds the record of a trial."""
     return (directory / records.EPISODE).is_file() and (directory / records.EVENTS).is_file()
 
 
 def is_batch(directory: Path) -> bool:
-    """True if `directory` is the folder of a batch: it holds archives and folders, some of which are checked."""
+    """Return True if `directory` is the folder of a batch. Only a sample of its runs is inspected."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False
     with os.scandir(trials) as entries:
         inside = [entry for entry in entries if PACKED in entry.name or not entry.name.startswith(".")]
-    if not inside:  # a batch that was killed before its first trial was done has no table either
+    if not inside:  # a batch that was killed during its first trials has no table
         return not list(directory.glob(f"{TRIALS}.*"))
     folders = [entry for entry in inside if PACKED not in entry.name]
     sample = (Path(entry) for entry in folders[:SAMPLE])
@@ -40,17 +39,21 @@ def is_batch(directory: Path) -> bool:
 
 
 def visit_folders(directory: Path) -> list[Path]:
-    """The visits in the folder of an `mjsim play`, or of several of these, by name."""
+    """List the visits in one or several folders of `mjsim play`, by name."""
     found = (path for depth in ("*", "*/*") for path in directory.glob(f"{depth}/{VISIT}"))
     return sorted(path.parent for path in found)
 
 
 def check_run_directory(path: Path, *, replace: bool = False) -> Path:
-    """Check that a run may be written to `path`; `replace` allows the place of an earlier run. Links are followed.
+    """Check that a run may be written to `path`, and return the path with links resolved.
+
+    Args:
+        path: The path.
+        replace: Allow `path` to hold an earlier run.
 
     Raises:
-        RecordError: Something is in the way; the message says what, and what to do.
-        OSError: The path is unusable: too long, below a file, not to be read.
+        RecordError: Something is in the way. The message says what to do.
+        OSError: The path is not usable: too long, below a file, or not readable.
     """
     place = _place(path)
     if not place.exists():
@@ -77,7 +80,7 @@ def check_run_directory(path: Path, *, replace: bool = False) -> Path:
 
 
 def check_batch_folder(path: Path) -> None:
-    """Check that a batch may be written to `path`, or added to one that is there.
+    """Check that a batch may be written to `path`, or added to an existing one.
 
     Raises:
         RecordError: Something else is in the way.
@@ -111,13 +114,17 @@ def check_file(path: Path, *, replace: bool = False) -> None:
 
 @contextmanager
 def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = None) -> Iterator[Path]:
-    """Yield a working folder; with metrics in it, it is moved to `path` in the end, also where the block raises.
+    """Yield a working folder, which is moved to `path` when the block ends, even by an error.
 
-    A folder without metrics is removed. `replace` allows the place of an earlier run. `scratch` is the parent of the
-    working folder (default: that of `path`).
+    A folder without metrics is deleted instead.
+
+    Args:
+        path: Path of the run directory.
+        replace: Allow `path` to hold an earlier run.
+        scratch: Parent of the working folder (default: that of `path`).
 
     Raises:
-        RecordError: Something is in the way. If it came there during the run, the run is kept next to it.
+        RecordError: Something is in the way. If it appeared during the run, the run is kept next to it.
         OSError: The folder cannot be written.
     """
     place = check_run_directory(path, replace=replace)
@@ -131,9 +138,9 @@ def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = N
 
 
 def add_files(folder: Path, path: Path) -> None:
-    """Add the files of a work folder, and the checksums of all, to a run directory: at once, or not at all.
+    """Add the files of a working folder to a run directory and update its checksums, atomically.
 
-    Afterwards the folder holds the run as it was.
+    Afterwards the working folder holds the previous run directory.
     """
     place = Path(os.path.realpath(path))
     shutil.copytree(place, folder, copy_function=link_or_copy, dirs_exist_ok=True)
@@ -142,7 +149,7 @@ def add_files(folder: Path, path: Path) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """`path`, or with the first number that makes it a name of nothing that exists."""
+    """Return `path`, or if it exists, `path` with the first free number appended."""
     number, free = 1, path
     while os.path.lexists(free):
         number += 1
@@ -164,7 +171,7 @@ def _move(folder: Path, place: Path, *, replace: bool) -> None:
 
 
 def link_or_copy(source: str, target: str) -> None:
-    """Give a file a second name, or copy it on a file system without links."""
+    """Hard-link a file, or copy it if the file system has no links."""
     try:
         os.link(source, target)
     except OSError:
@@ -173,7 +180,7 @@ def link_or_copy(source: str, target: str) -> None:
 
 @contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    """Make `folder` and those above it; those that are empty afterwards are removed again."""
+    """Create `folder` and its parents. Remove those that are empty afterwards."""
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -186,9 +193,9 @@ def _folder(folder: Path) -> Iterator[None]:
 
 
 def _place(path: Path) -> Path:
-    """The target of a path, links followed; raises `RecordError` for a link that leads nowhere, else `OSError`."""
+    """Resolve the links of a path. Raises `RecordError` for a dangling link, `OSError` if the path is not usable."""
     if path.is_symlink() and not path.exists():
-        raise RecordError(f"{path} is a symbolic link that leads nowhere; remove it or choose another --out")
+        raise RecordError(f"{path} is a dangling symbolic link; remove it or choose another --out")
     place = Path(os.path.realpath(path))
     with suppress(FileNotFoundError, NotADirectoryError):
         place.stat()  # from Python 3.14 on, `exists` is False for a name that is too long
@@ -196,7 +203,6 @@ def _place(path: Path) -> Path:
 
 
 def _existing(folder: Path) -> Path:
-    """The folder, or the lowest one above it that exists."""
     while not folder.exists():
         folder = folder.parent
     return folder

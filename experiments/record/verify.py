@@ -1,4 +1,4 @@
-"""Checks a record without simulating it: lengths and hashes, files that follow from it, and checksums of all files."""
+"""Verifies a record without simulating it: lengths, hashes, derived files and checksums."""
 
 import hashlib
 import json
@@ -12,7 +12,7 @@ import numpy as np
 from experiments.errors import RecordError
 from experiments.record import records
 from experiments.record.columns import TRAJECTORY_COLUMNS, action_hashes
-from experiments.record.event_check import check_event
+from experiments.record.events import check_event
 from experiments.record.files import CHECKSUMS, read_checksums, read_json, sha256_of
 from experiments.record.metrics import CIRCUMSTANCES, measure
 from experiments.record.reader import Record, read_log
@@ -21,12 +21,12 @@ from mjsim.world.state import checkpoint_hash
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Something that differs from the record.
+    """A difference from the record.
 
     Attributes:
-        step: The first control step that it concerns.
-        message: What differs.
-        file: Name of the file that is not as recorded.
+        step: First control step concerned.
+        message: Description.
+        file: Name of the file that differs.
     """
 
     step: int
@@ -35,20 +35,20 @@ class Mismatch:
 
 
 def damage(record: Record) -> list[Mismatch]:
-    """Where a record contradicts its own lengths and hashes, in the order of the control steps."""
+    """List contradictions between a record and its own lengths and hashes, by control step."""
     checks = (_lengths, _actions, _log, _checkpoints, _lines, _settings)
     return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step)
 
 
 def derived_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
-    """Where plans and metrics on disk do not follow from a record that was verified."""
+    """Yield differences between the plans and metrics on disk and those that follow from a verified record."""
     plans = record.plans
     yield from _derived(directory, record, records.PLAN, lambda found: _plan_fault(found, plans))
     yield from _derived(directory, record, records.METRICS, lambda found: _metrics_fault(found, record))
 
 
 def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
-    """Files that are not those that were written with the run."""
+    """Yield files of a run that are missing, added or changed."""
     last = record.steps - 1
     try:
         sums = read_checksums(directory)
@@ -65,10 +65,10 @@ def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
 
 
 def check_log(directory: Path) -> None:
-    """Check that a log has the format of this version, and that every line is an event with the fields of its kind.
+    """Check the format of a log and the fields of all its events.
 
     Raises:
-        RecordError: It is not a run directory, or a line is no event.
+        RecordError: The folder is not a run directory, or an event is invalid.
         ReplayError: The log has the format of another version.
     """
     for number, line in enumerate(read_log(directory).splitlines(), start=1):
@@ -79,7 +79,6 @@ def check_log(directory: Path) -> None:
 
 
 def _lengths(record: Record) -> Iterator[Mismatch]:
-    """Arrays of another length than the states."""
     steps = record.steps
     lengths = {(records.TRAJECTORY, name): len(record.trajectory[name]) for name in TRAJECTORY_COLUMNS}
     lengths[records.RECORDING, "action_hash"] = len(record.recording["action_hash"])
@@ -92,7 +91,6 @@ def _lengths(record: Record) -> Iterator[Mismatch]:
 
 
 def _actions(record: Record) -> Iterator[Mismatch]:
-    """The first action that is not the recorded one."""
     hashes = record.recording["action_hash"][: record.steps]
     actions = record.trajectory["action"][: len(hashes)]
     bad = np.flatnonzero(action_hashes(actions) != hashes[: len(actions)])
@@ -102,7 +100,6 @@ def _actions(record: Record) -> Iterator[Mismatch]:
 
 
 def _log(record: Record) -> Iterator[Mismatch]:
-    """The first step whose part of the log is not what was written."""
     digest, end, log = hashlib.sha1(usedforsecurity=False), 0, record.log
     sizes, hashes = record.recording["log_size"].tolist(), record.recording["log_hash"].tolist()
     for step, (size, expected) in enumerate(zip(sizes, hashes, strict=False)):
@@ -112,7 +109,9 @@ def _log(record: Record) -> Iterator[Mismatch]:
             return
         digest.update(log[start:size])
         if size > len(log):
-            what = f"{records.EVENTS} is cut short: {len(log)} bytes, and more were written here"
+            what = (
+                f"{records.EVENTS} is truncated: it has {len(log)} bytes, but more were written by this step"
+            )
             yield Mismatch(at, what, records.EVENTS)
             return
         if int.from_bytes(digest.digest()[:8], "little") != expected:
@@ -126,7 +125,6 @@ def _log(record: Record) -> Iterator[Mismatch]:
 
 
 def _lines(record: Record) -> Iterator[Mismatch]:
-    """The first line that is not an event."""
     lines = zip(record.steps_of_events, record.log.splitlines(), strict=True)
     for number, (step, line) in enumerate(lines, start=1):
         try:
@@ -137,7 +135,6 @@ def _lines(record: Record) -> Iterator[Mismatch]:
 
 
 def _checkpoints(record: Record) -> Iterator[Mismatch]:
-    """Checkpoints that are missing, or not those that were recorded."""
     steps = record.checkpoint_steps
     physics, details, hashes = (
         record.recording[f"checkpoint_{part}"] for part in ("physics", "details", "hash")
@@ -155,7 +152,6 @@ def _checkpoints(record: Record) -> Iterator[Mismatch]:
 
 
 def _settings(record: Record) -> Iterator[Mismatch]:
-    """Whether the start event is about this episode."""
     start, names = record.start, record.names
     if hashlib.sha256(record.episode.to_json().encode()).hexdigest() != start["episode_sha256"]:
         yield Mismatch(0, f"{records.EPISODE} is not the episode that was run", records.EPISODE)
@@ -171,7 +167,7 @@ def _settings(record: Record) -> Iterator[Mismatch]:
 def _derived(
     directory: Path, record: Record, name: str, fault: Callable[[Any], str | None]
 ) -> Iterator[Mismatch]:
-    """Compare a JSON file with what it should hold; a missing file is for the checksums to tell."""
+    """Compare a JSON file with its expected content. Missing files are left to the checksums."""
     if not (directory / name).exists():
         return
     try:
@@ -193,7 +189,7 @@ def _metrics_fault(found: Any, record: Record) -> str | None:
     missing = [name for name in (*expected, *CIRCUMSTANCES) if name not in found]
     added = [name for name in found if name not in expected and name not in CIRCUMSTANCES]
     if missing or added:
-        return f"lacks {', '.join(missing)}" if missing else f"has {', '.join(added)}, which is no metric"
+        return f"lacks {', '.join(missing)}" if missing else f"has {', '.join(added)}, which is not a metric"
     for name, value in expected.items():
         if not _same(found[name], value):
             return f"has {name} = {found[name]!r}, log and trajectory give {value!r}"
@@ -201,5 +197,5 @@ def _metrics_fault(found: Any, record: Record) -> str | None:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Whether two values are the same JSON; 1, 1.0 and true are not."""
+    """Compare two values as JSON, where 1, 1.0 and true differ."""
     return json.dumps(one) == json.dumps(other)

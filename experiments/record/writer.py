@@ -1,17 +1,26 @@
-"""Writes the record of a session while it runs: control steps, events and checkpoints, appended only."""
+"""Writes the record of a running session, and the run directory of a finished one."""
 
 import dataclasses
 import json
+import shutil
+import tempfile
 from collections.abc import Collection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.errors import RecordError
+from experiments.record import records
 from experiments.record.columns import HEALTH, STATUSES, row_type, state_columns
-from experiments.record.journal import Checkpoint, Entry, Journal
+from experiments.record.files import save_arrays, write_checksums, write_json
+from experiments.record.journal import Checkpoint, Journal, JournalEntry
+from experiments.record.metrics import measure
 from experiments.record.reader import Record, assemble
 from experiments.record.records import EventLog
+from experiments.record.run_directory import free_name
+from mjsim.support.files import replacing
 from mjsim.values.actions import Move, Pick, StepAction
 from mjsim.values.episode import Episode
 from mjsim.values.observation import ObjectStatus, Observation, Steps
@@ -19,26 +28,26 @@ from mjsim.world.health.monitor import HealthSample
 from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
 from mjsim.world.world import World
 
-FIRST_CAPACITY = 4096  # rows; doubled when they are full
+FIRST_CAPACITY = 4096  # rows allocated at first; doubled when full
+NOTHING_FILMED = "none: nothing was filmed"  # recorded as the renderer of a run without a film
 
 
 class RecordWriter:
-    """The record of a session that is running.
+    """The record of a running session.
 
-    A session passes a checkpoint at the first control step at which the world is not busy, `CHECKPOINT_PERIOD` or more
-    after the last one. A replay passes them where the run did.
+    A session takes a checkpoint at the first control step at which the world is not busy, at least `CHECKPOINT_PERIOD`
+    after the previous one. A replay takes them at the steps of the original run.
 
     Args:
         episode: The disorganized house.
         log: The event log.
-        journal: Takes with each `commit` what is new; None to keep everything in memory.
-        checkpoints: Control steps at which to pass a checkpoint, or None for the rule above.
+        journal: Receives new data at each `commit`, or None to keep everything in memory.
+        checkpoints: Control steps at which to take a checkpoint, or None for the rule above.
 
     Attributes:
-        log: The event log.
         step: Number of the next control step.
-        time: Simulated time of the control step before it, s; 0 at the start.
-        checkpoints: States that were passed, by control step.
+        time: Simulated time of the previous control step, s.
+        checkpoints: New checkpoints, by control step.
     """
 
     def __init__(
@@ -61,7 +70,7 @@ class RecordWriter:
         self._status: tuple[tuple[ObjectStatus, ...], list[int]] = ((), [])
 
     def restore(self, record: Record, step: int) -> None:
-        """Continue before a control step of a record: with its log up to there, and without its rows."""
+        """Continue a record at a control step. Earlier events are kept in the log, earlier rows are not."""
         self.log.restore(record.events[: record.events_before(step)])
         self.step, self._length, self._committed = step, 0, self.log.entries
         self._last_checkpoint = max((k for k in record.checkpoint_steps if k <= step), default=0)
@@ -69,12 +78,12 @@ class RecordWriter:
         self.checkpoints.clear()
 
     def append(self, before: Observation, health: HealthSample, state_hash: int, steps: Steps) -> None:
-        """Add control steps, during which no hand picks up or releases anything.
+        """Add control steps during which no hand picks up or releases anything.
 
         Args:
-            before: State before the first of them.
-            health: The physics before the first of them.
-            state_hash: Hash of the state before the first of them.
+            before: State before the first step.
+            health: Health of the physics before the first step.
+            state_hash: Hash of the state before the first step.
             steps: The steps.
         """
         first, end = self._length, self._length + len(steps)
@@ -96,15 +105,18 @@ class RecordWriter:
             for name in ("hands", "object_status"):
                 columns[name][rest] = columns[name][first]
         self.time = float(columns["time"][end - 1])
-        self._length, self.step = end, self.step + len(steps)  # last: an interruption leaves whole rows
+        self._length, self.step = (
+            end,
+            self.step + len(steps),
+        )  # set last, so an interruption leaves only whole rows
 
     @property
     def last_state_hash(self) -> int:
-        """Hash of the state before the control step that was added last."""
+        """Hash of the state before the control step added last."""
         return int(self._columns["state_hash"][self._length - 1])
 
     def pass_checkpoint(self, world: World, now: Observation) -> Observation:
-        """Take the world's state and restore the world to it, if a checkpoint is due; the observation after that."""
+        """If a checkpoint is due, take it and restore the world from it. Return the resulting observation."""
         if not self._due(world, now.busy):
             return now
         state = self.checkpoints[self.step] = world.state()
@@ -112,14 +124,14 @@ class RecordWriter:
         return world.restore(state)
 
     def steps_to_checkpoint(self, world: World) -> int:
-        """Control steps that can be taken at once before the next checkpoint is due by the rule, 1 or more."""
+        """Return the number of control steps until the next checkpoint is due by the rule, at least 1."""
         return max(1, self._last_checkpoint + _period(world) - self.step)
 
     def commit(self, participant: Any = None) -> None:
-        """Append to the journal all that is new, and the state of the participant.
+        """Append all new data and the state of the participant to the journal.
 
         Raises:
-            OSError: It cannot be written.
+            OSError: The journal cannot be written.
         """
         if self._journal is None:
             return
@@ -129,16 +141,16 @@ class RecordWriter:
         ]
         events = self.log.events[self._committed :]
         rows = self._rows[: self._length]
-        rows["logged"] = self.log.event_counts[rows["logged"]]  # places left empty are not in the journal
+        rows["logged"] = self.log.event_counts[rows["logged"]]  # the journal has no empty lines of the log
         self._journal.append(
-            Entry(rows.tobytes(), list(map(json.dumps, events)), self._unknown, states, participant)
+            JournalEntry(rows.tobytes(), list(map(json.dumps, events)), self._unknown, states, participant)
         )
         self._committed += len(events)
         self._length = 0
         self.checkpoints.clear()
 
     def record(self) -> Record:
-        """The record so far, without what the journal holds."""
+        """Return the record so far, without data already in the journal."""
         return assemble(self._episode, self._rows[: self._length], self.log, self._unknown, self.checkpoints)
 
     def _due(self, world: World, busy: bool) -> bool:
@@ -177,9 +189,74 @@ def _period(world: World) -> int:
 
 
 def provenance(world: World) -> dict[str, Any]:
-    """Versions, compiled model and rules, on which a run depends as it does on its configuration; JSON-ready."""
+    """Return versions, compiled model and world options on which a run depends, JSON-ready."""
     return {
         "versions": engine_versions(),
         "model": model_fingerprint(world.scene.counterpart(visuals=False).model),
         "world": dataclasses.asdict(world.options),
     }
+
+
+def save_record(
+    folder: Path,
+    out: Path,
+    record: Record,
+    wall: float,
+    *,
+    frames_sha256: str | None = None,
+    renderer: str = NOTHING_FILMED,
+) -> dict[str, Any]:
+    """Write the record of a session and its metrics to a working folder. Return the metrics.
+
+    Args:
+        folder: Working folder, which becomes the run directory.
+        out: Path of the run directory.
+        record: The record.
+        wall: Wall time of the trial, s.
+        frames_sha256: Hash of the filmed frames, or None.
+        renderer: Renderer of these frames.
+
+    Raises:
+        RecordError: The folder cannot be written. The message says where the record was saved instead.
+        OSError: The folder cannot be written, but the session's journal still holds the record.
+    """
+    metrics = {
+        **measure(record.events, record.trajectory),
+        "frames_sha256": frames_sha256,
+        "renderer": renderer,
+        "wall_s": round(wall, 3),
+    }
+    try:
+        _write(folder, record, metrics)
+    except OSError as error:
+        if record.participant is not None:  # it was read from a journal, which still holds it
+            raise
+        shutil.rmtree(folder, ignore_errors=True)
+        metrics["frames_sha256"] = None
+        kept = _save_elsewhere(out, record, metrics)
+        raise RecordError(f"cannot write {out} ({error.strerror}); the run is kept in {kept}") from error
+    return metrics
+
+
+def _write(folder: Path, record: Record, metrics: dict[str, Any]) -> None:
+    record.episode.save(folder / records.EPISODE)
+    with replacing(folder / records.EVENTS) as path:
+        path.write_bytes(record.log)
+    # Sessions with people are long. Short trials of a batch are not worth the slower compression.
+    played = record.participant is not None
+    save_arrays(folder / records.TRAJECTORY, record.trajectory, small=played)
+    save_arrays(folder / records.RECORDING, record.recording, small=played)
+    write_json(folder / records.PLAN, record.plans)
+    write_json(folder / records.METRICS, metrics)  # marks the run directory as complete
+    write_checksums(folder, records.FILES)
+
+
+def _save_elsewhere(out: Path, record: Record, metrics: dict[str, Any]) -> Path:
+    kept = free_name(Path(tempfile.gettempdir()) / f"mjsim-{out.name}")
+    kept.mkdir()
+    try:
+        _write(kept, record, metrics)
+    except OSError:
+        shutil.rmtree(kept, ignore_errors=True)
+        raise
+    return kept

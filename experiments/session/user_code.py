@@ -17,8 +17,8 @@ from experiments.errors import (
     UserCodeError,
     definition,
     describe,
-    place,
     shown,
+    user_code_location,
 )
 from experiments.house import House
 from experiments.participants.base import Participant, Percept
@@ -57,9 +57,9 @@ def user_code(code: object, what: str) -> Iterator[None]:
     except PASSED_ON:
         raise
     except _Overdue as error:
-        raise UserCodeError(f"{what} {error}; --call-limit allows more{place(error)}") from error
+        raise UserCodeError(f"{what} {error}; --call-limit allows more{user_code_location(error)}") from error
     except BaseException as error:  # user code must not end the process and lose the run
-        raise UserCodeError(f"{what} raised {describe(error)}{place(error)}") from error
+        raise UserCodeError(f"{what} raised {describe(error)}{user_code_location(error)}") from error
 
 
 def _call_limit() -> float:

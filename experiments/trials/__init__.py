@@ -1,4 +1,1 @@
-"""Trials and batches of trials: their settings and designs, how they are run and resumed, and their tables.
-
-Serves `mjsim run` and `mjsim batch`, and studies, which are batches of simulated people.
-"""
+"""Trials and batches of trials: settings, designs, running and resuming them, and tables."""

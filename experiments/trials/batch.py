@@ -1,4 +1,4 @@
-"""Many trials on all cores. Each finished trial is a run directory, so a killed batch continues where it stopped."""
+"""Runs many trials on all cores. Each finished trial is stored, so a killed batch can be resumed."""
 
 import dataclasses
 import functools
@@ -20,9 +20,8 @@ from experiments.house import House
 from experiments.record.archive import WAIT_S, adopt, new_archive, pack
 from experiments.record.run_directory import TRIALS, check_batch_folder, is_run
 from experiments.session.signals import signals_postponed
-from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import StoredTrial, in_order, read_trial, trial_name, write_rows
-from experiments.trials.batch_plan import BatchPlan, plan_batch
+from experiments.trials.batch_plan import BatchPlan, check_trials, plan_batch
 from experiments.trials.design import Design, confounded
 from experiments.trials.fingerprint import plugins
 from experiments.trials.ray_workers import LostMachineError
@@ -35,18 +34,18 @@ from mjsim.house.compiled.house import MAX_HOUSES
 from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
-RETRIES = 5  # maximum number of machines that a trial loses before it is run alone
+RETRIES = 5  # how often a trial is repeated because its machine was lost, before it runs alone
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """Progress of a batch."""
+    """Numbers of trials done and failed in this call, and done by an earlier call, and the latest failure."""
 
-    done: int  # trials done in this call
-    resumed: int  # trials that an earlier call had done
-    failed: int  # trials that failed in this call
-    total: int  # trials of the design
-    failure: str | None = None  # what failed in the latest trial, or None
+    done: int
+    resumed: int
+    failed: int
+    total: int
+    failure: str | None = None
 
 
 def run_batch(
@@ -64,44 +63,43 @@ def run_batch(
     """Run every trial of the design that `out` does not hold yet, then write the tables.
 
     Args:
-        design: Which trials.
-        out: Folder of the batch; an earlier batch there is added to.
+        design: The trials.
+        out: Folder of the batch. An existing batch is extended.
         workers: Number of trials at a time (default: one per core of this machine or of the Ray cluster).
-        executor: Who runs them: `processes` of this machine, or a `ray` cluster whose machines share the folder.
+        executor: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         packed: Store the trials in archives, one per worker process, instead of run directories.
-        shard: Runs and reads only this share of the design, and writes no tables.
+        shard: Run and read only this share of the design, and write no tables.
         on_progress: Called at the start and after every trial.
-        on_note: Called with lines that a user should read: what is run again, what the tables leave out.
+        on_note: Called with lines for the user, such as what is run again and what the tables leave out.
         on_read: Called after each finished trial that is read, with the numbers of trials read and to be read.
 
     Returns:
-        A row for every trial of the folder, those of the design first, in the design's order; of a shard, only its own.
+        A row for every trial in the folder, those of the design first and in its order. With a shard, only its own.
 
     Raises:
-        ConfigError: `workers` is below 1, there is no such executor, or a machine of the cluster cannot be used.
+        ConfigError: An argument is invalid, or a machine of the cluster cannot be used.
         ConnectionError: The Ray cluster is lost.
-        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run; nothing was run.
+        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run. No trial was run.
         OSError: A table cannot be written.
     """
     if workers is not None and workers < 1:
         raise ConfigError(f"a batch needs at least one worker, got {workers}")
     if executor not in EXECUTORS:
         raise ConfigError(f"no executor {executor!r}; there are {', '.join(EXECUTORS)}")
-    said: set[str] = set()
+    noted: set[str] = set()
 
     def note(line: str) -> None:
-        """Say it once, of the design or of the folder."""
-        if line not in said:
-            said.add(line)
+        if line not in noted:
+            noted.add(line)
             on_note(line)
 
-    out = out.absolute() if executor == RAY else out  # other machines have other current folders
+    out = out.absolute() if executor == RAY else out  # machines have different current folders
     check_batch_folder(out)
     trials = design.trials if shard is None else shard.of(design).trials
     inputs = check_trials(trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     label = "" if shard is None else shard.label
-    adopt(out / TRIALS, label)  # of a batch that was killed
+    adopt(out / TRIALS, label)  # archives of a killed batch
     own = None if shard is None else {trial_name(*trial) for trial in zip(trials, inputs, strict=True)}
     readers = workers or os.cpu_count() or 1
     reader = TrialReader(out, workers=readers, on_read=on_read, names=own, label=label)
@@ -118,7 +116,7 @@ def run_batch(
             signals.save()
             remove_leftovers(out / TRIALS)
             if archives is not None and adopt(out / TRIALS, archives, WAIT_S):
-                note("a worker still writes to its archive; run the command again to read its trials")
+                note("a worker is still writing its archive; repeat the command to read its trials")
             found, unusable = reader.read()
             if shard is None:
                 rows = write_rows(trials, out, found, unusable, note)
@@ -153,14 +151,14 @@ def _run_missing(
 def _results(
     missing: Mapping[Path, TrialConfig], executor: ExecutorContext, archives: str | None
 ) -> Iterator[StoredTrial | str]:
-    """Yield each trial that succeeds, else what went wrong; those whose process may die go last and alone.
+    """Yield each trial that succeeds, or an error message. Trials whose process may die are run last, one by one.
 
-    Trials go house by house: making one takes longer than many a trial in it.
+    Trials are run house by house, because making a house takes longer than many a trial.
     """
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
-    # The work folder is removed in the end, with what killed processes left in it.
+    # The work folder is removed at the end, with the leftovers of killed processes.
     with work_folder(by_house[0][0].parent) as folder, executor(folder) as pools:
         run = functools.partial(_run, folder=folder, archives=archives)
         while left:
@@ -171,13 +169,13 @@ def _results(
             with pools() as pool:
                 yield from _together(pool, {path: config}, again, run)
             if again:
-                yield f"{path.name}: its process died: killed, out of memory, or ended by code of your own"
+                yield f"{path.name}: its process died: it was killed, out of memory, or ended by custom code"
             else:
                 _died(path).unlink(missing_ok=True)
 
 
 def _died(path: Path) -> Path:
-    """Is there if a process died while it ran this trial, perhaps of another one that ran beside."""
+    """Return the marker of a trial during which a process died, perhaps because of another trial."""
     return path.with_name(f".{path.name}.died")
 
 
@@ -187,23 +185,25 @@ def _together(
     alone: dict[Path, TrialConfig],
     run: Callable[[TrialConfig, Path], StoredTrial | str],
 ) -> Iterator[StoredTrial | str]:
-    """Run the trials that are left, a few at a time; when a process dies, those in progress are moved to `alone`."""
+    """Run the remaining trials, a few at a time. If a process dies, move the trials in progress to `alone`."""
     running: dict[Future[StoredTrial | str], tuple[Path, TrialConfig]] = {}
-    lost, whole = Counter[Path](), True
+    lost, usable = Counter[Path](), True
     while True:
-        while whole and left and len(running) < pool.room:
+        while usable and left and len(running) < pool.room:
             path, config = next(iter(left.items()))
             del left[path]
             try:
                 running[pool.submit(run, config, path)] = path, config
             except BrokenProcessPool:
-                left[path], whole = config, False
+                left[path], usable = config, False
         if not running:
             return
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
             (path, config), error = running.pop(future), future.exception()
-            if isinstance(error, ConfigError | ConnectionError):  # of the cluster; those of trials are texts
+            if isinstance(
+                error, ConfigError | ConnectionError
+            ):  # of the cluster; errors of trials are strings
                 raise error
             if isinstance(error, LostMachineError) and lost[path] < RETRIES:
                 lost[path], left[path] = lost[path] + 1, config
@@ -214,28 +214,28 @@ def _together(
                 continue
             result = future.result() if error is None else _failure(error)
             if not isinstance(result, str) and result.stamp != UNSTAMPED and not path.exists():
-                result = "its run directory is not here; all machines must share the folder of the batch"
+                result = "its run directory is missing; all machines must share the folder of the batch"
             yield f"{path.name}: {result}" if isinstance(result, str) else result
 
 
 @functools.lru_cache(MAX_HOUSES)
 def _house(name: str) -> House:
-    """A few are kept per process; the garbage collector need not look at them, or at what was imported, again."""
+    """Load a house and cache a few per process. Freezing it speeds up garbage collection."""
     house = House.load(name)
     gc.freeze()
     return house
 
 
-_archive = functools.cache(new_archive)  # of this process, open until the process ends
+_archive = functools.cache(new_archive)  # one per process, open until the process ends
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
-    """Run a trial and read it back. Return an error as text, because not every exception can be pickled.
+    """Run a trial and read it. Return an error as text, because not every exception can be pickled.
 
-    The trial is made in the work folder of the batch. With `archives`, the prefix of their names, it is packed.
+    The trial runs in the work folder of the batch. With `archives`, the prefix of their names, it is packed.
     """
-    with nullcontext(out.parent) if archives is None else work_folder(folder) as place:
-        run = place / out.name
+    with nullcontext(out.parent) if archives is None else work_folder(folder) as parent:
+        run = parent / out.name
         try:
             try:
                 house = _house(config.house)

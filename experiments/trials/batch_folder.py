@@ -1,10 +1,8 @@
-"""The folder of a batch: which trials it holds, how they were made, and what they say.
+"""The folder of a batch.
 
-OUT/trials/NAME      one run directory per trial
-OUT/trials/ARCHIVE.sqlar    packed trials, many in one file
-OUT/outdated/NAME    trials that were run again because something that they depend on has changed
-OUT/trials.parquet, OUT/trials.csv    one row per trial
-OUT/.rows.jsonl.gz   rows that were read (`trial_reader`)
+OUT/trials/NAME      one run directory per trial OUT/trials/ARCHIVE.sqlar    packed trials, many in one file
+OUT/outdated/NAME    trials that were run again because something that they depend on has changed OUT/trials.parquet,
+OUT/trials.csv    one row per trial OUT/.rows.jsonl.gz   cache of rows (`trial_reader`)
 """
 
 import functools
@@ -33,28 +31,35 @@ from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConf
 from mjsim.house.catalogue.house_ref import parse_house
 
 OUTDATED = "outdated"
-MAX_NAME = 120  # characters, without seeds and hash
+MAX_NAME = 120  # longest name of a trial without seeds and hash, in characters
 _SETTINGS = frozenset(SETTINGS)
 CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
 
-# Size in bytes and modification time in ns of each file that `read_trial` reads; None for a file that is missing.
+# Size in bytes and modification time in ns of each file that `read_trial` reads, or None for a missing file
 Stamp = tuple[tuple[int, int] | None, ...]
 
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """A trial of a batch."""
+    """A trial of a batch.
 
-    path: Path  # its run directory, also if it is packed
-    settings: Mapping[str, Any]  # fields of its configuration by name
-    inputs: Inputs  # what else it depended on
-    row: Mapping[str, Any]  # what its log and trajectory say, as in `metrics.json`
-    as_measured: bool  # whether `metrics.json` says the same
-    stamp: Stamp  # of its files before they were read
+    Attributes:
+        path: Its run directory, even if it is packed.
+        row: Its row of the tables, computed from log and trajectory.
+        as_measured: True if `metrics.json` agrees with the row.
+        stamp: Stamp of its files before they were read.
+    """
+
+    path: Path
+    settings: Mapping[str, Any]
+    inputs: Inputs
+    row: Mapping[str, Any]
+    as_measured: bool
+    stamp: Stamp
 
     @property
     def complete(self) -> bool:
-        """Whether it was run to its end; one that failed or was interrupted is run again."""
+        """False for trials that failed or were interrupted, which are run again."""
         return self.row["ended"] in COMPLETE
 
     @functools.cached_property
@@ -62,17 +67,17 @@ class StoredTrial:
         return trial_key(self.settings)
 
     def is_in(self, house: str, inputs: Inputs) -> bool:
-        """True if it took place in that house, or in a house of the same content."""
+        """Return True if the trial took place in that house, or in one with the same content."""
         return self.inputs["house"] == inputs["house"] or self.settings["house"] == house
 
 
 def trial_key(settings: Mapping[str, Any]) -> str:
-    """Equal for equal configurations, wherever the files of the house are."""
+    """Return a key that is equal for equal configurations, wherever the files of the house are."""
     return json.dumps({name: settings[name] for name in sorted(settings) if name != "house"})
 
 
 def read_trial(path: Path) -> StoredTrial:
-    """Read a trial of a batch; what it says is worked out anew from its log and trajectory."""
+    """Read a trial. Its row is computed from log and trajectory."""
     stamp = stamp_of(path)
     sums = read_checksums(path)
     for name in CHECKED:
@@ -83,23 +88,23 @@ def read_trial(path: Path) -> StoredTrial:
         raise RecordError(f"{path} was made by another version of mjsim")
     arrays = read_arrays(path / records.TRAJECTORY, only=("time", "position", *HEALTH))
     row = measure(events, arrays)
-    told = _metrics(path)
-    as_measured = all(told.get(name) == value for name, value in json.loads(json.dumps(row)).items())
-    row |= {name: told.get(name) for name in CIRCUMSTANCES}
+    written = _metrics(path)
+    as_measured = all(written.get(name) == value for name, value in json.loads(json.dumps(row)).items())
+    row |= {name: written.get(name) for name in CIRCUMSTANCES}
     settings = {name: start[name] for name in _SETTINGS}
     return StoredTrial(path, settings, start["inputs"], row, as_measured, stamp)
 
 
 def _metrics(path: Path) -> Mapping[str, Any]:
     try:
-        told = read_json(path / records.METRICS)
+        written = read_json(path / records.METRICS)
     except RecordError:
         return {}
-    return told if isinstance(told, dict) else {}
+    return written if isinstance(written, dict) else {}
 
 
 def stamp_of(path: Path) -> Stamp:
-    """Equal as long as no file that `read_trial` reads has changed, or the archive of a packed trial."""
+    """Return a stamp that changes with any file that `read_trial` reads, or with the archive of a packed trial."""
     if path.parent.suffix == PACKED:
         return (_file_stamp(str(path.parent)),)
     return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *CHECKED))
@@ -114,7 +119,7 @@ def _file_stamp(path: str) -> tuple[int, int] | None:
 
 
 def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
-    """Move trials to the outdated ones of their batch; nothing there is replaced."""
+    """Move trials to the `outdated` folder of their batch, without replacing earlier ones."""
     if names:
         (out / OUTDATED).mkdir(exist_ok=True)
         discard(out / TRIALS, names, out / OUTDATED, prefix)
@@ -124,15 +129,15 @@ def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
 
 
 def trial_name(config: TrialConfig, inputs: Inputs) -> str:
-    """Folder name of a trial: readable, and unlike that of any other configuration or house."""
-    own_house = parse_house(config.house).kind == "folder"
-    house = Path(config.house).parent.name if own_house else config.house
+    """Return a readable folder name that is unique for each configuration and house."""
+    is_custom = parse_house(config.house).kind == "folder"
+    house = Path(config.house).parent.name if is_custom else config.house
     words = [house, f"{config.objects:02d}", config.assistance, config.user]
     words += [word for word in (config.planner, config.fidelity) if word not in (DEFAULTS["planner"], "full")]
     readable = re.sub(r"[^\w.+-]", ".", "-".join(words), flags=re.ASCII)[:MAX_NAME]
     seeds = [getattr(config, name) for name in SEEDS]
     numbers = f"{seeds[0]:04d}" if len(set(seeds)) == 1 else "-".join(f"{seed:04d}" for seed in seeds)
-    identity = trial_key(config.settings()) + (inputs["house"] if own_house else config.house)
+    identity = trial_key(config.settings()) + (inputs["house"] if is_custom else config.house)
     return f"{readable}-seed{numbers}-{hashlib.sha256(identity.encode()).hexdigest()[:8]}"
 
 
@@ -143,7 +148,7 @@ def write_rows(
     unusable: Mapping[Path, str],
     on_note: Callable[[str], None],
 ) -> list[Mapping[str, Any]]:
-    """Write the tables of the trials that were found in a folder. Return the rows, those of the design first."""
+    """Write the tables of the trials in a folder. Return the rows, those of the design first."""
     for note in folder_notes(found, unusable):
         on_note(note)
     rows = [trial.row for trial in in_order(trials, found)]
@@ -153,7 +158,7 @@ def write_rows(
 
 
 def in_order(trials: Sequence[TrialConfig], found: Sequence[StoredTrial]) -> list[StoredTrial]:
-    """The complete trials, those of the design first and in its order."""
+    """Return the complete trials, those of the design first and in its order."""
     order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
     complete = [trial for trial in found if trial.complete]
     return sorted(complete, key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
@@ -164,26 +169,26 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
-    """Lines on unexpected content or gaps of the tables."""
+    """Yield lines about unexpected content and gaps of the tables."""
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (
-            f"left out of the tables as it ended early: {counted(len(early), 'trial')}, such as {early[0].path.name} "
+            f"left out of the tables as they ended early: {counted(len(early), 'trial')}, such as {early[0].path.name} "
             f"({early[0].row['ended']})"
         )
     trials = [trial for trial in trials if trial.complete]
     edited = [trial.path.name for trial in trials if not trial.as_measured]
     if edited:
         yield (
-            f"metrics.json is not what the log says in {counted(len(edited), 'trial')}, such as {edited[0]}; "
-            "the tables hold what the logs say"
+            f"metrics.json differs from the log in {counted(len(edited), 'trial')}, such as {edited[0]}; "
+            "the tables follow the logs"
         )
     if unusable:
         yield f"left out of the tables: {counted(len(unusable), 'trial')}, such as: {next(iter(unusable.values()))}"
     makes = {json.dumps({k: v for k, v in t.inputs.items() if not _is_of_the_design(k)}) for t in trials}
     if len(makes) > 1:
         yield (
-            f"the tables hold trials of {len(makes)} versions of mjsim or its libraries (column fingerprint); "
+            f"the tables have trials of {len(makes)} versions of mjsim or its libraries (column fingerprint); "
             "run the whole design again to compare them"
         )
     if fault := confounded_rows([trial.row for trial in trials]):

@@ -1,28 +1,54 @@
-"""What a batch has to do: its design compared with what its folder holds."""
+"""The preparation of a batch: check that its trials can be run, and find those that its folder does not hold yet."""
 
+import dataclasses
+import functools
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec.structs import replace
+
+from experiments.errors import ConfigError
+from experiments.house import House
+from experiments.participants.registry import DEFAULT_PARTICIPANT, participant
 from experiments.record.archive import discard
+from experiments.record.records import EventLog
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch_folder import OUTDATED, StoredTrial, put_aside, trial_key, trial_name
 from experiments.trials.design import counted
-from experiments.trials.fingerprint import Inputs, changes
+from experiments.trials.fingerprint import Inputs, changes, trial_inputs
+from experiments.trials.setup import draw_behaviour, draw_person, prepare_session, trial_episode
 from experiments.trials.trial_config import TrialConfig
 from experiments.trials.trial_reader import TrialReader
+from hud.conditions import CONDITIONS, condition
+from mjsim.generator.home_cache import load_catalogue
+from mjsim.house.catalogue.catalogue import Catalogue
+from mjsim.house.catalogue.house_ref import parse_house
+from mjsim.house.compiled.house import MAX_HOUSES
+from mjsim.house.scene.scene import compose
+from mjsim.values.episode import POINTS, Episode
+from mjsim.values.errors import EpisodeError, PersonError
+from mjsim.values.person_parameters import PersonParameters
+from planner.solvers import solver
 
-SHOWN = 3  # names or reasons in a line
+MAX_REASONS = 3  # in a line
+Houses = Callable[[str], House]
 
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """What is there and what is to be run."""
+    """Finished and missing trials of a batch.
 
-    done: tuple[StoredTrial, ...]  # trials of the design that the folder holds, as they would come out now
-    missing: Mapping[Path, TrialConfig]  # folder and configuration of every other trial of the design
-    notes: tuple[str, ...]  # lines that say what is done again, and why
+    Attributes:
+        done: Trials of the design that the folder holds and that would come out the same now.
+        missing: Configuration of every other trial of the design, by run directory.
+        notes: Lines that say what is run again, and why.
+    """
+
+    done: tuple[StoredTrial, ...]
+    missing: Mapping[Path, TrialConfig]
+    notes: tuple[str, ...]
 
 
 def plan_batch(
@@ -32,9 +58,9 @@ def plan_batch(
     reader: TrialReader | None = None,
     prefix: str = "",
 ) -> BatchPlan:
-    """Compare a design with what a folder holds, and put aside what is out of date.
+    """Compare a design with the trials in a folder, and move outdated trials aside.
 
-    Of the archives, only those whose names begin with `prefix` are changed.
+    Only archives whose names begin with `prefix` are changed.
     """
     wanted = dict(zip(trials, inputs, strict=True))
     stored, unusable = (reader or TrialReader(out)).read()
@@ -71,5 +97,89 @@ def _why_again(trial: StoredTrial, inputs: Inputs) -> str:
 
 def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
     if reasons:
-        why = "; ".join(f"{reason} ({count})" for reason, count in reasons.most_common(SHOWN))
-        yield f"run again: {counted(reasons.total(), 'trial')}: {why}; what was complete is kept in {out / OUTDATED}"
+        why = "; ".join(f"{reason} ({count})" for reason, count in reasons.most_common(MAX_REASONS))
+        yield f"run again: {counted(reasons.total(), 'trial')}: {why}; complete trials are kept in {out / OUTDATED}"
+
+
+def check_names(trials: Sequence[TrialConfig]) -> None:
+    """Raise the error of the first trial with an unknown participant, assistance, planner or behaviour."""
+    for check, names in (
+        (participant, {trial.user for trial in trials}),
+        (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
+        (solver, {trial.planner for trial in trials}),
+    ):
+        for name in sorted(names):
+            check(name)
+    for trial in {(t.user, t.behaviour): t for t in trials}.values():
+        draw_behaviour(trial)
+
+
+def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
+    """Check that trials can be run, as far as possible in advance. Return the inputs of each."""
+    check_names(trials)
+    catalogue = functools.cache(load_catalogue)
+    house = functools.lru_cache(MAX_HOUSES)(House.load)
+    for trial in {(t.episode, t.house, t.objects): t for t in trials if t.episode is not None}.values():
+        _check_episode(trial, catalogue(trial.house))
+    for name, seed, points in dict.fromkeys(
+        (t.house, t.house_seed, t.points) for t in trials if _may_be_small(t)
+    ):
+        house(name).sample_points(seed=seed, points=points)
+    _check_people(trials, house)
+    for trial in {(t.house, t.user, t.assistance): t for t in reversed(trials)}.values():
+        if _may_not_fit(trial):
+            _begin(trial, house(trial.house))
+    return [trial_inputs(trial, catalogue(trial.house)) for trial in trials]
+
+
+def _may_be_small(trial: TrialConfig) -> bool:
+    """Return True for houses that may lack room for the points. Those of the package have room for the default."""
+    custom = parse_house(trial.house).kind != "shipped"
+    return trial.episode is None and (custom or trial.points > POINTS)
+
+
+def _check_episode(trial: TrialConfig, catalogue: Catalogue) -> None:
+    episode = Episode.load(Path(str(trial.episode)))
+    if len(episode.objects) != trial.objects:
+        raise ConfigError(f"objects is {trial.objects}, but {trial.episode} has {len(episode.objects)}")
+    try:
+        compose(episode, catalogue)
+    except EpisodeError as error:
+        raise EpisodeError(f"{trial.episode}: {error}") from error
+
+
+def _check_people(trials: Iterable[TrialConfig], house: Houses) -> None:
+    usual = PersonParameters()
+    people: dict[str, dict[tuple[float, float], PersonParameters]] = {}
+    for trial in trials:
+        person = draw_person(trial)
+        people.setdefault(trial.house, {})[person.body_radius, person.reach] = person
+    for name, sizes in people.items():
+        sizes.pop((usual.body_radius, usual.reach), None)
+        if sizes:
+            _check_sizes(house(name), sizes)
+
+
+def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters]) -> None:
+    """Check a person with the widest body and the shortest reach first. If that person fits, everyone does."""
+    radii, reaches = zip(*sizes, strict=True)
+    try:
+        house.for_person(dataclasses.replace(PersonParameters(), body_radius=max(radii), reach=min(reaches)))
+    except (ConfigError, PersonError):
+        for person in sizes.values():
+            house.for_person(person)
+
+
+def _may_not_fit(trial: TrialConfig) -> bool:
+    """Return True unless the default participant meets a condition of this package, which always works."""
+    return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in CONDITIONS
+
+
+def _begin(trial: TrialConfig, house: House) -> None:
+    """Begin a trial with a single object, so that participant and condition interact once."""
+    small = replace(trial, objects=1, episode=None, live=False)
+    person = draw_person(small)
+    house = house.for_person(person)
+    scene = compose(trial_episode(small, house), house.catalogue, person=person)
+    session, _ = prepare_session(small, house, scene, EventLog())
+    session.begin()

@@ -1,4 +1,4 @@
-"""Which trials a batch consists of: a full factorial of options, or the cells of a TOML file (docs/batches.md)."""
+"""The trials of a batch: a full factorial of options, or the cells of a TOML file (docs/batches.md)."""
 
 import itertools
 import math
@@ -31,14 +31,14 @@ MAX_NUMBERS = 1_000_000
 
 @dataclass(frozen=True)
 class Design:
-    """The trials of a batch, in order.
+    """The trials of a batch, in order, and the exclusions of its file, if any.
 
     Raises:
-        ConfigError: There are none, or one is there twice.
+        ConfigError: There are no trials, or the same trial occurs twice.
     """
 
     trials: tuple[TrialConfig, ...]
-    exclusions: Exclusions | None = None  # who will be left out of the analysis, where the file says it
+    exclusions: Exclusions | None = None
 
     def __post_init__(self) -> None:
         if not self.trials:
@@ -60,12 +60,12 @@ def factorial(
     seeds: Sequence[int],
     **same: Any,
 ) -> Design:
-    """Every combination; the seed changes fastest. All trials have the `same` other fields of `TrialConfig`."""
+    """Combine all values, with the seed changing fastest. All trials have the `same` other fields of `TrialConfig`."""
     for name, values in (("objects", objects), ("assistance", assistance), ("user", users), ("seeds", seeds)):
         if not values:
             raise ConfigError(f"a batch needs at least one value for --{name}")
         if len(set(values)) != len(values):
-            raise ConfigError(f"--{name} names a value twice: {list(values)[:20]}")
+            raise ConfigError(f"--{name} has a value twice: {list(values)[:20]}")
     combinations = itertools.product(objects, assistance, users, seeds)
     return Design(
         tuple(
@@ -75,27 +75,23 @@ def factorial(
     )
 
 
-_Seeds = int | list[int] | str | None  # one, several, or a range such as "0:10"
+_Seeds = int | list[int] | str | None  # a seed, several, or a range such as "0:10"
 
 
 class _People(msgspec.Struct, forbid_unknown_fields=True):
-    """The people of a cell."""
-
     people: Annotated[int, msgspec.Meta(ge=1)] | None = None
     seeds: _Seeds = None
     house_seeds: _Seeds = None
     person_seeds: _Seeds = None
     order_seeds: _Seeds = None
     trials_per_person: Annotated[int, msgspec.Meta(ge=1)] = 1
-    houses: str | list[str] | None = (
-        None  # names, or seeds of generated ones such as "generated:0:200?rooms=5"
-    )
+    houses: str | list[str] | None = None  # names, or generated homes such as "generated:0:200?rooms=5"
 
     def each(self) -> list[dict[str, Any]]:
-        """The three seeds of every trial, and the house; lists are gone through again for more people.
+        """Return seeds and house of every trial. Short lists are repeated.
 
-        Further trials of a person are in houses, or with house seeds, that lie evenly further on in these lists: a home
-        that comes first for one person comes second for another.
+        Further trials of a person take houses, or house seeds, at even distances in these lists, so that a house that
+        comes first for one person comes second for another.
         """
         lists: dict[str, list[Any]] = {
             name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
@@ -107,7 +103,7 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
         longest = max((math.ceil(len(seeds) / shared[name]) for name, seeds in lists.items()), default=0)
         people = longest if self.people is None else self.people
         if people == 0:
-            raise ConfigError("people must be given, or seeds for each of them")
+            raise ConfigError("people or seeds are missing")
         if people < longest or people > MAX_NUMBERS:
             raise ConfigError(f"people is {people}, but there are seeds for {longest}")
         everyone = lists.pop("seeds", list(range(people)))
@@ -116,9 +112,7 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
             by_name["house"] = lists["houses"]
         places = {name: by_name[name] for name in ("house", "house_seed") if name in by_name}
         if trials > max(map(len, places.values())):
-            raise ConfigError(
-                f"trials_per_person is {trials}; give each of them a house or a house seed of its own"
-            )
+            raise ConfigError(f"trials_per_person is {trials}; give each trial its own house or house seed")
         steps = {name: len(places[name]) // trials if name in places else 0 for name in by_name}
         return [
             {name: v[(k + steps[name] * trial) % len(v)] for name, v in by_name.items()}
@@ -132,21 +126,21 @@ _SEEDS = ("seeds", *(f"{name}s" for name in SEEDS))
 _IN_A_CELL = {*SETTINGS, "people", "houses", "trials_per_person", *_SEEDS} - {"live", "trial_number", *SEEDS}
 
 
-class _File(msgspec.Struct, forbid_unknown_fields=True):
+class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
     cells: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1)]
     all_cells: dict[str, Any] = msgspec.field(default_factory=dict)
     exclusions: Exclusions | None = None
-    study: dict[str, Any] = msgspec.field(default_factory=dict)  # with people: `experiments.study.file`
+    study: dict[str, Any] = msgspec.field(default_factory=dict)  # read by `experiments.study.file`
 
 
 def read_design(path: Path) -> Design:
-    """Read a design from a TOML file; a ConfigError names the file and a value that is unusable."""
+    """Read a design from a TOML file. Raises a `ConfigError` if the file is not a valid design."""
     trials: list[TrialConfig] = []
     reached = None
     content = _content(path, "design")
     try:
-        file = msgspec.convert(content, _File)
-        for reached, cell in enumerate(file.cells):  # noqa: B007 - for errors
+        file = msgspec.convert(content, _DesignFile)
+        for reached, cell in enumerate(file.cells):  # noqa: B007 - for error messages
             trials += _cell_trials({**file.all_cells, **cell}, path.parent)
         reached = None
         return Design(tuple(trials), file.exclusions)
@@ -155,7 +149,11 @@ def read_design(path: Path) -> Design:
 
 
 def read_exclusions(path: Path) -> Exclusions:
-    """Read who is left out: a TOML file of rules and people, or the `exclusions` of a design; errors name the file."""
+    """Read exclusions from a TOML file of rules and people, or from the table [exclusions] of a design.
+
+    Raises:
+        ConfigError: The file has no valid exclusions.
+    """
     content = _content(path, "rules")
     if "cells" in content:
         found = read_design(path).exclusions
@@ -165,7 +163,7 @@ def read_exclusions(path: Path) -> Exclusions:
     try:
         return msgspec.convert(content, Exclusions)
     except msgspec.ValidationError as error:
-        raise ConfigError(f"{path}: {error}; docs/analysis.md says how rules are written") from error
+        raise ConfigError(f"{path}: {error}; docs/analysis.md describes the rules") from error
 
 
 def _content(path: Path, what: str) -> dict[str, Any]:
@@ -178,7 +176,6 @@ def _content(path: Path, what: str) -> dict[str, Any]:
 
 
 def _located(message: str, cell: int | None) -> str:
-    """A message that says which cell it is about."""
     if cell is None:
         return message
     place = f"`$.cells[{cell}]"
@@ -186,9 +183,9 @@ def _located(message: str, cell: int | None) -> str:
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
-    """The trials of one cell; paths are relative to `folder`."""
+    """Return the trials of a cell. Paths are relative to `folder`."""
     if unknown := sorted(set(values) - _IN_A_CELL):
-        raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists what a design may hold")
+        raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists the fields of a design")
     settings = {name: value for name, value in values.items() if name in SETTINGS}
     people = msgspec.convert({n: v for n, v in values.items() if n not in SETTINGS}, _People).each()
     for seeds in people if "houses" in values else ():
@@ -199,7 +196,7 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
     if isinstance(settings.get("phases"), list):
         settings["phases"] = ",".join(map(str, settings["phases"]))
     if "houses" in values and ("house" in settings or "episode" in settings):
-        raise ConfigError("houses says in which houses the trials are; leave out house and episode")
+        raise ConfigError("houses sets the houses of the trials; leave out house and episode")
     if "episode" in settings:
         if "objects" in settings or "house_seeds" in values:
             raise ConfigError(
@@ -211,19 +208,19 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
 
 
 def house_names(houses: str | list[str]) -> list[str]:
-    """Names of houses: one, several, or generated ones of a range of seeds, as in `generated:0:200?split=test`."""
+    """Return names of houses. `generated:0:200?split=test` stands for a range of generated homes."""
     if isinstance(houses, list):
         return [name for entry in houses for name in house_names(entry)]
     return generated_names(houses) if is_generated(houses) else [houses]
 
 
 def numbers(text: int | list[int] | str) -> list[int]:
-    """Whole numbers: one, several, or as in `6,12` and `0:10` (the end not included), also mixed."""
+    """Parse whole numbers: one, a list, a text such as `6,12` or `0:10` (which excludes 10), or a mix of both."""
     if isinstance(text, int):
         text = [text]
     if isinstance(text, list):
         if not text or min(text) < 0:
-            raise ConfigError(f"{text} must name at least one number, none of them negative")
+            raise ConfigError(f"{text} must have at least one number, and none below 0")
         return text
     values: list[int] = []
     for part in text.split(","):
@@ -233,25 +230,24 @@ def numbers(text: int | list[int] | str) -> list[int]:
         first = int(found[1])
         end = first + 1 if found[2] is None else int(found[2])
         if len(values) + end - first > MAX_NUMBERS:
-            raise ConfigError(f"{text!r} names more than {MAX_NUMBERS} numbers")
+            raise ConfigError(f"{text!r} has more than {MAX_NUMBERS} numbers")
         values.extend(range(first, end))
     if not values:
-        raise ConfigError(f"{text!r} names no number; a range's end is not included")
+        raise ConfigError(f"{text!r} has no numbers; a range excludes its end")
     return values
 
 
 def counted(number: int, noun: str) -> str:
-    """`1 trial`, `2 trials`."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def confounded(trials: Sequence[TrialConfig]) -> str | None:
-    """One line on what differs between the assistance conditions besides the assistance; None if nothing does."""
+    """Describe differences between the assistance conditions other than the assistance, or return None."""
     return confounded_rows([trial.settings() for trial in trials])
 
 
 def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
-    """As `confounded`, of rows of a table."""
+    """Compare the assistance conditions like `confounded`, for rows of a table."""
     faults = []
     for name in CONFOUNDERS:
         values: dict[str, set[str]] = {}

@@ -1,4 +1,4 @@
-"""Who is left out of a study and why: rules over the columns of its table, and people by name (docs/analysis.md)."""
+"""Exclusions from a study: rules over the columns of its table, and people by id (docs/analysis.md)."""
 
 import difflib
 import math
@@ -16,12 +16,12 @@ Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
 Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*\Z")]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
-IDS = ("participant", "fingerprint", "person_seed")  # columns that name a person, the best first
+IDS = ("participant", "fingerprint", "person_seed")  # columns that identify a person, the best first
 BY_NAME = "people by name"
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """People are left out whose value in a column compares so; a missing value is only ever `missing`."""
+    """A rule that excludes rows by the value of a column. Missing values match only the comparison `missing`."""
 
     column: Name
     comparison: Comparison
@@ -34,7 +34,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"{self.comparison!r} takes {'a' if takes_value else 'no'} `value`")
         if isinstance(self.value, float) and not math.isfinite(self.value):
             raise ValueError(
-                f"`value` is {self.value}; for that, write comparison = 'infinite' or 'missing', and no value"
+                f"`value` is {self.value}; write comparison = 'infinite' or 'missing' without a value instead"
             )
         if isinstance(self.value, str | bool) and self.comparison not in ("==", "!="):
             raise ValueError(f"{self.value!r} has no order; compare it by '==' or '!='")
@@ -44,7 +44,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.column} {self.comparison}{given}"
 
     def holds(self, row: Row) -> bool:
-        """Whether a row is left out; a TypeError where its value cannot be compared."""
+        """Return True if a row is excluded. Raises a `TypeError` if the value of the row cannot be compared."""
         found = row.get(self.column)
         unknown = found is None or (isinstance(found, float) and math.isnan(found))
         if unknown or self.comparison == "missing":
@@ -67,44 +67,48 @@ _COMPARED: Mapping[str, Any] = {
 UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
-class Person(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person left out by id, and the reason."""
+class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A person excluded by id, and the reason."""
 
-    id: Name | int  # in one of the columns `IDS`
+    id: Name | int  # value in one of the columns `IDS`
     reason: Reason
 
 
 class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Rules and people; those who did not finish are left out as well unless they are kept."""
+    """Rules and people. Unfinished people are excluded as well unless `unfinished` is `keep`."""
 
     rules: tuple[Rule, ...] = ()
-    people: tuple[Person, ...] = ()
+    people: tuple[ExcludedPerson, ...] = ()
     unfinished: Literal["leave out", "keep"] = "leave out"
 
     def __post_init__(self) -> None:
         rules, people = [str(rule) for rule in self.rules], [str(person.id) for person in self.people]
         for what, names in (("rule", rules), ("person", people)):
             if twice := next((name for name in names if names.count(name) > 1), None):
-                raise ValueError(f"the {what} {twice} is there twice; leave one out")
+                raise ValueError(f"the {what} {twice} occurs twice; leave one out")
 
     def all_rules(self) -> tuple[Rule, ...]:
-        """The rules, and the one on those who did not finish."""
+        """Return the rules, including the one for unfinished people."""
         implied = self.unfinished == "leave out" and str(UNFINISHED) not in map(str, self.rules)
         return (*self.rules, *([UNFINISHED] if implied else []))
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A person who is left out."""
+    """An excluded person, with the rules that exclude the person and their reasons."""
 
     person: str
     assistance: str
     objects: int
-    rules: Mapping[str, str]  # each that leaves them out, with its reason
+    rules: Mapping[str, str]
 
 
 def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[int, LeftOut]:
-    """Those who are left out of a table, by row; a RecordError names a rule or a person that does not fit it."""
+    """Return the excluded people of a table by row number.
+
+    Raises:
+        RecordError: A rule or a person does not fit the table.
+    """
     found: dict[int, dict[str, str]] = {}
     for number, rule in enumerate(exclusions.all_rules(), start=1):
         if rule is UNFINISHED and not any(rule.column in row for row in rows):
@@ -125,7 +129,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
         theirs = next(filter(None, by_column), None)
         if theirs is None:
             raise RecordError(
-                f"{path}: there is no person {person.id!r} to leave out; names are in {', '.join(IDS)}, such as "
+                f"{path}: no person {person.id!r} to leave out; ids are in {', '.join(IDS)}, such as "
                 f"{person_name(rows[0], 0)!r}"
             )
         for k in theirs:
@@ -137,7 +141,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 
 def person_name(row: Row, number: int) -> str:
-    """The name of a person: their id, or the number of their row where they have none."""
+    """Return the id of a person, or the number of their row if they have none."""
     return str(next((row[name] for name in IDS if row.get(name) is not None), f"row {number}"))
 
 

@@ -1,6 +1,6 @@
-"""What a trial depends on besides its settings: files, source code and libraries, each by a hash or a version.
+"""Everything that a trial depends on besides its settings: files, source code and libraries, by hash or version.
 
-A batch that is resumed compares it with what is there now, and runs again what has changed.
+A resumed batch compares them with the present ones, and runs trials again if something has changed.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
-# Code on which the record of a trial depends; what only looks at records is not here.
+# Code on which the record of a trial depends. Code that only reads records is not included.
 CODE = (
     "hud",
     "planner",
@@ -33,7 +33,7 @@ Inputs = Mapping[str, str]
 
 
 def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
-    """Hash or version by what it is of; equal configurations with equal inputs give equal records."""
+    """Return hashes and versions by name. Equal configurations with equal inputs give equal records."""
     inputs = {"house": catalogue.content, **code_versions()}
     if config.episode is not None:
         inputs["episode"] = hashlib.sha256(read_bytes(Path(config.episode))).hexdigest()
@@ -44,24 +44,23 @@ def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
 
 
 def code_versions(modules: Iterable[str] = ()) -> dict[str, str]:
-    """Hash or version of all code that affects trials: this package, its libraries, and these user modules."""
+    """Return hashes and versions of all code that affects trials: this package, libraries, and these user modules."""
     user_code = {f"module {name}": plugin_digest(name) for name in modules}
     return {"code of mjsim": source_digest(*CODE), **_libraries(), **user_code}
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:
-    """16 hex digits over a trial's settings and inputs: the content of its files counts, their paths do not."""
+    """Return 16 hex digits over a trial's settings and inputs. Paths of files do not count, but their content does."""
     settings = {name: value for name, value in config.settings().items() if name not in PATHS}
     return hashlib.sha256(json.dumps([settings, sorted(inputs.items())]).encode()).hexdigest()[:16]
 
 
 def changes(before: Inputs, now: Inputs) -> list[str]:
-    """Names of the inputs that differ."""
     return [name for name in dict.fromkeys([*now, *before]) if before.get(name) != now.get(name)]
 
 
 def plugins(config: TrialConfig) -> tuple[str, ...]:
-    """Names of the modules outside this package that the participant, condition and planner come from."""
+    """Return the modules outside this package that define the participant, conditions and planner."""
     conditions = (config.assistance, config.training_assistance)
     named = (config.user, config.planner, *(name.partition("-")[0] for name in conditions))
     modules = {module for module, colon, _ in (name.partition(":") for name in named) if colon}
@@ -71,12 +70,12 @@ def plugins(config: TrialConfig) -> tuple[str, ...]:
 
 @functools.cache
 def plugin_digest(module: str) -> str:
-    """16 hex digits over the source of a module: its file, or all of the package that it is in."""
+    """Return 16 hex digits over the source of a module: its file, or the whole top-level package."""
     spec = importlib.util.find_spec(module.partition(".")[0])
     if spec is None:
         return ""
-    places = spec.submodule_search_locations or ([spec.origin] if spec.origin else [])
-    return digest_of(*map(Path, places))
+    paths = spec.submodule_search_locations or ([spec.origin] if spec.origin else [])
+    return digest_of(*map(Path, paths))
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Floor plan of a trial: rooms, objects, receptacles, the planned and the walked path. Drawn with OpenCV."""
+"""Draws the floor plan of a trial: rooms, objects, receptacles, the planned and the walked path."""
 
 import contextlib
 import functools
@@ -22,16 +22,16 @@ from mjsim.support.kernels import cache_base
 from mjsim.values.episode import Episode
 from mjsim.values.observation import Observation
 
-# Okabe-Ito colours, distinct for all common kinds of colour vision.
+# Okabe-Ito colours, distinct for all common kinds of colour vision
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
-PIXELS_PER_METRE = 90  # of a house of usual size
-MAX_SIDE = 1920  # of the picture of the house, px; larger houses are drawn at a smaller scale
-MARGIN, ROW, COLUMN = 28, 24, 240  # px: frame around the house, a line and a column of the legend
-DASH, PERIOD = 8, 15  # px of a dashed line
-_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # px: a line in the legend
-_SHIFT = 4  # OpenCV draws at sixteenths of a pixel
+PIXELS_PER_METRE = 90  # scale, unless the house is large
+MAX_SIDE = 1920  # longest side of the picture of the house, px
+MARGIN, ROW, COLUMN = 28, 24, 240  # frame around the house, line and column of the legend, px
+DASH, PERIOD = 8, 15  # of a dashed line, px
+_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # a line in the legend, px
+_SHIFT = 4  # fractional bits of coordinates in OpenCV
 
 _Points = NDArray[np.float64]
 
@@ -39,15 +39,15 @@ _Points = NDArray[np.float64]
 def draw_topdown(
     path: Path, house: House, episode: Episode, plan: Event, walked: _Points, origin: str
 ) -> None:
-    """Write a PNG of the house with the plan at the start and the path walked.
+    """Write a PNG of the house with the first plan and the walked path.
 
     Args:
         path: PNG file to write.
         house: The house.
-        episode: What lay where at the start.
+        episode: The episode.
         plan: The first `plan` event of the log.
         walked: Positions of the person, m, shape (T, 2).
-        origin: Whether the participant is simulated (`experiments.record.phases`).
+        origin: Origin of the run, such as `Simulated`.
     """
     planned = planned_path(house, episode, plan)
     lines = {
@@ -63,7 +63,7 @@ def draw_topdown(
 def task_picture(
     house: House, episode: Episode, title: str, planned: _Points | None = None
 ) -> NDArray[np.uint8]:
-    """What lies where at the start of a task, and the way to tidy it, m, shape (k, 2): RGB, (height, width, 3)."""
+    """Draw the start of a task and the planned path (k, 2), m. Return RGB, shape (height, width, 3)."""
     lines = {} if planned is None else {f"shortest way, {_length(planned):.1f} m": (planned, PLANNED)}
     drawing = _drawn_task(house, episode, lines, np.array([episode.start.x, episode.start.y]))
     drawing.text(title, np.array([drawing.width / 2, MARGIN / 2]), Face(17, 700), BLACK)
@@ -73,7 +73,7 @@ def task_picture(
 def _drawn_task(
     house: House, episode: Episode, lines: Mapping[str, tuple[_Points, str]], start: _Points
 ) -> "_Drawing":
-    """Ways (planned ones dashed) by what the legend says of them, the start, objects, receptacles, rooms, a legend."""
+    """Draw all but the title. `lines` has paths and colours by their text in the legend; planned ones are dashed."""
     drawing = _Drawing(house)
     for points, colour in lines.values():
         drawing.line(points, colour, dashed=colour == PLANNED)
@@ -96,7 +96,7 @@ def _drawn_task(
 
 
 def planned_path(house: House, episode: Episode, plan: Event, seen: Observation | None = None) -> _Points:
-    """Floor points of the tour of a `plan` event made at `seen`, or else at the start; m, shape (k, 2)."""
+    """Return the path (k, 2), m, of a `plan` event made for the observation `seen`, or else for the start."""
     if seen is None:
         places = {o.name: np.array(o.position[:2]) for o in episode.objects}
         here = np.array([episode.start.x, episode.start.y])
@@ -114,7 +114,7 @@ def planned_path(house: House, episode: Episode, plan: Event, seen: Observation 
 
 
 class _Drawing:
-    """The house from above with a frame around it, RGB, and room for a legend below."""
+    """The house from above, RGB, with a frame around it and space for a legend below."""
 
     def __init__(self, house: House) -> None:
         x_min, y_min, x_max, y_max = house.bounds
@@ -129,16 +129,15 @@ class _Drawing:
 
     @property
     def width(self) -> int:
-        """Of the image, px."""
         return int(self.image.shape[1])
 
     def pixels(self, points: _Points) -> _Points:
-        """Points of the house, m, shape (k, 2 or more), as columns and rows, shape (k, 2)."""
+        """Convert points of the house, m, shape (k, 2 or more), to columns and rows, shape (k, 2)."""
         scale = np.array([self._scale, -self._scale])
         return np.asarray((np.atleast_2d(points)[:, :2] - self._corner) * scale + MARGIN)
 
     def line(self, points: _Points, colour: str, *, dashed: bool = False) -> None:
-        """A path through points, m, shape (k, 2), with a white halo."""
+        """Draw a path, m, shape (k, 2), with a white halo."""
         path = self.pixels(points)
         parts = list(_dashes(path)) if dashed else [path]
         for tone, thickness in ((WHITE, 5), (colour, 2)):
@@ -157,7 +156,6 @@ class _Drawing:
         self._shape(centre + np.column_stack([radius * np.sin(turn), -radius * np.cos(turn)]), WHITE)
 
     def text(self, text: str, middle: _Points, face: Face, colour: str, *, halo: bool = False) -> None:
-        """A line of text around a point."""
         mask, baseline = self._type.rasterise(text, face)
         width, top = self._type.width(text, face), middle[1] - baseline + face.size / 3
         left = min(middle[0] - width / 2, self.width - width - 4)
@@ -166,7 +164,6 @@ class _Drawing:
         self._cover(mask, left, top, colour)
 
     def legend(self, lines: Mapping[str, str], start: str, categories: Sequence[tuple[str, str]]) -> None:
-        """Colours of ways by label, the start, and the colours of the categories, column by column."""
         draws: list[tuple[Callable[[_Points], None], str]] = [
             *((functools.partial(self._sample, colour=colour), label) for label, colour in lines.items()),
             (self.star, start),
@@ -191,7 +188,7 @@ class _Drawing:
         cv2.polylines(self.image, _fixed([corners]), True, _rgb(BLACK), 1, cv2.LINE_AA, _SHIFT)
 
     def _cover(self, mask: NDArray[np.uint8], left: float, top: float, colour: str) -> None:
-        """Colour the pixels of a mask, 0 to 255, as far as it lies in the image."""
+        """Blend a colour into the image by a mask of 0 to 255, clipped at the edges."""
         x, y = max(0, round(left)), max(0, round(top))
         under = self.image[y : y + len(mask), x : x + mask.shape[1]]
         share = mask[: under.shape[0], : under.shape[1], None] / 255.0
@@ -199,22 +196,21 @@ class _Drawing:
 
 
 def house_picture(house: House, scale: float) -> NDArray[np.uint8]:
-    """The tidy house from above, RGB, from the cache folder where it was drawn before."""
+    """Draw the tidy house from above, RGB, or read it from the cache folder."""
     name = f"{house.catalogue.content}-{scale:g}.png"
     kept = cache_base() / f"mjsim-floorplans-{source_digest('mjsim')}" / name
     if (picture := cv2.imread(str(kept)) if kept.is_file() else None) is not None:
         return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)  # type: ignore[no-any-return]
-    from mjsim.render import render_house_map  # OpenGL takes a while to load
+    from mjsim.render import render_house_map  # imported late because OpenGL loads slowly
 
     drawn = render_house_map(house.catalogue, house.bounds, scale)[..., :3]
     with contextlib.suppress(OSError), replacing(kept) as temporary:
         cv2.imwrite(str(temporary), cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
-        os.utime(kept.parent)  # in use
+        os.utime(kept.parent)  # marks the cache as used
     return drawn
 
 
 def _dashes(path: _Points) -> list[_Points]:
-    """The drawn pieces of a dashed line, px."""
     along = np.concatenate([[0.0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
     steps = np.arange(0.0, along[-1])
     points = np.column_stack([np.interp(steps, along, path[:, k]) for k in range(2)])

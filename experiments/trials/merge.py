@@ -1,4 +1,4 @@
-"""Merging of shards: joins their folders, writes the tables, and finds the trials that are missing."""
+"""Merges shards: joins their folders, writes the tables, and finds missing trials."""
 
 import dataclasses
 import functools
@@ -27,13 +27,17 @@ _ROWS_OF = re.compile(r"\.rows\.\d+-of-(\d+)\..*")
 
 @dataclass(frozen=True)
 class Merged:
-    """A design whose shards were merged."""
+    """A design whose shards were merged.
 
-    rows: Sequence[Mapping[str, Any]]  # of the tables, those of the design first
-    missing: Sequence[TrialConfig]  # trials of the design that are in no part
-    shards: Mapping[
-        Shard, int
-    ]  # number of missing trials by shard; empty if the number of shards is not known
+    Attributes:
+        rows: Rows of the tables, those of the design first.
+        missing: Trials of the design that no part holds.
+        shards: Number of missing trials by shard; empty if the number of shards is unknown.
+    """
+
+    rows: Sequence[Mapping[str, Any]]
+    missing: Sequence[TrialConfig]
+    shards: Mapping[Shard, int]
 
 
 def merge_shards(
@@ -45,18 +49,18 @@ def merge_shards(
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
 ) -> Merged:
-    """Join the folders of shards in `out`, and write the tables. The parts stay as they are.
+    """Join the folders of shards in `out`, and write the tables. The parts are not changed.
 
     Args:
         design: The whole design.
-        out: Folder that gets the trials of all parts; it may hold some of them already.
+        out: Folder for the trials of all parts. It may hold some of them already.
         parts: Folders of further shards.
         workers: Number of processes that read trials.
-        on_note: Called with lines that a user should read.
+        on_note: Called with lines for the user.
         on_read: Called after each trial that is read, with the numbers of trials read and to be read.
 
     Raises:
-        RecordError: A part is not the folder of a batch, or a trial is there twice, with different results.
+        RecordError: A part is not the folder of a batch, or two parts have different results of the same trial.
         OSError: The folder cannot be written.
     """
     check_batch_folder(out)
@@ -66,7 +70,7 @@ def merge_shards(
             raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     for folder in (out, *others):
-        adopt(folder / TRIALS)  # of shards that were killed
+        adopt(folder / TRIALS)  # archives of killed shards
     reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
     chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
     added: dict[Path, dict[str, StoredTrial]] = {}
@@ -88,24 +92,26 @@ def merge_shards(
 
 
 def _same(one: Path, other: Path) -> bool:
-    """Compare the records of two runs of a trial. The time that they took does not count."""
+    """Compare the records of two runs of a trial, except for their wall times."""
     with opened_run(one) as first, opened_run(other) as second:
         sums = read_checksums(first), read_checksums(second)
     return all(sums[0].get(name) == sums[1].get(name) for name in CHECKED)
 
 
 def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: TrialReader) -> None:
-    """Add trials of a part: files of run directories as hard links if possible, packed trials as copies."""
-    place = out / TRIALS
-    put_aside(out, {path.name for path in run_paths(place)}.intersection(trials))  # incomplete or damaged
+    """Add the trials of a part. Files of run directories are hard-linked if possible, packed trials copied."""
+    trials_folder = out / TRIALS
+    put_aside(
+        out, {path.name for path in run_paths(trials_folder)}.intersection(trials)
+    )  # incomplete or damaged
     for name in (name for name in trials if is_run(part / TRIALS / name)):
-        with work_folder(place) as work:
+        with work_folder(trials_folder) as work:
             shutil.copytree(part / TRIALS / name, work / name, copy_function=link_or_copy)
-            (work / name).rename(place / name)
-    copy(part / TRIALS, [name for name in trials if not (place / name).exists()], place)
+            (work / name).rename(trials_folder / name)
+    copy(part / TRIALS, [name for name in trials if not (trials_folder / name).exists()], trials_folder)
     for name, trial in trials.items():
-        stamp = trial.stamp if (place / name).exists() else UNSTAMPED
-        reader.add(dataclasses.replace(trial, path=place / name, stamp=stamp))
+        stamp = trial.stamp if (trials_folder / name).exists() else UNSTAMPED
+        reader.add(dataclasses.replace(trial, path=trials_folder / name, stamp=stamp))
 
 
 def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> list[TrialConfig]:
@@ -126,7 +132,7 @@ def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> li
 def _shards(
     trials: Sequence[TrialConfig], missing: Iterable[TrialConfig], folders: Iterable[Path]
 ) -> dict[Shard, int]:
-    """Number of missing trials by shard, for the number of shards that most files of rows are of."""
+    """Count missing trials by shard. The number of shards is the most frequent one among the files of rows."""
     files = Counter(
         int(match[1])
         for folder in folders

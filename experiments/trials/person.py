@@ -1,7 +1,7 @@
-"""How the bodies and habits of people differ: which values of `mjsim.PersonParameters` a trial draws.
+"""Distributions of `mjsim.PersonParameters`, from which each trial draws its person.
 
-Names and units are those of `PersonParameters`; values of a group are `motion.reach_time` and so on. A value that no
-description names is the same for each person.
+Names and units are those of `PersonParameters`. Names in a group have a prefix, as in `motion.reach_time`. Values
+without a distribution are the same for everyone.
 """
 
 import math
@@ -29,13 +29,17 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 
 def check_person(described: Distributions) -> None:
-    """Check a description of people by the person in the middle of it; a ConfigError says what is wrong."""
-    if described:  # the person in the middle of nothing is the usual one
+    """Check distributions with the median person. Raises a `ConfigError` if a distribution is invalid."""
+    if described:  # otherwise it is the default person
         _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
 def view_limits(text: str) -> tuple[float, float]:
-    """Parse `1.2,1.9`: within which angles, rad, a person may choose how wide the picture is; ConfigError otherwise."""
+    """Parse `1.2,1.9`, the limits of the field of view, rad, that a person may choose.
+
+    Raises:
+        ConfigError: The text is not two angles in ascending order.
+    """
     least, most, _ = RANGES["field_of_view"]
     try:
         low, high = map(float, text.split(","))
@@ -50,7 +54,7 @@ def view_limits(text: str) -> tuple[float, float]:
 
 
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
-    """A person; a ConfigError where a name is unknown, or a value cannot be drawn."""
+    """Draw a person. Raises a `ConfigError` if a name is unknown, or a value cannot be drawn."""
     if not described:
         return _DEFAULT
     return _person(draw(PARAMETERS, described, rng, "a person"))

@@ -1,4 +1,4 @@
-"""A Ray cluster as the workers of a batch: machines that share its folder. Ray comes with the extra `ray`."""
+"""A Ray cluster, whose machines share a folder, as the workers of a batch. Ray comes with the extra `ray`."""
 
 import functools
 import logging
@@ -18,11 +18,11 @@ from typing import Any
 from experiments.errors import ConfigError
 from experiments.session.signals import SIGNALS
 
-TRIAL_BYTES = 300_000_000  # memory of a trial whose kernels are compiled
+TRIAL_BYTES = 300_000_000  # memory of a trial with compiled kernels
 QUEUED_PER_CORE = 2
-PERIOD_S = 5.0  # between two looks at the cluster
-HEAD_TIMEOUT_S = 60.0  # longest time that the head of the cluster may need to restart
-END_S = 10.0  # time for cancelled calls to end
+PERIOD_S = 5.0  # between two checks of the cluster
+HEAD_TIMEOUT_S = 60.0  # how long the head of the cluster may take to restart
+END_S = 10.0  # how long cancelled calls may take to end
 # By default, Ray ends this process without a message after a minute without the head, and sends usage statistics.
 ENVIRONMENT = {"RAY_gcs_rpc_server_reconnect_timeout_s": "600", "RAY_USAGE_STATS_ENABLED": "0"}
 REMEDY = "install the same versions on all machines, then restart Ray there"
@@ -37,7 +37,7 @@ class LostMachineError(BrokenProcessPool):
 def ray_cluster(
     workers: int | None, modules: Sequence[str], on_note: Callable[[str], None], folder: Path
 ) -> Iterator[Callable[[], AbstractContextManager["_Cluster"]]]:
-    """Connect to the cluster that RAY_ADDRESS names, else to the one that runs here, else start one here.
+    """Connect to the cluster at RAY_ADDRESS, or to a local one, which is started if necessary.
 
     Raises:
         ConfigError: Ray or a cluster is missing, or a machine cannot run trials of this batch.
@@ -47,7 +47,7 @@ def ray_cluster(
         import ray
     except ImportError as error:
         raise ConfigError("--executor ray needs Ray: pip install 'mjsim[ray]'") from error
-    from experiments.trials.fingerprint import code_versions  # numba takes a while to load
+    from experiments.trials.fingerprint import code_versions  # imported late because numba loads slowly
 
     if is_mine := not ray.is_initialized():
         _connect(ray)
@@ -64,14 +64,14 @@ def ray_cluster(
 def _connect(ray: Any) -> None:
     """Connect without Ray's signal handlers and messages."""
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
-    # No option silences the thread that prints the logs of lost machines.
+    # Ray has no option to silence the thread that prints the logs of lost machines.
     ray._private.worker.print_to_stdstream = lambda *_, **__: None
     try:
         if ":" in (address := os.environ.get("RAY_ADDRESS", "")):
-            _reach(address)  # Ray itself would try for minutes
+            _reach(address)  # fails at once, while Ray would try for minutes
         ray.init(log_to_driver=False, logging_level=logging.ERROR)
     except (OSError, RuntimeError, ValueError) as error:
-        raise ConfigError(f"there is no Ray cluster to work on: {error}") from error
+        raise ConfigError(f"cannot connect to a Ray cluster: {error}") from error
     if threading.current_thread() is threading.main_thread():
         for number, handler in handlers.items():
             signal.signal(number, handler)
@@ -83,23 +83,22 @@ def _reach(address: str) -> None:
 
 
 class _Cluster:
-    """Machines of a Ray cluster. A trial takes one core."""
+    """The machines of a Ray cluster. A trial takes one core."""
 
     def __init__(self, ray: Any, workers: int | None, needed: tuple[Path, Versions]) -> None:
         self._ray, self._workers, self._needed = ray, workers, needed
         self._call = ray.remote(max_retries=0)(_checked)
-        self._running: dict[Future[Any], Any] = {}  # with Ray's references
+        self._running: dict[Future[Any], Any] = {}  # Ray's reference of each call
         self._ended = threading.Event()
         self._machines, self._cores = self._count()
 
     @property
     def room(self) -> int:
-        """Maximum number of calls under way: those beyond the number of cores wait in Ray's queue."""
         cores = self._cores
         return self._workers if self._workers and self._workers < cores else cores * QUEUED_PER_CORE
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
-        """Start a call with these options of Ray, by default on any machine with a free core."""
+        """Start a call with Ray options, by default on any machine with a free core."""
         result: Future[Any] = Future()
         options = options or {"num_cpus": 1, "memory": TRIAL_BYTES}
         self._running[result] = reference = self._call.options(**options).remote(*self._needed, fn, *args)
@@ -115,7 +114,7 @@ class _Cluster:
                 result.set_result(done.result())
 
     def prepare(self, on_note: Callable[[str], None]) -> None:
-        """Check all machines, and let one process of each load numeric code before many do."""
+        """Check all machines, and load numeric code in one process on each before others do."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy as On
 
         from experiments.trials.design import counted
@@ -133,7 +132,7 @@ class _Cluster:
         }
         for call in as_completed(calls):
             error = call.exception()
-            if error is None or isinstance(error, BrokenProcessPool):  # a lost machine is no reason to stop
+            if error is None or isinstance(error, BrokenProcessPool):  # lost machines are tolerated
                 continue
             if isinstance(error, ConfigError | ConnectionError):
                 raise error
@@ -141,7 +140,6 @@ class _Cluster:
             raise ConfigError(f"machine {calls[call]} cannot run trials: {reason}; {REMEDY}") from error
 
     def end(self) -> None:
-        """Stop all calls that are under way."""
         self._ended.set()
         running = dict(self._running)
         for reference in running.values():
@@ -149,7 +147,6 @@ class _Cluster:
         wait(running, timeout=END_S)
 
     def _count(self) -> tuple[dict[str, str], int]:
-        """Return the names of the machines that can run trials, by Ray's identifier, and the number of their cores."""
         cores = {}
         for node in filter(lambda node: node["Alive"], self._ray.nodes()):
             resources = node["Resources"]
@@ -163,7 +160,7 @@ class _Cluster:
         return dict(cores.keys()), sum(cores.values())
 
     def _watch(self) -> None:
-        """Until the end, count the cores. Fail all calls if the head of the cluster does not answer."""
+        """Until the end, update the number of cores. Fail all calls if the head of the cluster does not answer."""
         address = self._ray.get_runtime_context().gcs_address
         answered = time.monotonic()
         while time.monotonic() - answered < HEAD_TIMEOUT_S:
@@ -177,13 +174,13 @@ class _Cluster:
             f"the head of the Ray cluster at {address} does not answer; start it and try again"
         )
         while not self._ended.wait(0.1):
-            with suppress(InvalidStateError, KeyError):  # it ends just now, or no call is under way
+            with suppress(InvalidStateError, KeyError):  # a call has just ended, or none is running
                 self._running.popitem()[0].set_exception(lost)
 
 
 @functools.cache
 def _check_machine(folder: Path, versions: Versions) -> None:
-    """Check, once per process, that this machine has the driver's versions and the work folder of the batch."""
+    """Check, once per process, that this machine has the versions of the driver and shares the work folder."""
     from experiments.trials.fingerprint import changes, code_versions
 
     expected, name = dict(versions), platform.node()
@@ -204,13 +201,13 @@ def _check_machine(folder: Path, versions: Versions) -> None:
 
 
 def _checked(folder: Path, versions: Versions, fn: Callable[..., Any], *args: Any) -> Any:
-    """Call a function. The machine may have joined the cluster after the others were checked."""
+    """Check the machine, which may have joined the cluster later, and call a function."""
     _check_machine(folder, versions)
     return fn(*args)
 
 
 def _translated(error: BaseException) -> BaseException:
-    """Return what a pool of processes would raise."""
+    """Return the error that a pool of processes would raise."""
     from ray import exceptions
 
     if isinstance(error, exceptions.NodeDiedError | exceptions.TaskUnschedulableError):

@@ -1,4 +1,4 @@
-"""What a trial is made of: its person, its episode, and a session that is ready to run."""
+"""Sets up a trial: its person, its episode, and a session that is ready to run."""
 
 import hashlib
 from pathlib import Path
@@ -33,16 +33,16 @@ from planner.route import TaskState
 from planner.service import Mode, Planner
 from planner.solver_source import SolverSource
 
-_SESSION = 77  # sets the session's random numbers apart from those of the house with the same seed
+_SESSION = 77  # makes the session's random numbers independent of the house's with the same seed
 _LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # purposes of random numbers in a session
-FAMILIARISATION = 20.0  # s of wall time to prove the plan before the clock of a live trial starts
+PREPARATION_S = 20.0  # longest wall time for proving the plan before the clock of a live trial starts
 
 
 def draw_person(config: TrialConfig) -> PersonParameters:
-    """The participant of a trial, drawn by the person's seed.
+    """Draw the participant's parameters by the person's seed.
 
-    What `config.person` does not describe is drawn as the participant's factory says in its attribute `person`, a
-    mapping as for `Distributions.of`; what neither describes is usual.
+    Values without a distribution in `config.person` use those of the attribute `person` of the participant's factory, a
+    mapping as for `Distributions.of`, or else the defaults.
     """
     factory = participant(config.user)
     try:
@@ -54,7 +54,7 @@ def draw_person(config: TrialConfig) -> PersonParameters:
 
 
 def draw_behaviour(config: TrialConfig) -> dict[str, float]:
-    """The values of the participant model in a trial, drawn by the person's seed; empty if it has none."""
+    """Draw the parameters of the participant model by the person's seed. They are empty if it has none."""
     parameters = getattr(participant(config.user), "behaviour", {})
     rng = _session_rng(config.person_seed, _BEHAVIOUR)
     values = draw(parameters, config.behaviour, rng, f"participant {config.user!r}")
@@ -64,25 +64,23 @@ def draw_behaviour(config: TrialConfig) -> dict[str, float]:
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
-    """The disorganized house of a trial: sampled, or read from its file, which must hold as many objects."""
+    """Sample the episode of a trial, or read it from its file."""
     if config.episode is None:
         return house.sample_episode(objects=config.objects, seed=config.house_seed, points=config.points)
     episode = Episode.load(Path(config.episode))
     if len(episode.objects) != config.objects:
         raise ConfigError(
-            f"objects is {config.objects}, but {config.episode} holds {len(episode.objects)}; leave it out"
+            f"objects is {config.objects}, but {config.episode} has {len(episode.objects)}; leave it out"
         )
     return episode
 
 
 def simulated_user(config: TrialConfig, house: House) -> Participant:
-    """The participant that a trial names; `house` is what it knows."""
     rng = _session_rng(config.person_seed, _CHANCE)
     return make_participant(config.user, house, rng, draw_behaviour(config))
 
 
 def solver_source(config: TrialConfig, house: House) -> SolverSource:
-    """Plans of the planner that a trial names."""
     return SolverSource(house.geodesics, planner_named(config.planner), capacity=config.capacity)
 
 
@@ -91,10 +89,10 @@ def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
 
 
 def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
-    """The planner of a trial, which has started to plan; close it in the end.
+    """Return the planner of a trial, which has started to plan. The caller must close it.
 
-    With the exact planner it works in a thread, as its kernels run without the interpreter's lock. For a live trial all
-    that takes long is done before the clock starts.
+    The exact planner works in a thread, because its kernels release the GIL. For a live trial, the first plan is proved
+    before the clock starts.
     """
     mode = Mode.THREAD if isinstance(planner_named(config.planner), ExactSolver) else Mode.INLINE
     mode = Mode.LIVE if config.live else mode
@@ -106,7 +104,7 @@ def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Pla
             carried=(),
             deliveries=deliveries(house, episode),
         )
-        planner.prepare(first, seconds=FAMILIARISATION)
+        planner.prepare(first, seconds=PREPARATION_S)
     return planner
 
 
@@ -124,8 +122,16 @@ def prepare_session(
 ) -> tuple[Session, World]:
     """Make the world, the assistant and the participant of a trial, ready to run.
 
-    The house is for the scene's person (`House.for_person`); a given `world` must be new. World, planner and
-    participant are made where none is given; without a journal, the record is kept in memory.
+    Args:
+        config: The settings.
+        house: The house for the scene's person (`House.for_person`).
+        scene: The composed episode.
+        log: The event log.
+        viewer: Shows the session, or None.
+        planner: A planner, or None for that of the settings.
+        world: A new world, or None to make one.
+        user: A participant, or None for that of the settings.
+        journal: Receives the record, or None to keep it in memory.
     """
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     planner = planner or Planner(solver_source(config, house), regret_evaluator(config, house))
@@ -155,7 +161,6 @@ def prepare_session(
 
 
 def _session_rng(seed: int, purpose: int) -> np.random.Generator:
-    """The generator of one purpose in a session, apart from those of the house with the same seed."""
     return np.random.default_rng(np.random.SeedSequence([seed, _SESSION]).spawn(4)[purpose])
 
 

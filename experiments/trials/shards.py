@@ -1,7 +1,7 @@
 """Shards: shares of a design for the tasks of an array job.
 
-A shard reads and runs only its own trials, and writes no tables. Any number of shards can therefore work in one folder
-at the same time.
+A shard reads and runs only its own trials and writes no tables, so any number of shards can work in one folder at the
+same time.
 """
 
 import dataclasses
@@ -24,11 +24,11 @@ class Shard:
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
-        """Parse `K/N`; a ConfigError if it is not a shard."""
+        """Parse `K/N`. Raises a `ConfigError` if the text is not a shard."""
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         if not found or not 1 <= int(found[1]) <= int(found[2]):
             raise ConfigError(
-                f"{text!r} is not a shard K/N; shards are counted from 1 to N: the first of 40 is 1/40"
+                f"{text!r} is not a shard K/N; the first of 40 shards is 1/40, and the last is 40/40"
             )
         return cls(int(found[1]), int(found[2]))
 
@@ -41,7 +41,11 @@ class Shard:
         return f"{self.number}-of-{self.count}."
 
     def of(self, design: Design) -> Design:
-        """The trials of this shard, in the design's order; a ConfigError if there are fewer trials than shards."""
+        """Return the trials of this shard, in the design's order.
+
+        Raises:
+            ConfigError: There are fewer trials than shards.
+        """
         total = len(design.trials)
         if total < self.count:
             raise ConfigError(
@@ -53,18 +57,19 @@ class Shard:
 
 
 def shard_numbers(trials: Sequence[TrialConfig], count: int) -> list[int]:
-    """Return the shard of each trial, 1 to `count`. It depends only on the number of trials and on which share a house.
+    """Return the shard of each trial, from 1 to `count`.
 
-    A shard gets whole houses as far as possible, because making one takes longer than many a trial in it. Within a
-    house, trials are mixed, so that no shard gets only the trials with the most objects.
+    It depends only on the number of trials and on their houses. A shard gets whole houses as far as possible, because
+    making a house takes longer than many a trial. Within a house, trials are shuffled, so that shards take similar
+    times.
     """
     houses = {house: k for k, house in enumerate(dict.fromkeys(trial.house for trial in trials))}
-    order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _mixed(k)))
+    order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _shuffle_key(k)))
     numbers = [0] * len(trials)
-    for place, k in enumerate(order):
-        numbers[k] = ((place + 1) * count - 1) // len(trials) + 1
+    for rank, k in enumerate(order):
+        numbers[k] = ((rank + 1) * count - 1) // len(trials) + 1
     return numbers
 
 
-def _mixed(number: int) -> bytes:
+def _shuffle_key(number: int) -> bytes:
     return hashlib.sha256(str(number).encode()).digest()

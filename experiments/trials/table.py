@@ -1,6 +1,10 @@
-"""One table of many trials, as Parquet for analysis and CSV for the eye."""
+"""A table of many trials, as Parquet and CSV, and the meaning of its columns."""
 
+import dataclasses
+import inspect
 import json
+import re
+import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,19 +14,36 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from experiments.errors import RecordError
+from experiments.record.columns import HEALTH
+from experiments.record.metrics import COUNTED, Displays, Metrics
 from experiments.record.phases import is_simulated
-from experiments.trials.trial_config import SEEDS
+from experiments.trials.trial_config import SEEDS, SETTINGS, TrialConfig
 from mjsim.support.files import check_input, replacing
+from mjsim.values.motion_parameters import GROUPS
+from mjsim.values.person_parameters import PersonParameters
 
 NAME = "trials"
-_TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # equal for equal trials
-_WRITTEN = (
-    b"mjsim.columns"  # metadata: types of the columns by name, as the footer of Parquet has no checksum
-)
+_TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # columns that identify a trial
+_WRITTEN = b"mjsim.columns"  # metadata with the column types, because the footer of Parquet has no checksum
+Columns = dict[str, tuple[str, str]]  # type and description, by name
+_QUANTITIES = {
+    "penetration_m": "penetration depth of objects or the body",
+    "trunk_penetration_m": "penetration depth of the trunk and the house",
+    "weld_error_m": "distance of a carried object from its place in the hand",
+    "weld_error_rad": "angle of a carried object from its orientation in the hand",
+    "settle_s": "time until a released object comes to rest",
+}
+_STATISTICS = {"max": "Largest", "p99": "99th percentile of the", "mean": "Mean"}
+_CIRCUMSTANCES = {
+    "frames_sha256": ("str | null", "SHA-256 of the pixels of all frames; null without a film."),
+    "renderer": ("str", "Renderer of the frames."),
+    "wall_s": ("float", "Wall time of the trial, s."),
+}
+_NAMES = {"NoneType": "null", "VisitKind": "str", "Status": "str", "Refusal": "str", "EventKind": "str"}
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
-    """Write `trials.parquet` and `trials.csv`, a row per trial, each whole or not at all; their paths in this order.
+    """Write `trials.parquet` and `trials.csv` atomically. Return their paths in this order.
 
     Columns are the union of the rows' keys in order of first appearance.
     """
@@ -30,10 +51,10 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
     written = table.replace_schema_metadata({_WRITTEN: json.dumps(_types(table.schema))})
-    # pyarrow gets files that are open: it takes no path that is not UTF-8, or that looks like the address of a server.
+    # pyarrow gets open files because it rejects paths that are not UTF-8 or that look like URLs.
     with replacing(parquet) as temporary, temporary.open("wb") as file:
         pa.parquet.write_table(written, file, write_page_checksum=True)
-    # An empty column has no type that CSV could hold.
+    # CSV leaves out empty columns, which have no type.
     present = [c for c in columns if table[c].null_count < len(rows)]
     with replacing(csv) as temporary, temporary.open("wb") as file:
         pa.csv.write_csv(table.select(present), file)
@@ -41,10 +62,10 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a Parquet file.
+    """Read the rows of a Parquet file.
 
     Raises:
-        RecordError: It cannot be read, is damaged, or has a trial twice.
+        RecordError: The file cannot be read, is damaged, or has a trial twice.
     """
     try:
         check_input(path)
@@ -53,12 +74,12 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
         _check_columns(table.schema)
         rows: list[dict[str, Any]] = table.to_pylist()
     except (OSError, ValueError, pa.ArrowException) as error:
-        raise RecordError(f"{path} cannot be read ({error})") from error
+        raise RecordError(f"cannot read {path} ({error})") from error
     seen: dict[tuple[Any, ...], int] = {}
     for k, row in enumerate(rows):
         if row.get("fingerprint") is None and row.get("person_seed") is None:
-            continue  # nothing says who it is
-        # People may play the same trial; they do not answer and walk alike.
+            continue  # the row has no identity
+        # Several people may play the same trial, with different results.
         names = _TRIAL if is_simulated(row.get("user")) else sorted(row)
         first = seen.setdefault(tuple(str(row.get(name)) for name in names), k)
         if first != k:
@@ -74,7 +95,7 @@ def _types(schema: pa.Schema) -> dict[str, str]:
 
 
 def _check_columns(schema: pa.Schema) -> None:
-    """Raise a `ValueError` if a column has another name or type than was written; columns may be added or left out."""
+    """Raise a `ValueError` if a column was renamed or converted. Columns may be added or left out."""
     found = _types(schema)
     written = json.loads((schema.metadata or {}).get(_WRITTEN, "{}"))
     renamed = sorted(found.keys() - written) if written.keys() - found else []
@@ -83,3 +104,68 @@ def _check_columns(schema: pa.Schema) -> None:
             f"column {bad[0]!r} is not as it was written: the file is damaged, or the column was renamed or converted; "
             "then write the table without its metadata, with replace_schema_metadata() of pyarrow"
         )
+
+
+def trial_columns() -> Columns:
+    """Return type and description of the columns of a table of trials, in order."""
+    hints = typing.get_type_hints(TrialConfig)
+    found: Columns = {
+        name: (_type_name(hints[name]), str(about.description))
+        for name, about in SETTINGS.items()
+        if name not in ("person", "behaviour")
+    }
+    found["fingerprint"] = ("str", "Hash of the settings and of everything else that the trial depends on.")
+    found["rooms"] = ("int", "Number of rooms.")
+    found["area_m2"] = ("float", "Floor area of the rooms, m2.")
+    found["simulated"] = ("bool", "Whether the participant is simulated (all except `human`).")
+    person = described(PersonParameters, leave_out=set(GROUPS))
+    found |= {f"person_{name}": about for name, about in person.items()}
+    found["behaviour_..."] = (
+        "float",
+        "Parameters of the participant model, if any (docs/participants.md).",
+    )
+    found |= {**described(Metrics), **described(Displays)}
+    for name in HEALTH:
+        for statistic, words in _STATISTICS.items():
+            unit = name.rsplit("_", 1)[1]
+            found[f"{statistic}_{name}"] = ("float", f"{words} {_QUANTITIES[name]}, {unit}.")
+    found["releases_settled"] = ("int", "Number of released objects that came to rest.")
+    found |= {name: ("int", f"Number of events `{kind.value}`.") for name, kind in COUNTED.items()}
+    found["simulated_s"] = ("float", "Simulated time at the last state, s.")
+    found["signal, error"] = ("str", "As in the event `end`, if present.")
+    return found | _CIRCUMSTANCES
+
+
+def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
+    """Return type and description of the fields that a class itself defines.
+
+    Raises:
+        KeyError: The docstring of the class does not describe a field.
+    """
+    texts, hints = _attributes(kind), typing.get_type_hints(kind)
+    names = (
+        [field.name for field in dataclasses.fields(kind)]
+        if dataclasses.is_dataclass(kind)
+        else kind.__annotations__
+    )
+    return {name: (_type_name(hints[name]), texts[name]) for name in names if name not in leave_out}
+
+
+def _attributes(kind: type[Any]) -> dict[str, str]:
+    text = (inspect.getdoc(kind) or "").split("Attributes:\n", 1)[1]
+    text = re.split(r"\n\n?(?=\S)", text)[0]
+    entries = re.split(r"\n(?=    \w+(?:, \w+)*: )", "\n" + text)[1:]
+    pairs = (entry.strip().split(": ", 1) for entry in entries)
+    texts = {name: " ".join(what.split()) for name, what in pairs}
+    return {name: what[0].upper() + what[1:] if what[1:2].isalpha() else what for name, what in texts.items()}
+
+
+def _type_name(hint: Any) -> str:
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is None:
+        return _NAMES.get(hint.__name__, str(hint.__name__))
+    if origin is typing.Literal:
+        return "str"
+    if origin in (list, dict, tuple):
+        return f"{origin.__name__}[{', '.join(map(_type_name, arguments))}]"
+    return " | ".join(_type_name(argument) for argument in arguments)

@@ -1,4 +1,4 @@
-"""The training trial: one object, as long as it takes (PAPER section 7)."""
+"""The training before a task: a trial with one object and practically no time limit (PAPER section 7)."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,17 +9,13 @@ from msgspec.structs import replace
 from experiments.record.phases import TASK, TRAINING
 from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
-TRAINING_LIMIT = 3600.0  # seconds, for a simulated participant
-HUMAN_TRAINING_LIMIT = 24 * 3600.0  # seconds, for a person; no one reaches it
-_TRAINING_SEED = 7  # sets the house of the training apart from that of the task
+TRAINING_LIMIT_S = 3600.0  # for a simulated participant
+HUMAN_TRAINING_LIMIT_S = 24 * 3600.0
+_TRAINING_SEED = 7  # makes the house of the training differ from that of the task
 
 
 def training_config(config: TrialConfig) -> TrialConfig:
-    """The training trial that belongs to a trial: one object in the same house, without limit of time.
-
-    Person and fidelity are those of the trial; its assistance has a setting of its own. The object lies where the
-    house's seed says, but elsewhere than in the task.
-    """
+    """Return the training of a trial: one object in the same house, at another place than in the task."""
     seed = int(np.random.SeedSequence([config.house_seed, _TRAINING_SEED]).generate_state(1)[0])
     return replace(
         config,
@@ -31,11 +27,11 @@ def training_config(config: TrialConfig) -> TrialConfig:
         episode=None,
         phases=TASK,
         story=None,
-        time_limit=TRAINING_LIMIT,
+        time_limit=TRAINING_LIMIT_S,
     )
 
 
 def trials_of(task: TrialConfig) -> Mapping[str, dict[str, Any]]:
-    """Return the settings of a person's task and of the training before it, by phase."""
-    training = replace(training_config(task), time_limit=HUMAN_TRAINING_LIMIT)
+    """Return the settings of a person's training and task, by phase."""
+    training = replace(training_config(task), time_limit=HUMAN_TRAINING_LIMIT_S)
     return {TRAINING: training.settings(), TASK: task.settings()}

@@ -1,4 +1,4 @@
-"""One trial: an episode, an assistance condition, a participant and a seed, recorded into a run directory."""
+"""Runs one trial and records it in a run directory."""
 
 import dataclasses
 import os
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from experiments.errors import UserCodeError, describe
 from experiments.house import House
 from experiments.record import records
-from experiments.record.export import NOTHING_FILMED, save_record
 from experiments.record.phases import INTERRUPTED, RECORDED, TRAINING, origin_of
 from experiments.record.reader import Record
 from experiments.record.records import EventLog
 from experiments.record.run_directory import add_files, run_directory
+from experiments.record.writer import NOTHING_FILMED, save_record
 from experiments.session.familiarise import Familiarisation, familiarise
 from experiments.session.film_config import FilmConfig
 from experiments.session.session import OnProgress, Progress
@@ -53,30 +53,30 @@ def run_trial(
     on_progress: OnProgress = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Run a trial and write its record to `out`, whole or not at all; however it ended, what was simulated is kept.
+    """Run a trial and write its record to `out` atomically. The record is kept even if the trial ends early.
 
     Args:
-        config: What to run.
+        config: Settings of the trial.
         out: Run directory.
-        film: How to film it, or None for no video.
-        topdown: Whether to draw the floor plan.
-        replace: Whether `out` may take the place of an earlier run.
+        film: Settings of the film, or None for no video.
+        topdown: Draw the floor plan.
+        replace: Allow `out` to hold an earlier run.
         scratch: Parent of the working folder (default: that of `out`).
-        house: A loaded house to use again; it must be the one that `config` names.
+        house: The house that `config` names, if it is loaded already.
         on_progress: Called after every action.
-        on_warning: Called with what went wrong without harm to the record: no video, no floor plan.
+        on_warning: Called with errors that do not affect the record: no video, no floor plan.
 
     Returns:
-        What `metrics.json` holds.
+        The content of `metrics.json`.
 
     Raises:
-        ExperimentError, MjsimError, PlannerError, HudError: The configuration or the run directory is unusable, or
+        ExperimentError, MjsimError, PlannerError, HudError: The settings or the run directory are not usable, or
             participant or condition failed.
         PhysicsError: The physics failed.
-        Stopped: A signal came when the session was over.
+        Stopped: A signal arrived after the session had ended.
     """
     started = time.perf_counter()
-    with chdir("."), signals_postponed() as signals:  # a user's own code may go elsewhere
+    with chdir("."), signals_postponed() as signals:  # custom code may change the current folder
         with run_directory(out, replace=replace, scratch=scratch) as folder:
             person = draw_person(config)
             house = (house or House.load(config.house)).for_person(person)
@@ -107,7 +107,7 @@ def run_trial(
 
 
 def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
-    """Add the floor plan to a run directory; why that was not possible, or None."""
+    """Add the floor plan to a run directory. Return an error message, or None."""
     if not record.plans:
         return None
     try:
@@ -117,29 +117,28 @@ def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
             walked = record.trajectory["position"]
             draw_topdown(folder / records.TOPDOWN, house, record.episode, record.plans[0], walked, origin)
             add_files(folder, run)
-    except Exception as error:  # no picture is worth a record
+    except Exception as error:  # a failed picture must not cost the record
         return f"no floor plan: {describe(error)}"
     return None
 
 
 def _kept(error: Exception, out: Path) -> Exception:
-    """The error that ended a trial; it also says where the record is."""
     if isinstance(error, PhysicsError | UserCodeError):
         error.args = (f"{error} (kept for `mjsim replay {out}`)",)
-    error.add_note(f"What was simulated is kept in {out}.")
+    error.add_note(f"The run is kept in {out}.")
     return error
 
 
 @dataclass(frozen=True, eq=False)
-class _Result:
-    """A session that is over: its record, what ended it where that is an error, and its film, if any."""
+class _SessionResult:
+    """A session that has ended: its record, the error that ended it, and its film, if any."""
 
     record: Record
     error: Exception | None
     film: "TrialFilm | None"
 
     def save(self, folder: Path, out: Path, wall: float) -> dict[str, Any]:
-        """Write the run directory that will appear at `out`; raises the error if there is nothing to keep."""
+        """Write the run directory that will appear at `out`. Raises the error if there is no record to keep."""
         if self.error is not None and not self.record.steps:
             raise self.error
         if self.film is None:
@@ -158,8 +157,7 @@ def _run_session(
     on_progress: OnProgress,
     film: "TrialFilm | None" = None,
     planner: Planner | None = None,
-) -> _Result:
-    """Run the session of a trial; its film is complete afterwards."""
+) -> _SessionResult:
     error, log = None, EventLog()
     planner = planner or prepared_planner(config, house, scene.episode)
     known_house = house if known.seen is None else dataclasses.replace(house, seen=known.seen)
@@ -171,11 +169,13 @@ def _run_session(
             session.run(on_progress)
         except Exception as failure:
             error = failure
-    return _Result(session.record.record(), error, film)
+    return _SessionResult(session.record.record(), error, film)
 
 
 def _make_film(scene: Scene, house: House, config: FilmConfig, folder: Path) -> "TrialFilm":
-    from experiments.session.first_person import TrialFilm  # OpenGL and FFmpeg take a while to load
+    from experiments.session.first_person import (
+        TrialFilm,  # imported late because OpenGL and FFmpeg load slowly
+    )
 
     return TrialFilm(scene, house, config, folder / records.VIDEO)
 
@@ -183,14 +183,14 @@ def _make_film(scene: Scene, house: House, config: FilmConfig, folder: Path) -> 
 def _before_the_task(
     config: TrialConfig, house: House, person: PersonParameters, folder: Path, on_progress: OnProgress
 ) -> Familiarisation:
-    """Go through the phases before the task; the training is a run of its own in the run directory."""
+    """Run the phases before the task. The training has its own run directory inside that of the task."""
     known = familiarise(config.phase_names, config.story, house, person)
     if TRAINING not in config.phase_names:
         return known
     started, training = time.perf_counter(), training_config(config)
-    place = folder / records.TRAINING
-    place.mkdir()
+    training_folder = folder / records.TRAINING
+    training_folder.mkdir()
     scene = compose(trial_episode(training, house), house.catalogue, person=person, visuals=False)
     result = _run_session(training, house, scene, Familiarisation((), known.seen), on_progress)
-    result.save(place, place, time.perf_counter() - started)
+    result.save(training_folder, training_folder, time.perf_counter() - started)
     return known.trained(result.record.events)

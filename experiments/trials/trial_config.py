@@ -1,4 +1,4 @@
-"""The settings of a trial. Options, design files, the start event, columns and docs/data.md are made from this type."""
+"""The settings of a trial, from which options, design files, the start event, columns and docs/data.md are made."""
 
 import math
 import typing
@@ -18,15 +18,15 @@ from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solvers import DEFAULT_SOLVER
 
-SECONDS_PER_OBJECT = 150.0  # s; several times what the slowest searcher takes
+SECONDS_PER_OBJECT = 150.0  # several times as long as the slowest searcher takes
 SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
 DRAWN_BY = ("auto", "browser", "server")
-MAX_SEED = 2**63 - 1  # tables hold 64 bits
+MAX_SEED = 2**63 - 1  # largest integer in tables
 
 
 def _about(description: str, **extra: Any) -> msgspec.Meta:
-    """Description of a setting; `metavar` and `choices` of its option; whether it is a path relative to a design."""
+    """Describe a setting. `extra` has `metavar` and `choices` of its option, and `path` if designs resolve it."""
     return msgspec.Meta(description=description, extra=extra)
 
 
@@ -34,21 +34,23 @@ _AS_SEED = cast(int, None)  # filled in from `seed`
 
 
 class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Everything that decides how a trial goes; equal configurations give equal records.
+    """Settings that determine a trial. Equal settings give equal records.
 
     The field `seed` sets those of the three seeds that are not given, and is None afterwards.
 
     Raises:
-        ConfigError: A value is unusable.
+        ConfigError: A value is invalid.
     """
 
-    objects: Annotated[int, _about("Number of misplaced objects, 1 to the number of points.", metavar="N")]
+    objects: Annotated[
+        int, _about("Number of misplaced objects, from 1 to the number of points.", metavar="N")
+    ]
     assistance: Annotated[str, _about("Assistance condition.", metavar="NAME")]
     user: Annotated[str, _about("Participant.", metavar="NAME")] = DEFAULT_PARTICIPANT
     house: Annotated[
         str,
         _about(
-            "Name of a house, path of its catalogue.toml or folder, or a seed of a generated one: `generated:7`, "
+            "Name of a house, path of its folder or catalogue.toml, or a generated home such as `generated:7` or "
             "`generated:7?rooms=5` (docs/generated-houses.md).",
             metavar="NAME",
             path=True,
@@ -58,60 +60,59 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     time_limit: Annotated[
         float | None,
         _about(
-            "Simulated time after which a trial ends, s (default: 60, and 150 for each object).", metavar="S"
+            "Simulated time after which the trial ends, s (default: 60, plus 150 per object).", metavar="S"
         ),
     ] = None
     live: Annotated[
         bool,
         _about(
-            "Plan in real time, with proofs in the background, as for a person. Such a run depends on the machine's "
-            "speed; a replay shows the plans that were shown."
+            "Plan in real time, with proofs in the background, as for a person. The run depends on the machine, "
+            "but a replay shows the same plans."
         ),
     ] = False
     fidelity: Annotated[
         str,
         _about(
-            "How much of the world is physics: `full`, everything; `event`, only what falls (docs/simulation.md).",
+            "Extent of the physics: `full` for everything, `event` only for falling objects (docs/simulation.md).",
             choices=FIDELITIES,
         ),
     ] = WorldOptions.fidelity
     regret: Annotated[
         bool,
         _about(
-            "Log for every visit by how much it makes the rest of the task longer than the best one would; takes up "
-            "to 1 s a trial."
+            "Log the regret of every visit: the extra length of the remaining task compared with the best visit. Takes "
+            "up to 1 s per trial."
         ),
     ] = True
-    house_seed: Annotated[int, _about("Seed of the house: what lies where, and the start.", metavar="S")] = (
-        _AS_SEED
-    )
-    person_seed: Annotated[int, _about("Seed of the participant's chance.", metavar="S")] = _AS_SEED
+    house_seed: Annotated[
+        int, _about("Seed of the house: objects, their places, and the start.", metavar="S")
+    ] = _AS_SEED
+    person_seed: Annotated[int, _about("Seed of the participant's random choices.", metavar="S")] = _AS_SEED
     order_seed: Annotated[
-        int, _about("Seed of the order of the list in the HUD (PAPER section 5).", metavar="S")
+        int, _about("Seed of the order of the task list (PAPER section 5).", metavar="S")
     ] = _AS_SEED
     points: Annotated[
         int,
         _about(
-            "Points of the house where objects may lie, at least 1 m apart; fewer fit into a small house. Levels of "
-            "difficulty share them (PAPER section 4).",
+            "Number of points at which objects may lie, at least 1 m apart. Levels of difficulty share them (PAPER "
+            "section 4). Small houses have room for fewer.",
             metavar="N",
         ),
     ] = POINTS
     trial_number: Annotated[
         int,
         _about(
-            "Which of the person's trials it is, from 1; `trials_per_person` of a design counts them "
-            "(docs/batches.md).",
+            "Number of the trial among those of the person, from 1 (`trials_per_person` in docs/batches.md).",
             metavar="N",
         ),
     ] = 1
     capacity: Annotated[
-        int, _about("Objects carried at most; with 1, in the right hand.", choices=CAPACITIES)
+        int, _about("Most objects carried at a time; 1 uses only the right hand.", choices=CAPACITIES)
     ] = CAPACITY
     episode: Annotated[
         str | None,
         _about(
-            "Path of an episode (an episode.json) to run instead of sampling one; its objects, house and seed apply.",
+            "Path of an episode.json to run instead of sampling an episode. Its objects, house and seed apply.",
             metavar="FILE",
             path=True,
         ),
@@ -119,15 +120,15 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     phases: Annotated[
         str,
         _about(
-            "Phases of the trial, in order, joined by commas: `story`, `flythrough` and `training` may come before the "
-            "`task` (docs/trials.md).",
+            "Phases in order, separated by commas: `story`, `flythrough` and `training` may come before the `task` "
+            "(docs/trials.md).",
             metavar="NAME,..",
         ),
     ] = TASK
     story: Annotated[
         str | None,
         _about(
-            "Path of a text to read in the phase `story`, instead of the default one.",
+            "Path of a text for the phase `story`, in place of the default text.",
             metavar="FILE",
             path=True,
         ),
@@ -135,30 +136,29 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     training_assistance: Annotated[
         str,
         _about(
-            "Assistance condition of the training: one for everybody, whatever the task shows (PAPER section 7).",
+            "Assistance condition of the training, the same for all conditions of the task (PAPER section 7).",
             metavar="NAME",
         ),
     ] = NO_ASSISTANCE
     draw: Annotated[
         str,
         _about(
-            "Who draws the picture of a person in a browser: `browser`, `server`, or `auto`, the browser where it can "
-            "(docs/browser.md).",
+            "Renderer of a person's view: `browser`, `server`, or `auto` for the browser if it can (docs/browser.md).",
             choices=DRAWN_BY,
         ),
     ] = DRAWN_BY[0]
     field_of_view_range: Annotated[
         str | None,
         _about(
-            "Within which angles, rad, a person whose browser draws may choose the horizontal field of view of the "
-            "picture; otherwise it is the person's (docs/browser.md).",
+            "Range, rad, in which a person may choose the horizontal field of view if the browser draws; without it, "
+            "the field of view is the person's parameter (docs/browser.md).",
             metavar="LOW,HIGH",
         ),
     ] = None
     person: Annotated[
         Distributions,
         _about(
-            "Distributions of the person's values, drawn by the person's seed (docs/participants.md).",
+            "Distributions of the person's parameters, drawn by the person's seed (docs/participants.md).",
             metavar="SPEC",
         ),
     ] = Distributions()
@@ -166,11 +166,15 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         Distributions,
         _about("Distributions of the parameters of the participant model (docs/participants.md)."),
     ] = Distributions()
-    seed: Annotated[int | None, _about("Those of the three seeds that are not given.", metavar="S")] = None
+    seed: Annotated[int | None, _about("Value of the seeds that are not given.", metavar="S")] = None
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
-        """The trial whose `settings` these are, or a part of them; a ConfigError if a name or a value is unusable."""
+        """Make a configuration from `settings`, or from a part of them.
+
+        Raises:
+            ConfigError: A name or a value is invalid.
+        """
         try:
             return msgspec.convert(settings, cls, dec_hook=lambda kind, given: kind.of(given))
         except msgspec.ValidationError as error:
@@ -203,7 +207,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         if self.draw not in DRAWN_BY:
             raise ConfigError(f"no draw {self.draw!r}; choose one of {', '.join(DRAWN_BY)}")
         if self.trial_number < 1:
-            raise ConfigError(f"trial_number is {self.trial_number}; a person's trials are counted from 1")
+            raise ConfigError(f"trial_number is {self.trial_number}; it must be at least 1")
         if self.points < 1:
             raise ConfigError(f"points is {self.points}; a house needs at least 1")
         if self.episode is None and not 1 <= self.objects <= self.points:
@@ -215,13 +219,10 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         if self.time_limit is not None and not 0 < self.time_limit < math.inf:
             raise ConfigError(f"time limit must be positive, got {self.time_limit} s")
         if self.story is not None and STORY not in self.phase_names:
-            raise ConfigError(
-                f"there is a story, {self.story}, but no phase to read it in; add story to the phases"
-            )
+            raise ConfigError(f"story is {self.story}, but the phases lack story; add it")
         if self.training_assistance != NO_ASSISTANCE and TRAINING not in self.phase_names:
             raise ConfigError(
-                f"there is an assistance for a training, {self.training_assistance}, but no training; add it to "
-                "the phases"
+                f"training_assistance is {self.training_assistance}, but the phases lack training; add it"
             )
         check_person(self.person)
         if self.field_of_view_range is not None:
@@ -233,7 +234,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def view_limits(self) -> tuple[float, float] | None:
-        """Within which angles, rad, a person may choose how wide the picture is; None without a choice."""
+        """Limits of the field of view, rad, that a person may choose, or None without a choice."""
         return None if self.field_of_view_range is None else view_limits(self.field_of_view_range)
 
     @property
@@ -242,7 +243,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return self.time_limit if self.time_limit is not None else 60.0 + SECONDS_PER_OBJECT * self.objects
 
     def settings(self) -> dict[str, Any]:
-        """All of it by name, with the time limit filled in; JSON-ready."""
+        """Return all settings by name, with the time limit filled in, JSON-ready."""
         values = {name: getattr(self, name) for name in SETTINGS}
         return {
             **values,
@@ -252,7 +253,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         }
 
 
-# Description of every setting that a record holds, by name.
+# Description of each recorded setting
 SETTINGS: dict[str, msgspec.Meta] = {
     name: hint.__metadata__[0]
     for name, hint in typing.get_type_hints(TrialConfig, include_extras=True).items()
@@ -260,7 +261,7 @@ SETTINGS: dict[str, msgspec.Meta] = {
 }
 DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(TrialConfig)}
 PATHS = tuple(name for name, about in SETTINGS.items() if (about.extra or {}).get("path"))
-# What may differ by accident between the conditions of a comparison.
+# Settings that may differ by accident between the conditions of a comparison
 CONFOUNDERS = tuple(
     name
     for name in SETTINGS
@@ -269,7 +270,11 @@ CONFOUNDERS = tuple(
 
 
 def episode_settings(path: Path) -> dict[str, Any]:
-    """What an episode file decides of a trial, as arguments of `TrialConfig`; an EpisodeError where it is none."""
+    """Return the arguments of `TrialConfig` that an episode file sets.
+
+    Raises:
+        EpisodeError: The file is not a valid episode.
+    """
     episode = Episode.load(path)
     return {
         "objects": len(episode.objects),

@@ -1,8 +1,7 @@
-"""Reads the trials of a batch folder, each one once.
+"""Reads the trials of a batch folder, each of them once.
 
-Rows that were read are kept in OUT/.rows.jsonl.gz, of a shard in a file of its own, with the size and modification time
-of each file behind them. A trial is read again after one of these files, or the code of mjsim, has changed. The files
-of rows may be deleted at any time.
+Rows are cached in OUT/.rows.jsonl.gz, or in another file for each shard, with the size and modification time of their
+files. A trial is read again if these, or the code of mjsim, have changed. The caches may be deleted at any time.
 """
 
 import dataclasses
@@ -26,13 +25,13 @@ from mjsim.support.files import replacing, source_digest
 
 ROWS = ".rows.jsonl.gz"
 UNSTAMPED: Stamp = ()
-POOL_FROM = 500  # number of unread trials from which starting processes to read them pays
+POOL_FROM = 500  # number of unread trials from which worker processes are worth their start-up time
 
-OnRead = Callable[[int, int], None]  # called with the numbers of trials that are read, and to be read
+OnRead = Callable[[int, int], None]  # called with the numbers of trials read and to be read
 
 
-class _KeptRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
-    """A line of the file: a `StoredTrial` by the name of its folder."""
+class _CachedRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
+    """A line of the cache: a `StoredTrial` with the name of its folder."""
 
     name: str
     stamp: Stamp
@@ -42,19 +41,18 @@ class _KeptRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
     as_measured: bool
 
 
-_DECODER, _ENCODER = msgspec.json.Decoder(_KeptRow), msgspec.json.Encoder()
+_DECODER, _ENCODER = msgspec.json.Decoder(_CachedRow), msgspec.json.Encoder()
 
 
 class TrialReader:
-    """Reads the trials of a batch folder, and keeps what it has read in that folder.
+    """Reads the trials of a batch folder, with a cache in that folder.
 
     Args:
         out: The folder.
         workers: Number of processes that read.
         on_read: Called after each trial that is read.
-        names: Folders of the only trials to read, those of a shard; None for all.
-        label: Label of a shard. Its file of rows and its archives have it in their names, so that no two shards use
-            the same ones.
+        names: Names of the only trials to read, for a shard, or None for all.
+        label: Label of a shard, which is in the names of its cache and archives, so that no two shards share them.
     """
 
     def __init__(
@@ -74,11 +72,11 @@ class TrialReader:
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
-        """Take a trial that was read elsewhere; a packed one before it was packed, with the stamp `UNSTAMPED`."""
+        """Add a trial that was read elsewhere. One that was packed afterwards has the stamp `UNSTAMPED`."""
         self._known[trial.path.name] = trial
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
-        """Return the trials by name, and what is wrong with those that cannot be used."""
+        """Return the trials by name, and error messages of those that are not usable."""
         paths = self._paths()
         self._known = {
             path.name: trial for path in paths if (trial := self._unchanged(path, stamp_of(path))) is not None
@@ -101,7 +99,6 @@ class TrialReader:
         return paths if self._names is None else [path for path in paths if path.name in self._names]
 
     def _unchanged(self, path: Path, stamp: Stamp) -> StoredTrial | None:
-        """A trial that was read before, if its files have not changed since."""
         trial = self._known.get(path.name)
         if trial is None or trial.stamp not in (stamp, UNSTAMPED):
             return None
@@ -113,29 +110,27 @@ class TrialReader:
             with suppress(BrokenProcessPool), worker_pool(self._workers) as pool:
                 for result in pool.map(_read, unread, chunksize=20):
                     yield next(left), result
-        for path in left:  # of a pool that broke, too
+        for path in left:  # all, or those that a broken pool has left
             yield path, _read(path)
 
-    def _trial(self, row: _KeptRow) -> StoredTrial:
+    def _trial(self, row: _CachedRow) -> StoredTrial:
         return StoredTrial(
             self._trials / row.name, row.settings, row.inputs, row.row, row.as_measured, row.stamp
         )
 
     def _save(self) -> None:
-        """Keep the rows of complete trials; a folder that cannot be written is no reason to fail."""
         kept = {name: trial for name, trial in self._known.items() if trial.complete}
         if not self._trials.is_dir() or (kept == self._saved and self._file.is_file()):
             return
         with suppress(OSError), replacing(self._file) as path, gzip.open(path, "wb", compresslevel=1) as file:
             file.write(_header())
             for name, t in kept.items():
-                row = _KeptRow(name, t.stamp, dict(t.settings), dict(t.inputs), dict(t.row), t.as_measured)
+                row = _CachedRow(name, t.stamp, dict(t.settings), dict(t.inputs), dict(t.row), t.as_measured)
                 file.write(_ENCODER.encode(row) + b"\n")
         self._saved = kept
 
 
 def read_trials(out: Path) -> tuple[list[StoredTrial], Mapping[Path, str]]:
-    """Trials of a batch folder by name, and what is wrong with those that cannot be used."""
     return TrialReader(out).read()
 
 
@@ -147,8 +142,7 @@ def _header() -> bytes:
     return f"{source_digest(*CODE)}\n".encode()
 
 
-def _load(file: Path) -> Iterable[_KeptRow]:
-    """Rows of a file; none if it is damaged, or if other code wrote it."""
+def _load(file: Path) -> Iterable[_CachedRow]:
     if not file.is_file():
         return []
     try:
@@ -161,7 +155,7 @@ def _load(file: Path) -> Iterable[_KeptRow]:
 
 
 def _read(path: Path) -> StoredTrial | str:
-    """Read a trial. Return what is wrong with one that cannot be used."""
+    """Read a trial. Return an error message if it is not usable."""
     listed = path.parent.with_name(path.name) if path.parent.suffix == PACKED else path
     stamp = stamp_of(path)
     try:

@@ -1,6 +1,6 @@
 """Compiles all kernels ahead of their first use; later processes load them from disk.
 
-Run once after installing: `python -m experiments.trials.warmup`. It takes a minute, and seconds where all is compiled.
+Run this once after installing: `python -m experiments.trials.warmup`. It takes a minute, or seconds if all is compiled.
 """
 
 import contextlib
@@ -28,11 +28,11 @@ from planner.exact.warm_start import NOTHING_KNOWN
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import regrets
 
-TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity, and how far a trial is played, s
+TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity and simulated time of short trials, s
 
 
 def compile_kernels(house: House | None = None) -> None:
-    """Plan, act and play a little: every kernel runs on arguments of the types that it meets later."""
+    """Run every kernel once, with arguments of the types that it gets later."""
     house = house or House.load()
     plan()
     act(house)
@@ -40,7 +40,7 @@ def compile_kernels(house: House | None = None) -> None:
 
 
 def plan() -> None:
-    """Plan a tour by the full table and by the search, with regrets, and again from what is known of it."""
+    """Plan a tour by the full table and by the search, with regrets, and again from a warm start."""
     places = np.random.default_rng(0).random((16, 2))
     distances = np.linalg.norm(places[:, None] - places[None], axis=2)
     for resolution in (1e-4, None):  # tables in 32 bits, and in 64
@@ -55,7 +55,6 @@ def plan() -> None:
 
 
 def act(house: House) -> None:
-    """Walk, pick and place in every tier."""
     scene = _before_a_receptacle(house)
     start = np.array([scene.episode.start.x, scene.episode.start.y])
     path = FollowPath(np.array([start, start + 1.0]), start + 1.0, 0.5)
@@ -68,7 +67,6 @@ def act(house: House) -> None:
 
 
 def play(house: House) -> None:
-    """Play the beginning of a trial in every condition."""
     scene = compose(house.sample_episode(objects=2, seed=0), house.catalogue, visuals=False)
     for assistance in CONDITIONS:
         for fidelity, until in TRIALS:
@@ -79,7 +77,7 @@ def play(house: House) -> None:
 
 
 def _before_a_receptacle(house: House) -> Scene:
-    """A person who faces a receptacle, and an object for it half a metre behind them."""
+    """Compose a person who faces a receptacle, with an object for it half a metre behind."""
     key, receptacle = next(iter(house.receptacles.items()))
     x, y = receptacle.approach.tolist()
     heading = math.atan2(receptacle.center[1] - y, receptacle.center[0] - x)
@@ -98,7 +96,7 @@ if __name__ == "__main__":
     compile_kernels()
 
 
-NOTICE = "compiling numeric code that no command has used since the last update; this takes up to a minute"
+NOTICE = "compiling numeric code for the first time since the last update; this takes up to a minute"
 NOT_KEPT = (
     "compiling numeric code, which takes up to a minute at every command because {folder} is not writable; "
     "set NUMBA_CACHE_DIR to a folder that is"
@@ -106,7 +104,7 @@ NOT_KEPT = (
 
 
 class _Notice(Listener):  # type: ignore[misc]  # numba has no types
-    """Prints once, when the first kernel is compiled that is not on disk."""
+    """Prints a notice when the first kernel is compiled rather than loaded from disk."""
 
     def __init__(self, may_print: Callable[[], bool]) -> None:
         self._may_print = may_print
@@ -116,14 +114,13 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
         first, self._seen = not self._seen, True
         if first and sys.stderr is not None and self._may_print():
             kept = cache_folder(Path(event.data["dispatcher"].py_func.__code__.co_filename)) is not None
-            with contextlib.suppress(OSError):  # standard error is closed
+            with contextlib.suppress(OSError):  # standard error may be closed
                 sys.stderr.write(f"mjsim: {NOTICE if kept else NOT_KEPT.format(folder=cache_base())}\n")
                 sys.stderr.flush()
 
-    def on_end(self, event: Event) -> None:
-        """Do nothing; only the start of the first compilation counts."""
+    def on_end(self, event: Event) -> None: ...
 
 
 def announce_compiling(may_print: Callable[[], bool] = lambda: True) -> None:
-    """Print one line to standard error when a kernel is first compiled from now on, if `may_print()` allows it."""
+    """Print one line to standard error when a kernel is compiled from now on, if `may_print()` allows it."""
     register("numba:compile", _Notice(may_print))

@@ -1,4 +1,4 @@
-"""What runs the trials of a batch: processes of this machine that end with their parent, or a Ray cluster."""
+"""Executors of a batch: processes of this machine, which end with their parent, or a Ray cluster."""
 
 import functools
 import multiprocessing
@@ -15,19 +15,18 @@ from typing import Any, Protocol
 from experiments.session.signals import SIGNALS, signals_postponed
 from experiments.trials.ray_workers import ray_cluster
 
-QUEUED_PER_WORKER = 2  # few, so that Ctrl-C has little to wait for
+QUEUED_PER_WORKER = 2  # few, so that Ctrl-C takes effect soon
 
 
 class _Pool(ProcessPoolExecutor):
-    """Its processes begin with signals blocked, and keep them so: what stops a batch is up to the parent."""
+    """A pool whose processes block signals, so that only the parent stops a batch."""
 
     @property
     def room(self) -> int:
-        """Maximum number of calls under way."""
         return int(self._max_workers * QUEUED_PER_WORKER)  # type: ignore[attr-defined]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        with signals_postponed() as signals:  # another thread may take a signal that this one blocks
+        with signals_postponed() as signals:  # another thread may receive a signal that this one blocks
             before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             try:
                 future = super().submit(fn, *args, **kwargs)
@@ -39,7 +38,7 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def worker_pool(count: int | None = None) -> Iterator[_Pool]:
-    """Worker processes, by default one per core. They end at once where the block raises or this process is killed."""
+    """Start worker processes, by default one per core. They end at once if the block raises or this process dies."""
     # Spawned, not forked: a forked GL context or thread pool does not work.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
@@ -48,21 +47,21 @@ def worker_pool(count: int | None = None) -> Iterator[_Pool]:
         yield pool
         pool.shutdown()
     finally:
-        work.close()  # all workers see it
+        work.close()  # ends all workers
         pool.shutdown(cancel_futures=True)
         end_of_work.close()
 
 
-def _begin(end_of_work: Connection, voice: Semaphore) -> None:
-    """Begin to work: one of the workers says it if kernels are compiled, all end with their parent."""
-    from experiments.trials.warmup import announce_compiling  # numba takes a while to load
+def _begin(end_of_work: Connection, may_print: Semaphore) -> None:
+    """Initialize a worker. Only one of them announces that kernels are compiled."""
+    from experiments.trials.warmup import announce_compiling  # imported late because numba loads slowly
 
-    announce_compiling(lambda: voice.acquire(block=False))
+    announce_compiling(lambda: may_print.acquire(block=False))
     _end_with(end_of_work)
 
 
 def _end_with(end_of_work: Connection) -> None:
-    """End this process when its parent terminates it, or closes the other end of the connection, also by its death."""
+    """End this process when its parent terminates it, closes the other end of the connection, or dies."""
     parent = os.getppid()
 
     def wait_for_end() -> None:
@@ -70,7 +69,7 @@ def _end_with(end_of_work: Connection) -> None:
         os._exit(1)
 
     def wait_for_parent() -> None:
-        # From Python 3.12 on, a pool that has lost a process waits until those that it terminates have ended.
+        # From Python 3.12, a pool that has lost a process waits for the processes that it terminates.
         while signal.sigwaitinfo({signal.SIGTERM}).si_pid != parent:
             pass
         os._exit(1)
@@ -84,15 +83,16 @@ class Executor(Protocol):
 
     @property
     def room(self) -> int:
-        """Maximum number of calls under way."""
+        """Maximum number of running and queued calls."""
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]:
-        """Start a call."""
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
 
 PROCESSES, RAY = "processes", "ray"
-Pools = Callable[[], AbstractContextManager[Executor]]  # makes a new executor after a process has died
-# Name -> context, for a number of workers or None, user modules, a callback for notes, and the batch's work folder.
+Pools = Callable[
+    [], AbstractContextManager[Executor]
+]  # makes a new executor each time, for use after a crash
+# Arguments: number of workers or None, user modules, callback for notes, and work folder of the batch
 EXECUTORS: Mapping[str, Callable[..., AbstractContextManager[Pools]]] = {
     PROCESSES: lambda workers, *_: nullcontext(functools.partial(worker_pool, workers)),
     RAY: ray_cluster,

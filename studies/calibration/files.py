@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from experiments.analysis.comparison_plot import mark_origin
-from experiments.analysis.page import Block, Paragraph, Picture, page, table
+from experiments.analysis.page import Block, FigureBlock, Paragraph, page, table
 from experiments.analysis.report.figures import svg
 from experiments.analysis.study.robustness import left_out_table
 from experiments.record.files import write_json
@@ -162,7 +162,7 @@ def _missed(found: Calibration) -> list[str]:
     return [order for order, one in zip(found.rows.orders(), missed, strict=True) if one]
 
 
-def prior_and_kept(found: Calibration) -> Picture:
+def prior_and_kept(found: Calibration) -> FigureBlock:
     """A panel per parameter: its prior, what is kept, and the best value."""
     names, fit = list(found.free.priors), found.fit
     lines = -(-len(names) // COLUMNS)

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
-from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
 Fit free parameters of the guest (studies/calibration.toml) to the published rows at 6 objects. No row
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.analysis.study.table import read_study
     from experiments.errors import ConfigError
     from experiments.record.run_directory import check_file
-    from experiments.trials.simulate import study_path
+    from experiments.trials.designs import study_path
     from studies.calibration.calibrate import calibrate
     from studies.calibration.files import FILES, PAGE, write_calibration
     from studies.calibration.population import read_free_parameters

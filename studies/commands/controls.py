@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
         ConfigError: There is no control of that name.
     """
     from experiments.cli.terminal import error_console
-    from experiments.trials.simulate import read_study, study_path
+    from experiments.trials.designs import read_study, study_path
     from studies.controls import read_controls
 
     controls = read_controls(read_study(study_path(arguments.study), arguments.people), only=arguments.only)

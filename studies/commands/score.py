@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
-from experiments.cli.requirements import require_extra
 
 WIDTH = 160  # characters, where there is no terminal
 

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from experiments.analysis.comparison_plot import mark_origin
-from experiments.analysis.statistics.by_house import differences_by_house
-from experiments.analysis.statistics.mixed import mixed_model
+from experiments.analysis.statistics.mixed import differences_by_house, mixed_model
 from experiments.analysis.study.analysis import random_factors
 from experiments.analysis.study.measures import read_measures
 from experiments.analysis.study.table import StudyTable, read_study

@@ -34,7 +34,7 @@ from experiments.record.records import Event, read_events
 from experiments.record.run_directory import TRIALS
 from experiments.trials.batch import BatchProgress, run_batch
 from experiments.trials.design import Design
-from experiments.trials.simulate import read_study, study_path
+from experiments.trials.designs import read_study, study_path
 from experiments.trials.trial_reader import read_trials
 from mjsim.support.files import replacing, write_text_atomically
 from planner.ortools_solver import OrToolsSolver

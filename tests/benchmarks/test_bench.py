@@ -36,7 +36,7 @@ def test_a_module_that_measures_nothing_is_refused(tmp_path):
     )
     assert benchmark_names(tmp_path) == ("empty", "good")
     assert list(benchmark("good", tmp_path).lines({"n": 1})) == ["1"]
-    with pytest.raises(ConfigError, match=r"empty\.py is no benchmark"):
+    with pytest.raises(ConfigError, match=r"empty\.py is not a benchmark"):
         benchmark("empty", tmp_path)
 
 

@@ -74,7 +74,7 @@ def test_a_full_disk_at_the_floor_plan_costs_the_floor_plan_alone(house, tmp_pat
 
 
 def test_where_nothing_can_be_written_that_is_said(house, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.record.export.save_arrays", full)
+    monkeypatch.setattr("experiments.record.writer.save_arrays", full)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with pytest.raises(OSError, match="No space left"):
         run_trial(BRIEF, tmp_path / "out", topdown=False, house=house)

@@ -14,7 +14,7 @@ from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.records import EventLog
 from experiments.trials import setup
-from experiments.trials.replay.log_source import LogSource
+from experiments.trials.replay.replayer import LogSource
 from experiments.trials.setup import prepare_session, prepared_planner
 from experiments.trials.training import trials_of
 from experiments.trials.trial_config import TrialConfig

@@ -13,7 +13,7 @@ from experiments.participants.distribution import Distributions, distribution
 from experiments.participants.guest import PARAMETERS
 from experiments.record.phases import SIMULATED
 from experiments.trials.design import read_design
-from experiments.trials.simulate import read_study, study_path
+from experiments.trials.designs import read_study, study_path
 from experiments.trials.table import write_tables
 from studies import score_rules
 from studies.calibration import inference, surrogate

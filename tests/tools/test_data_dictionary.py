@@ -6,9 +6,9 @@ import re
 import pytest
 
 from experiments.record import records
-from experiments.record.displays import Displays
-from experiments.record.event_check import check_event
+from experiments.record.events import check_event
 from experiments.record.files import read_json
+from experiments.record.metrics import Displays
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from tools.data_dictionary import data_dictionary

@@ -1,1 +1,1 @@
-"""Planning of studies: power, homes, preregistration and cost."""
+"""Planning of studies: power, cost and preregistration."""

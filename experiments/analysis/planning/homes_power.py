@@ -1,8 +1,9 @@
-"""Power of a study in several homes: more homes, more people, or more trials of each?
+"""Power of a study in several homes by the numbers of homes, people and trials.
 
-The variances are those of a mixed model of simulated people. The design is balanced: each condition has the same number
-of people, everybody has the same number of trials, and all conditions share the homes. Then what all conditions
-of a home share cancels, and the mean of a condition varies by people, by what it does in its homes, and by trials.
+The variances come from a mixed model of simulated participants. The design is balanced: conditions have equal numbers
+of people, people have equal numbers of trials, and all conditions share the homes. Effects of a home that all
+conditions share cancel. The mean of a condition then varies with the people, with its own effects in the homes, and
+with the trials.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,8 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.analysis.comparison_plot import mark_origin
+from experiments.analysis.statistics.effects import power_of
 from experiments.analysis.statistics.mixed import MIN_LEVELS, mixed_model
-from experiments.analysis.statistics.power import power_of
 from experiments.analysis.study.analysis import random_factors
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
@@ -26,16 +27,23 @@ SLOPE = "house x assistance"
 
 @dataclass(frozen=True)
 class HomesPower:
-    """Power to find a difference between conditions, by numbers of homes and of people a condition."""
+    """Power to detect a difference between conditions, by numbers of homes and of people per condition.
 
-    origin: str  # whether the people of the pool were simulated
-    column: str  # of the measure
-    trials: int  # of each person
-    means: Mapping[str, float]  # by condition
-    variances: Mapping[str, float]  # of people, of conditions within houses, and of what is left
+    Attributes:
+        trials: Number of trials per person.
+        means: Mean by condition.
+        variances: Variances of people, of conditions within houses, and of the residual.
+        power: Power by homes, then by people.
+    """
+
+    origin: str
+    column: str
+    trials: int
+    means: Mapping[str, float]
+    variances: Mapping[str, float]
     homes: tuple[int, ...]
-    people: tuple[int, ...]  # of each condition
-    power: tuple[tuple[float, ...], ...]  # by homes and people
+    people: tuple[int, ...]
+    power: tuple[tuple[float, ...], ...]
 
 
 def homes_power(
@@ -48,17 +56,21 @@ def homes_power(
     difference: float | None = None,
     alpha: float = 0.05,
 ) -> HomesPower:
-    """Power of all these designs, `trials` of each person; people with several trials in several homes are the pool.
+    """Compute the power of all these designs from a pool of people with trials in several homes.
 
-    The means are those of the pool, or the extremes differ by `difference`, with the others in the middle. Raises
-    `ConfigError` for a design that is none, `StatisticsError` if the pool does not tell the variances.
+    The means are those of the pool. With `difference`, the extremes differ by it, and the other means are in the
+    middle.
+
+    Raises:
+        ConfigError: A design is impossible.
+        StatisticsError: The variances cannot be estimated from the pool.
     """
     if measure not in table.columns:
         raise ConfigError(f"there is no measure {measure!r}; there are {', '.join(table.columns)}")
     if min(homes) < MIN_LEVELS or min(people) < 2 or not 1 <= trials <= min(homes):
         raise ConfigError(
-            f"homes {min(homes)}, people {min(people)}, trials {trials}: at least {MIN_LEVELS} homes, 2 people of a "
-            "condition, and 1 trial in each of the homes at most are possible"
+            f"homes {min(homes)}, people {min(people)}, trials {trials}: a design needs at least {MIN_LEVELS} homes, 2 "
+            "people per condition, and at most 1 trial per home"
         )
     variances = _variances(table, measure)
     means = {c: float(values.mean()) for c, values in table.groups(measure).items()}
@@ -79,7 +91,7 @@ def _variances(table: StudyTable, measure: str) -> dict[str, float]:
     factors = random_factors(here)
     if missing := {"person", SLOPE} - set(factors):
         raise StatisticsError(
-            f"the pool does not tell the variance of {', '.join(sorted(missing))}: people need several trials "
+            f"the pool has no data on the variance of {', '.join(sorted(missing))}: people need several trials "
             "(trials_per_person), and houses several trials of a condition"
         )
     model = mixed_model(here.columns[measure], here.assistance, here.objects, factors)
@@ -95,18 +107,18 @@ def power_of_design(
     trials: int,
     alpha: float = 0.05,
 ) -> float:
-    """Power of the F test of the conditions, with Satterthwaite's degrees of freedom; `people` are of each condition.
+    """Compute the power of the F test of the conditions, with Satterthwaite's degrees of freedom.
 
-    No more homes are used than there are trials of a condition.
+    `people` is the number per condition. At most as many homes are used as a condition has trials.
     """
     count, each = len(means), people * trials
     used = min(homes, each)
     left = variances["residual"]
-    of_people = left + trials * variances["person"]  # expected mean squares
+    of_people = left + trials * variances["person"]  # this and the next are expected mean squares
     of_homes = left + each / used * variances[SLOPE]
     freedom = count * (people - 1), (count - 1) * (used - 1)
-    rest = max(count * each - sum(freedom) - used, freedom[0])  # no fewer, where people share no homes
-    variance = (of_people + of_homes - left) / each  # of the mean of a condition, but for what all share
+    rest = max(count * each - sum(freedom) - used, freedom[0])  # at least that, if people share no homes
+    variance = (of_people + of_homes - left) / each  # of a condition's mean, without the shared part
     parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
     df2 = variance**2 * each**2 / float(parts.sum())
     effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance
@@ -114,7 +126,7 @@ def power_of_design(
 
 
 def draw(path: Path, found: HomesPower, measure: str) -> None:
-    """A line for each number of people: power by the number of homes."""
+    """Draw the power by the number of homes, with a line per number of people."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
@@ -126,8 +138,8 @@ def draw(path: Path, found: HomesPower, measure: str) -> None:
     axes.minorticks_off()
     axes.set_ylim(0, 1.02)
     axes.set_xlabel("homes")
-    axes.set_ylabel(f"power to find the effect on {measure}")
-    axes.legend(title=f"in a condition, {found.trials} trials each", fontsize=8, frameon=False)
+    axes.set_ylabel(f"power to detect the effect on {measure}")
+    axes.legend(title=f"per condition, {found.trials} trials each", fontsize=8, frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
     mark_origin(figure, found.origin)
     with replacing(path) as temporary:

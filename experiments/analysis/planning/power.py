@@ -1,7 +1,7 @@
-"""Sample size of the next study from the variance of simulated people: for a wanted effect, with its uncertainty.
+"""Sample size and cost of the next study, from the variance of simulated participants.
 
-The noncentral F gives the number, bootstrapping the pool its uncertainty; studies drawn from the pool show whether it
-holds for data that are not normally distributed and vary more in some conditions than in others.
+The noncentral F distribution gives the sample size, and a bootstrap of the pool its interval. Studies drawn from the
+pool show whether the power holds for data that are not normal or have unequal variances.
 """
 
 import math
@@ -10,37 +10,76 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.analysis.planning.cost import StudyCost
 from experiments.analysis.statistics.anova import EFFECTS, Values, one_way, two_way, two_way_squares
-from experiments.analysis.statistics.effects import ALPHA
-from experiments.analysis.statistics.noncentral import Interval
-from experiments.analysis.statistics.power import POWER, people_per_cell
+from experiments.analysis.statistics.effects import ALPHA, POWER, Interval, people_per_cell
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
 from experiments.trials.exclusions import LeftOut
 
-RESAMPLES = 200  # of the pool
-STUDIES = 400  # drawn to see whether the power holds
-SHARE = 0.9  # of the interval
-MIN_POOL = 10  # people of a cell of the pool
+RESAMPLES = 200  # of the pool, for the interval
+STUDIES = 400  # drawn from the pool, to check the power
+COVERAGE = 0.9  # of the interval
+MIN_POOL = 10  # people per cell of the pool
 
 Cell = tuple[str, int]
 Pool = Mapping[Cell, Values]
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """The effect that a study should find."""
+class StudyCost:
+    """Pay, fees and time of participants.
 
-    measure: str  # short name of the measure
-    effect: str = "assistance"  # `assistance`, `objects` or `interaction`
-    # between the largest and the smallest mean of a factor's levels, in units of the measure, with the
-    # other means in the middle, which is the hardest case. Or None.
+    Attributes:
+        fee: Fee of the platform as a share of the pay.
+        dropout: Share of the people who start and do not finish.
+    """
+
+    pay: float = 7.5  # PAPER section 7
+    fee: float = 0.0
+    minutes: float = 25.0  # PAPER section 7
+    dropout: float = 0.15
+
+    def __post_init__(self) -> None:
+        for name in ("pay", "fee", "minutes", "dropout"):
+            value = getattr(self, name)
+            if not 0 <= value < (1 if name == "dropout" else math.inf):
+                raise ConfigError(
+                    f"{name} is {value:g}; it must be 0 or more{', below 1' * (name == 'dropout')}"
+                )
+
+    def total(self, people: int) -> float:
+        """Return the cost of this number of people who finish."""
+        return people * self.pay * (1 + self.fee)
+
+    def hours(self, people: int) -> float:
+        """Return the hours of this number of people who finish, and of those who do not."""
+        return self.to_recruit(people) * self.minutes / 60
+
+    def to_recruit(self, people: int) -> int:
+        """Return the number of people who must start."""
+        return math.ceil(people / (1 - self.dropout) - 1e-9)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The effect that a study should detect. Without `difference` and `eta_squared`, it is the effect in the pool.
+
+    Attributes:
+        measure: Short name of the measure.
+        effect: `assistance`, `objects` or `interaction`.
+        difference: Largest difference between means of a factor's levels, in units of the measure, or None. The other
+            means are in the middle, which is the hardest case.
+        eta_squared: Partial eta squared, or None.
+        power: Probability of detecting the effect.
+        alpha: Significance level.
+    """
+
+    measure: str
+    effect: str = "assistance"
     difference: float | None = None
-    # partial eta squared instead, or None. With neither, the effect is that of the pool.
     eta_squared: float | None = None
-    power: float = POWER  # probability of finding it
-    alpha: float = ALPHA  # level of the test
+    power: float = POWER
+    alpha: float = ALPHA
 
     def __post_init__(self) -> None:
         if self.effect not in EFFECTS:
@@ -51,33 +90,40 @@ class Wanted:
             self.effect == "interaction" or not 0 < self.difference < math.inf
         ):
             raise ConfigError(
-                f"a difference of {self.difference:g} must be above 0, and of assistance or objects"
+                f"difference is {self.difference:g}; it must be above 0, and the effect assistance or objects"
             )
         for name in ("eta_squared", "power", "alpha"):
             value = getattr(self, name)
             if value is not None and not 0 < value < 1:
-                raise ConfigError(f"{name} is {value:g}; it must lie between 0 and 1")
+                raise ConfigError(f"{name} is {value:g}; it must be between 0 and 1")
 
 
 @dataclass(frozen=True)
 class PowerPlan:
-    """Sample size and cost of a study."""
+    """Sample size and cost of a study.
 
-    origin: str  # whether the people of the pool were simulated
-    cells: int  # number of cells
-    eta_squared: float  # partial eta squared of the wanted effect
-    per_cell: int  # people in each cell
-    # 90 % interval of it, by drawing the people of the pool again; None where it does not depend on them
+    Attributes:
+        interval: 90 % interval of `per_cell` by resampling the pool; None if it does not depend on the pool.
+        power: Share of studies of that size, drawn from the pool, that detect the effect.
+        power_error: Standard error of that share.
+        people: Number of people who finish, in all cells.
+        to_recruit: Number of people who must start.
+    """
+
+    origin: str
+    cells: int
+    eta_squared: float
+    per_cell: int
     interval: tuple[int, int] | None
-    power: float  # share of studies of that size, drawn from the pool, that find the effect
-    power_error: float  # standard error of that share
-    people: int  # number who finish, in all cells
-    to_recruit: int  # number who must start
-    cost: float  # in the currency of the pay
-    hours: float  # of all people together
-    cost_interval: Interval | None  # cost at both ends of `interval`, or None
-    hours_interval: Interval | None  # hours at both ends of it, or None
-    left_out: tuple[LeftOut, ...]  # people of the pool's table who are no people of the pool
+    power: float
+    power_error: float
+    people: int
+    to_recruit: int
+    cost: float
+    hours: float
+    cost_interval: Interval | None
+    hours_interval: Interval | None
+    left_out: tuple[LeftOut, ...]
 
 
 def plan_power(
@@ -85,8 +131,11 @@ def plan_power(
 ) -> PowerPlan:
     """Compute the number of people that each cell (condition, number of objects) of a study needs.
 
-    `table` is the pool of people in the same cells. Raises `ConfigError` if the design cannot show the effect,
-    `StatisticsError` if the pool lacks people or does not vary, or too many people would be needed.
+    `table` is a pool of people in the same cells.
+
+    Raises:
+        ConfigError: The design cannot show the effect.
+        StatisticsError: The pool has too few people or no variance, or too many people would be needed.
     """
     pool, rng = _pool(cells, table, wanted), np.random.default_rng(seed)
     eta_squared = _eta_squared(pool, wanted)
@@ -130,32 +179,31 @@ def _pool(cells: Sequence[Cell], table: StudyTable, wanted: Wanted) -> Pool:
 
 
 def _levels(pool: Pool, effect: str) -> list[str | int]:
-    place = 0 if effect == "assistance" else 1
-    return sorted({cell[place] for cell in pool}, key=str)
+    factor = 0 if effect == "assistance" else 1
+    return sorted({cell[factor] for cell in pool}, key=str)
 
 
 def _freedom(pool: Pool, effect: str) -> int:
     counts = [len(_levels(pool, name)) for name in EFFECTS[:2]]
     if math.prod(counts) != len(pool):
         raise ConfigError(
-            "the cells are no full crossing of conditions and numbers of objects; tests need one"
+            "the tests need a full crossing of conditions and numbers of objects; some cells are missing"
         )
     freedom = {"assistance": counts[0] - 1, "objects": counts[1] - 1}
     found = freedom.get(effect, freedom["assistance"] * freedom["objects"])
     if found < 1:
-        raise ConfigError(f"the study has one level only; there is no effect of {effect}")
+        raise ConfigError(f"the study has only one level; there is no effect of {effect}")
     return found
 
 
 def _variance(pool: Pool) -> float:
-    """Variance within cells, every cell with the same weight."""
     return float(np.mean([v.var(ddof=1) for v in pool.values()]))
 
 
 def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
-    """Partial eta squared of the wanted effect, in cells of equal size.
+    """Return partial eta squared of the wanted effect, in cells of equal size.
 
-    The means of a pool differ by chance too; those of people drawn from it (`draws` 2) by its chance and their own.
+    The effect in the pool is corrected for chance: once for the pool itself, twice (`draws`) for people drawn from it.
     """
     if wanted.eta_squared is not None:
         return wanted.eta_squared
@@ -166,12 +214,14 @@ def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
     squares = _squares({cell: float(v.mean()) for cell, v in pool.items()}, wanted.effect)
     ratio = (squares / _variance(pool) - chance) / len(pool)
     if ratio <= 0:
-        raise StatisticsError(f"the pool shows no effect of {wanted.effect} on {wanted.measure}; name one")
+        raise StatisticsError(
+            f"the pool shows no effect of {wanted.effect} on {wanted.measure}; give its size"
+        )
     return ratio / (1 + ratio)
 
 
 def _squares(means: Mapping[Cell, float], effect: str) -> float:
-    """Sum of squares of an effect on means, one person in each cell."""
+    """Return the sum of squares of an effect on means, with one person per cell."""
     values = np.array(list(means.values()))
     first, second = (np.array([cell[k] for cell in means]) for k in (0, 1))
     if len(set(second.tolist())) == 1 or len(set(first.tolist())) == 1:
@@ -180,28 +230,27 @@ def _squares(means: Mapping[Cell, float], effect: str) -> float:
 
 
 def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int, int]:
-    """90 % interval of the people in each cell: the more, the smaller the effect of people drawn from the pool."""
     drawn = {cell: rng.choice(v, (RESAMPLES, len(v))) for cell, v in pool.items()}
     sizes = []
     for k in range(RESAMPLES):
         try:
             sizes.append(_eta_squared({cell: v[k] for cell, v in drawn.items()}, wanted, draws=2))
-        except StatisticsError:  # these people show no effect
+        except StatisticsError:  # the resampled people show no effect
             sizes.append(0.0)
-    small, large = np.quantile(sizes, [(1 - SHARE) / 2, (1 + SHARE) / 2], method="nearest").tolist()
+    small, large = np.quantile(sizes, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2], method="nearest").tolist()
     cells, freedom = len(pool), _freedom(pool, wanted.effect)
     try:
         low, high = (people_per_cell(e, freedom, cells, wanted.power, wanted.alpha) for e in (large, small))
     except StatisticsError as error:
         raise StatisticsError(
-            f"the pool does not say how many people are needed: its effect of {wanted.effect} is not clear of none; "
-            "simulate more people, or name an effect"
+            f"the pool is too small: its effect of {wanted.effect} could be zero; simulate more people, or give the "
+            "size of the effect"
         ) from error
     return low, high
 
 
 def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
-    """The pool's people with the wanted effect, and no other, in place of its own."""
+    """Replace the effects in the pool by the wanted effect only."""
     own = wanted.difference is None and wanted.eta_squared is None
     pattern = _own_pattern(pool, wanted.effect) if own else _pattern(pool, wanted.effect)
     ratio = eta_squared / (1 - eta_squared) * len(pool) * _variance(pool)
@@ -210,7 +259,7 @@ def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
 
 
 def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Means by cell, up to a factor: one extreme level against the other, or both factors' extremes crossed."""
+    """Return means by cell, up to a factor: the extreme levels of one factor, or of both factors crossed."""
 
     def step(cell: Cell, name: str) -> float:
         levels = _levels(pool, name)
@@ -221,12 +270,12 @@ def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
 
 def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Means of the pool's cells, less those of the other effects; up to a factor, as chance enlarges them."""
+    """Return means of the pool's cells without the other effects. Their scale is ignored; chance enlarges it."""
     means = {cell: float(v.mean()) for cell, v in pool.items()}
     grand = float(np.mean(list(means.values())))
 
-    def margin(cell: Cell, place: int) -> float:
-        return float(np.mean([m for other, m in means.items() if other[place] == cell[place]])) - grand
+    def margin(cell: Cell, factor: int) -> float:
+        return float(np.mean([m for other, m in means.items() if other[factor] == cell[factor]])) - grand
 
     if effect != "interaction":
         return {cell: margin(cell, EFFECTS.index(effect)) for cell in pool}
@@ -234,7 +283,6 @@ def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
 
 def _drawn_power(pool: Pool, wanted: Wanted, size: int, rng: np.random.Generator) -> float:
-    """Share of drawn studies with `size` people in each cell that find the effect."""
     first, second = (np.repeat([cell[k] for cell in pool], size) for k in (0, 1))
     crossed = len(set(first.tolist())) > 1 and len(set(second.tolist())) > 1
     found = 0

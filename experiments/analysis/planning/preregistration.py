@@ -1,6 +1,6 @@
-"""Preregistrations: a ZIP that freezes design, measures, exclusions, analysis and code before there are data.
+"""Preregistrations: ZIP files that freeze design, measures, exclusions, analysis and code before data are collected.
 
-Equal studies give equal bytes, so that the SHA-256 of the file stands for it.
+Equal studies give equal bytes, so the SHA-256 of the file identifies the study.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from experiments.errors import ConfigError, RecordError
 from experiments.record import records
 from experiments.record.archive import read_file, run_paths
 from experiments.record.run_directory import TRIALS
-from experiments.trials.batch_checks import check_names
+from experiments.trials.batch_plan import check_names
 from experiments.trials.design import counted, read_design
 from experiments.trials.exclusions import Exclusions
 from experiments.trials.trial_config import PATHS, SETTINGS
@@ -31,7 +31,7 @@ from mjsim.support.files import ROOT, read_bytes, replacing, source_digest
 STUDY, DESIGN, MEASURES, EXCLUSIONS = "study.toml", "design.json", "measures.toml", "exclusions.json"
 VERSIONS, MANIFEST, CODE = "versions.json", "manifest.json", "code/"
 LIBRARIES = ("mjsim", "numpy", "scipy", "statsmodels")
-# Code that decides what an analysis says.
+# Code that affects the results of an analysis
 ANALYSIS = (
     "experiments/study",
     "experiments/analysis",
@@ -39,30 +39,30 @@ ANALYSIS = (
     "experiments/trials/exclusions.py",
 )
 CELL = ("assistance", "objects")
-_DATE = (1980, 1, 1, 0, 0, 0)  # of every file, as a ZIP must have one
+_DATE = (1980, 1, 1, 0, 0, 0)  # of every file, because ZIP requires a date
 
 Files = dict[str, bytes]
 
 
 @dataclass(frozen=True)
 class Preregistration:
-    """What was frozen."""
+    """A frozen study: its files, the SHA-256 of the ZIP, and settings of each trial (`design`)."""
 
     files: Mapping[str, bytes]
-    sha256: str  # of the ZIP
+    sha256: str
     exclusions: Exclusions
     measures: Measures
     versions: Mapping[str, str]
-    design: Sequence[Mapping[str, Any]]  # settings of each trial
+    design: Sequence[Mapping[str, Any]]
 
 
 def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
-    """Freeze a study file and a file of measures as a ZIP; its SHA-256."""
+    """Freeze a study file and a file of measures as a ZIP. Return its SHA-256."""
     design = read_design(study)
     check_names(design.trials)
     read_measures(measures)
     if out.exists() and out.samefile(study):
-        raise ConfigError(f"{out} is the study file itself; name another file to write")
+        raise ConfigError(f"{out} is the study file; name another file to write")
     files = _frozen(design.exclusions or Exclusions(), measures.read_bytes())
     files[STUDY] = study.read_bytes()
     files[DESIGN] = _json([_comparable(trial.settings()) for trial in design.trials])
@@ -82,15 +82,15 @@ def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
 
 
 def _frozen(exclusions: Exclusions, measures: bytes) -> Files:
-    places = [ROOT / place for place in ANALYSIS]
-    sources = [path for place in places for path in ([place] if place.is_file() else place.rglob("*.py"))]
+    paths = [ROOT / path for path in ANALYSIS]
+    sources = [file for path in paths for file in ([path] if path.is_file() else path.rglob("*.py"))]
     return {
         MEASURES: measures,
         EXCLUSIONS: _json(msgspec.to_builtins(exclusions)),
         VERSIONS: _json(
             {"python": platform.python_version(), **_versions(), "code of mjsim": source_digest()}
         ),
-        **{CODE + path.relative_to(ROOT).as_posix(): path.read_bytes() for path in sources},
+        **{CODE + file.relative_to(ROOT).as_posix(): file.read_bytes() for file in sources},
     }
 
 
@@ -109,31 +109,27 @@ def _json(value: Any) -> bytes:
 
 
 def read_preregistration(path: Path) -> Preregistration:
-    """Read a preregistration; a ConfigError says why it is none, or not as it was written."""
+    """Read a preregistration. Raises a `ConfigError` if the file is not a preregistration, or was changed."""
     try:
         data = read_bytes(path)
         files = _unpacked(data)
-        told = msgspec.json.decode(files.pop(MANIFEST), type=dict[str, str])
+        listed = msgspec.json.decode(files.pop(MANIFEST), type=dict[str, str])
         sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
-        if changed := sorted(name for name in {**told, **sums} if told.get(name) != sums.get(name)):
-            raise ConfigError(
-                f"it was changed after it was written: {changed[0]} is not what its manifest says"
-            )
+        if changed := sorted(name for name in {**listed, **sums} if listed.get(name) != sums.get(name)):
+            raise ConfigError(f"it was changed: {changed[0]} differs from the manifest")
         exclusions = msgspec.json.decode(files[EXCLUSIONS], type=Exclusions)
         measures = decoded_measures(files[MEASURES])
         versions = msgspec.json.decode(files[VERSIONS], type=dict[str, str])
         design = msgspec.json.decode(files[DESIGN], type=list[dict[str, Any]])
         for trial in design:
             if set(trial) != set(SETTINGS) or not isinstance(trial["assistance"], str):
-                raise ConfigError(
-                    f"{DESIGN} does not hold the settings of each trial; another version wrote it"
-                )
+                raise ConfigError(f"{DESIGN} lacks settings of trials; another version wrote it")
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from error
     except KeyError as error:
-        raise ConfigError(f"{path} is no preregistration: it has no {error}") from error
+        raise ConfigError(f"{path} is not a preregistration: it has no {error}") from error
     except Exception as error:  # zipfile raises a dozen types on damaged files
-        raise ConfigError(f"{path} is no preregistration that can be used: {error}") from error
+        raise ConfigError(f"{path} is not a valid preregistration: {error}") from error
     return Preregistration(files, hashlib.sha256(data).hexdigest(), exclusions, measures, versions, design)
 
 
@@ -144,7 +140,7 @@ def _unpacked(data: bytes) -> Files:
         for entry in entries:
             if entry.compress_type != zipfile.ZIP_STORED or entry.filename in files:
                 raise ConfigError(
-                    "`mjsim study preregister` did not write it: files are packed, or there twice"
+                    "`mjsim study preregister` did not write it: files are compressed or duplicated"
                 )
             files[entry.filename] = archive.read(entry)
     return files
@@ -157,29 +153,29 @@ def departures(
     folder: Path,
     measures: Measures,
 ) -> list[str]:
-    """What is run otherwise than it was preregistered, a sentence each."""
+    """List the differences between a study and its preregistration, one sentence each."""
     now = _frozen(exclusions, b"")
     found = [*_of_exclusions(frozen.exclusions, exclusions)]
     if frozen.measures != measures:
-        found.append("The measures are others.")
+        found.append("The measures differ.")
     found += _of_versions(frozen.versions, json.loads(now[VERSIONS]))
     names = {name for name in (*frozen.files, *now) if name.startswith(CODE)}
     if changed := sorted(
         name.removeprefix(CODE) for name in names if frozen.files.get(name) != now.get(name)
     ):
-        found.append(f"The code of the analysis is another: {', '.join(changed)}.")
+        found.append(f"The code of the analysis differs: {', '.join(changed)}.")
     return [*found, *_of_design(frozen.design, people, folder)]
 
 
 def _of_exclusions(before: Exclusions, now: Exclusions) -> Iterator[str]:
-    def told(exclusions: Exclusions) -> dict[str, str]:
+    def reasons(exclusions: Exclusions) -> dict[str, str]:
         people = {f"the person {person.id}": person.reason for person in exclusions.people}
         return {f"the rule {rule}": rule.reason for rule in exclusions.all_rules()} | people
 
-    old, new = told(before), told(now)
+    old, new = reasons(before), reasons(now)
     for name in {**old, **new}:
         if name not in new:
-            yield f"Exclusions: {name} was preregistered and is not applied."
+            yield f"Exclusions: {name} was preregistered but is not applied."
         elif name not in old:
             yield f"Exclusions: {name} was not preregistered ({new[name]})."
         elif old[name] != new[name]:
@@ -188,7 +184,7 @@ def _of_exclusions(before: Exclusions, now: Exclusions) -> Iterator[str]:
 
 def _of_versions(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[str]:
     for name in {**before, **now}:
-        old, new = (found.get(name, "not known") for found in (before, now))
+        old, new = (found.get(name, "unknown") for found in (before, now))
         if old != new:
             yield f"Version of {name}: {new}, preregistered {old}."
 
@@ -203,7 +199,7 @@ def _of_design(
             yield f"The cell {cell[0]}, {cell[1]} objects has {counted(there, 'trial')}, preregistered {meant}."
     ran = _settings_of_runs(folder)
     if len(ran) != len(people):
-        yield "There is no run directory for each person; settings that are no columns of the table are not compared."
+        yield "Run directories are missing, so only settings that are columns of the table are compared."
         ran = [_comparable(row) for row in people]
     for name in (n for n in SETTINGS if n not in CELL and all(n in row for row in ran)):
         if other := _by_cell(ran, name) - _by_cell(planned, name):
@@ -211,7 +207,6 @@ def _of_design(
 
 
 def _by_cell(rows: Sequence[Mapping[str, Any]], name: str) -> Counter[str]:
-    """How often a setting has each value in each cell."""
     return Counter(
         f"{row['assistance']}, {row['objects']} objects: {json.dumps(row[name], sort_keys=True)}"
         for row in rows
@@ -219,7 +214,6 @@ def _by_cell(rows: Sequence[Mapping[str, Any]], name: str) -> Counter[str]:
 
 
 def _settings_of_runs(folder: Path) -> list[dict[str, Any]]:
-    """Settings of the trials in a folder, as their logs begin with them."""
     found = []
     for path in run_paths(folder / TRIALS):
         try:
@@ -231,7 +225,7 @@ def _settings_of_runs(folder: Path) -> list[dict[str, Any]]:
 
 
 def _comparable(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of a row without the places of its files: their content counts."""
+    """Return the settings of a row, with hashes of files in place of their paths."""
     found = {name: row[name] for name in SETTINGS if name in row}
     for name in PATHS:
         path = found.get(name)

@@ -1,1 +1,1 @@
-"""Reports of a study: figures, assumptions and the page."""
+"""Reports of a study: page, figures, and checks of assumptions."""

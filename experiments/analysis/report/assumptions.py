@@ -1,4 +1,4 @@
-"""Figures on how far results depend on choices and assumptions: specification curves, residuals."""
+"""Report sections on how far results depend on choices and assumptions: specification curves and residuals."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -8,14 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from experiments.analysis.page import Block, Paragraph, Picture, freedom, p_value, shown, table
+from experiments.analysis.page import Block, FigureBlock, Paragraph, freedom, p_value, shown, table
 from experiments.analysis.report.figures import COLOURS, MAX_DOTS, framed, grid
 from experiments.analysis.statistics.effects import ALPHA, FTest
 from experiments.analysis.statistics.models import residuals_of
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"
-ANALYSES = {  # rows of the matrix, by kind of result
+ANALYSES = {  # kind of result -> row of the matrix
     ONE_WAY: FISHER,
     TWO_WAY: FISHER,
     "two-way, Type III": "Type III",
@@ -31,32 +31,23 @@ ABOUT = (
     "equal variances; the latter two test unweighted means, as Type III does. The mixed model lets houses differ."
 )
 DIAGNOSTIC_HEAD = (
-    *(
-        "measure",
-        "Shapiro-Wilk W",
-        "p",
-        "skewness",
-        "excess kurtosis",
-        "equal variances: Brown-Forsythe F",
-        "df",
-        "p",
-    ),
-    *("smallest SD (cell)", "largest SD (cell)"),
+    *("measure", "Shapiro-Wilk W", "p", "skewness", "excess kurtosis", "equal variances: Brown-Forsythe F"),
+    *("df", "p", "smallest SD (cell)", "largest SD (cell)"),
 )
 SIGNIFICANT = COLOURS[2]
-COLUMN, ROW = 0.11, 0.17  # inches of the matrix
+COLUMN, ROW = 0.11, 0.17  # of the matrix, inches
 
 
 class Specification(NamedTuple):
-    """A way to analyse a measure, and the outcome."""
+    """One analysis of a measure, and its outcome."""
 
     reading: str  # column of the table
     analysis: str
     test: FTest
 
 
-def specification_curve(analysis: Analysis, name: str, label: str) -> Picture | None:
-    """Every effect on a measure by every reading and analysis, the choices below each estimate; None without any.
+def specification_curve(analysis: Analysis, name: str, label: str) -> FigureBlock | None:
+    """Draw every effect on a measure by every reading and analysis, with the choices below, or return None.
 
     Source: Simonsohn, Simmons and Nelson 2020, doi:10.1038/s41562-020-0912-z.
     """
@@ -87,7 +78,6 @@ def specification_curve(analysis: Analysis, name: str, label: str) -> Picture | 
 
 
 def _specifications(analysis: Analysis, name: str) -> dict[str, list[Specification]]:
-    """By effect and number of objects, from the smallest estimate to the largest."""
     readings = [name, *analysis.measures.objective[name].others]
     found: dict[str, list[Specification]] = {}
     for result in analysis.results:
@@ -101,7 +91,6 @@ def _specifications(analysis: Analysis, name: str) -> dict[str, list[Specificati
 
 
 def _choices(analysis: Analysis, groups: dict[str, list[Specification]]) -> list[str]:
-    """Rows of the matrix: readings in the order of the table, then analyses."""
     used = [one for found in groups.values() for one in found]
     readings = [c for c in analysis.table.sources.values() if c in {one.reading for one in used}]
     return readings + [a for a in dict.fromkeys(ANALYSES.values()) if a in {one.analysis for one in used}]
@@ -127,8 +116,7 @@ def _draw_choices(axes: Axes, found: list[Specification], choices: list[str]) ->
     axes.spines[["top", "right", "bottom", "left"]].set_visible(False)
 
 
-def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> Picture:
-    """A column per measure: residuals against the means of their cells, and against normal quantiles."""
+def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> FigureBlock:
     figure = Figure(figsize=(3.0 * len(labels), 5.0), layout="constrained")
     panels = grid(figure, 2, len(labels))
     for (upper, lower), (name, label) in zip(panels.T, labels.items(), strict=True):
@@ -155,7 +143,7 @@ def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> Picture:
 
 
 def assumptions(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[Block]:
-    """Diagnostics, and what analyses decide that assume less."""
+    """Yield diagnostics, and the decisions of analyses with weaker assumptions."""
     found = {r.measure: r.value for r in analysis.results if r.kind == "diagnostics" and r.value}
     if not found:
         return
@@ -175,7 +163,6 @@ def assumptions(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[Block
 
 
 def _decisions(analysis: Analysis, name: str, label: str) -> Iterator[tuple[object, ...]]:
-    """Effect by effect, p by each analysis, and whether one decides otherwise."""
     found: dict[tuple[str, int | None], dict[str, float]] = {}
     for result in (r for r in analysis.results if r.measure == name):
         for effect, test in tests_of(result):

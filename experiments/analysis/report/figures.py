@@ -1,12 +1,15 @@
-"""Figures of a study as inline SVG: no links, no scripts, equal bytes for equal data."""
+"""Figures of a study as inline SVG without links or scripts. Equal data give equal bytes."""
 
 import io
+import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+import shapely
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -15,23 +18,34 @@ from numpy.typing import NDArray
 
 from experiments.analysis.comparison import mean_interval
 from experiments.analysis.comparison_plot import mark_origin
-from experiments.analysis.page import Picture
+from experiments.analysis.page import FigureBlock
 from experiments.analysis.study.analysis import Analysis
-from experiments.analysis.study.measures import LIKERT_PREFIX
-from experiments.analysis.study.table import ANSWERS, StudyTable
+from experiments.analysis.study.measures import ANSWERS, LIKERT_PREFIX
+from experiments.analysis.study.table import StudyTable
+from experiments.errors import RecordError
+from experiments.house import House
+from experiments.record import records
+from experiments.record.archive import opened_run, read_file, run_paths
+from experiments.record.files import read_arrays
+from experiments.record.phases import TASK
+from experiments.record.run_directory import TRIALS, is_run
+from experiments.trials.floor_plan import PLANNED, WALKED, planned_path
+from mjsim.values.episode import Episode
 
-# Okabe-Ito colours, distinct for all common kinds of colour vision.
+# Okabe-Ito colours, distinct for all common kinds of colour vision
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
-RASTER_DPI = 200  # of dots that become a picture
-PANEL = (3.0, 2.6)  # inches
-JITTER = 0.12  # of a category's width
-MAX_DOTS = 2000  # dots that are drawn as vectors; more become a picture, which is smaller
+RASTER_DPI = 200  # of rasterized dots
+PANEL = (3.0, 2.6)  # size, inches
+JITTER = 0.12  # relative to the width of a category
+MAX_DOTS = 2000  # more dots than this are rasterized, for a smaller file
+WIDTH = 4.0  # of a panel, inches
+DISTANCE = "distance"
 
 
-def by_condition(table: StudyTable, labels: Mapping[str, str]) -> Picture:
-    """A row of panels per measure: each person as a dot, and means with their 95 % confidence intervals."""
+def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
+    """Draw each person as a dot, and means with 95 % confidence intervals, with a row of panels per measure."""
     levels = table.levels()
     figure = Figure(figsize=(PANEL[0] * len(levels), PANEL[1] * len(labels)), layout="constrained")
     for panels, name in zip(grid(figure, len(labels), len(levels)), labels, strict=True):
@@ -48,7 +62,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str]) -> Picture:
 def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
     groups = table.groups(name, objects)
     for place, (condition, values) in enumerate(groups.items()):
-        # A fixed jitter: equal data give equal figures.
+        # The jitter is not random, so that equal data give equal figures.
         shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
         dots = axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
         dots[0].set_rasterized(len(values) > MAX_DOTS)
@@ -58,8 +72,8 @@ def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None
     axes.set_xticks(range(len(groups)), list(groups))
 
 
-def interactions(table: StudyTable, labels: Mapping[str, str]) -> Picture:
-    """A panel per measure: means by number of objects, a line per condition, with 95 % confidence intervals."""
+def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
+    """Draw means by number of objects and condition with 95 % confidence intervals, with a panel per measure."""
     figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
     for axes, name in zip(grid(figure, 1, len(labels))[0], labels, strict=True):
         for k, condition in enumerate(table.conditions()):
@@ -70,14 +84,14 @@ def interactions(table: StudyTable, labels: Mapping[str, str]) -> Picture:
         axes.set_ylim(*_limits(table, name))
     figure.axes[0].legend(fontsize=7, frameon=False)
     caption = (
-        "Means by number of objects with 95 % confidence intervals, beside each other. Each measure has the axis "
+        "Means by number of objects with 95 % confidence intervals, side by side. Each measure has the axis "
         "of the figure above."
     )
     return framed(figure, "Means by number of objects and condition", table, caption)
 
 
-def variances(table: StudyTable, name: str, label: str) -> Picture:
-    """Distribution of a measure in each cell: a row of histograms per condition."""
+def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
+    """Draw a histogram of a measure for each cell, with a row per condition."""
     levels, conditions = table.levels(), table.conditions()
     figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
     panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True, sharey=True)
@@ -97,8 +111,8 @@ def variances(table: StudyTable, name: str, label: str) -> Picture:
     return framed(figure, f"Distribution of {label.lower()}", table, caption)
 
 
-def answers(analysis: Analysis) -> Picture:
-    """Shares of the answers to every survey item by condition, all numbers of objects together."""
+def answers(analysis: Analysis) -> FigureBlock:
+    """Draw shares of the answers to every survey item by condition, over all numbers of objects."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
@@ -118,8 +132,8 @@ def answers(analysis: Analysis) -> Picture:
     return framed(figure, "Answers by condition", table, caption)
 
 
-def svg(figure: Figure, title: str, caption: str) -> Picture:
-    """A figure as a block of a page."""
+def svg(figure: Figure, title: str, caption: str) -> FigureBlock:
+    """Convert a figure to inline SVG."""
     FigureCanvasSVG(figure)
     text = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "mjsim", "svg.fonttype": "path"}):
@@ -129,11 +143,11 @@ def svg(figure: Figure, title: str, caption: str) -> Picture:
     found = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", found)
     found = found.replace("<svg", f'<svg role="img" aria-label="{title}"', 1)
     drawing = Markup(found)  # nosec B704  # titles and drawings of this package
-    return Picture(drawing, caption)
+    return FigureBlock(drawing, caption)
 
 
-def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> Picture:
-    """A figure of a study, marked with the origin of its people."""
+def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> FigureBlock:
+    """Convert a figure to inline SVG, marked with the origin of its people."""
     mark_origin(figure, table.origin)
     return svg(figure, f"{title}. {table.origin}.", caption)
 
@@ -147,7 +161,6 @@ def grid(figure: Figure, rows: int, columns: int) -> NDArray[Any]:
 
 
 def _limits(table: StudyTable, name: str) -> tuple[float, float]:
-    """Ends of the axis of a measure, the same in all figures."""
     values = table.columns[name]
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     margin = 0.04 * (high - low) or 0.5
@@ -175,4 +188,74 @@ def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: 
         lw=1.3,
         capsize=2,
         label=condition,
+    )
+
+
+def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
+    """Draw a panel per condition, for the smallest number of objects, from the run directories in `folder`.
+
+    Raises:
+        RecordError: `folder` has no run directories of these people.
+    """
+    shown = [(row, found) for row in median_people(table) if (found := _run_of(row, folder)) is not None]
+    if not shown:
+        raise RecordError(f"{folder} has no run directories of its people")
+    figure = Figure(figsize=(WIDTH * len(shown), 0.8 * WIDTH), layout="constrained")
+    for axes, (row, run) in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+        with opened_run(run) as opened:
+            _draw_run(axes, row, opened)
+    figure.axes[0].legend(fontsize=7, loc="lower left")
+    mark_origin(figure, table.origin)
+    caption = (
+        f"The person with the median distance in each condition, with {table.levels()[0]} objects: the route that was "
+        "planned at the start, and the one that was walked, in the house seen from above; metres walked in the titles."
+    )
+    return svg(figure, f"Planned and walked paths. {table.origin}.", caption)
+
+
+def median_people(table: StudyTable) -> Iterator[Any]:
+    """Yield, for each condition, the row of the person with the median distance at the smallest number of objects."""
+    if DISTANCE not in table.columns:
+        return
+    walked, least = table.columns[DISTANCE], table.levels()[0]
+    for condition in table.conditions():
+        here = np.flatnonzero((table.assistance == condition) & (table.objects == least) & ~np.isnan(walked))
+        if len(here):
+            yield table.rows[here[np.argsort(walked[here], kind="stable")[(len(here) - 1) // 2]]]
+
+
+def _run_of(row: Any, folder: Path) -> Path | None:
+    """Find the run directory of a row. Fingerprints identify trials, but people may play the same trial."""
+    visit = folder / str(row.get("participant")) / TASK
+    if is_run(visit):
+        return visit
+    seed = f"{row.get('house_seed')}"
+    likely_first = sorted(run_paths(folder / TRIALS), key=lambda path: (seed not in path.name, path))
+    for path in likely_first:
+        try:
+            metrics = json.loads(read_file(path, records.METRICS))
+        except (OSError, ValueError, RecordError):
+            continue
+        if row.get("fingerprint") is not None and metrics.get("fingerprint") == row["fingerprint"]:
+            return path
+    return None
+
+
+def _draw_run(axes: Axes, row: Any, run: Path) -> None:
+    house = House.load(row["house"])
+    episode = Episode.load(run / records.EPISODE)
+    plan = next((e for e in records.read_events(run / records.EVENTS) if e["event"] == "plan"), None)
+    walked = read_arrays(run / records.TRAJECTORY, only=["position"])["position"]
+    for island in house.navmesh.islands:
+        for ring in shapely.get_rings(island):
+            axes.plot(*shapely.get_coordinates(ring).T, color="#BBBBBB", lw=0.8)
+    if plan is not None:
+        axes.plot(*planned_path(house, episode, plan).T, "--", color=PLANNED, lw=1.2, label="planned")
+    axes.plot(*walked.T, color=WALKED, lw=1.0, label="walked")
+    places = np.array([o.position[:2] for o in episode.objects])
+    axes.plot(*places.T, "o", color="#0072B2", ms=4, label="objects")
+    axes.plot(*walked[0], "*", color="#009E73", ms=9, label="start")
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    axes.set_title(
+        f"{row['assistance']}, {row['objects']} objects: {row['task_distance_m']:.0f} m", fontsize=9
     )

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.analysis.page import Block, Paragraph, Table, freedom, p_value, page, shown, table
+from experiments.analysis.page import Block, Paragraph, TableBlock, freedom, p_value, page, shown, table
 from experiments.analysis.report.assumptions import assumptions, specification_curve
-from experiments.analysis.report.figures import answers, by_condition, interactions, variances
-from experiments.analysis.report.paths import paths_figure
+from experiments.analysis.report.figures import answers, by_condition, interactions, paths_figure, variances
 from experiments.analysis.statistics.effects import FTest
 from experiments.analysis.statistics.mixed import MixedModel
 from experiments.analysis.statistics.models import OrdinalModel
@@ -20,7 +19,7 @@ from experiments.analysis.study.analysis import (
     STRICT,
     TWO_WAY,
     Analysis,
-    Result,
+    AnalysisResult,
     tests_of,
 )
 from experiments.analysis.study.measures import LIKERT_PREFIX
@@ -31,28 +30,21 @@ from mjsim.values.errors import MjsimError
 
 TITLE = "Study of assistance and difficulty"
 CAUTION = (
-    "These people were simulated. The numbers follow from a model of people and are no evidence about people; "
-    "answers to survey questions are not simulated."
+    "These people were simulated. The numbers follow from a model and are not evidence about people. Answers to survey "
+    "questions are not simulated."
 )
 REHEARSAL = (
-    "This is a rehearsal: nobody took part, and answers were drawn at random. No number here says anything."
+    "This is a rehearsal without people. Answers were drawn at random, so no number here has any meaning."
 )
 TEST_HEAD = ("measure", "test", "effect", "objects", "F", "df", "p", "partial η²", "90 % interval")
 PAIR_HEAD = (
-    "measure",
-    "objects",
-    "pair",
-    "difference",
-    "95 % interval",
-    "Tukey p",
-    "Games-Howell p",
-    "Holm p",
+    *("measure", "objects", "pair", "difference", "95 % interval", "Tukey p", "Games-Howell p", "Holm p"),
+    *("g", "95 % interval", "equivalence p", "verdict"),
 )
-PAIR_HEAD_MORE = ("g", "95 % interval", "equivalence p", "verdict")
 
 
 def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
-    """The page; paths are drawn where `folder` holds run directories."""
+    """Return the page. Paths are drawn if `folder` has run directories."""
     parts = (
         ("Summary", _summary(analysis)),
         ("People", _people(analysis)),
@@ -74,7 +66,6 @@ def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
 
 
 def _summary(analysis: Analysis) -> Iterator[Block]:
-    """Every hypothesis about the scored reading of a measure: one F test each, and the pairs it is about."""
     labels = _labels(analysis)
     effects, pairs = [], []
     for name, objects in ((n, o) for n in labels for o in (*analysis.table.levels(), None)):
@@ -112,7 +103,6 @@ def _people(analysis: Analysis) -> Iterator[Block]:
 
 
 def _labels(analysis: Analysis) -> dict[str, str]:
-    """Axis labels of the measures that are known."""
     found = {}
     for name, measure in analysis.measures.objective.items():
         if name in analysis.table.columns:
@@ -163,7 +153,6 @@ def _answers(analysis: Analysis) -> tuple[Block, ...]:
 
 
 def _tests(analysis: Analysis) -> Iterator[Block]:
-    """Of the scored readings; `_curves` shows the others."""
     scored = analysis.measures.objective
     names = {name: scored[name].label for name in _labels(analysis)} | analysis.measures.answers()
     rows = [
@@ -183,7 +172,7 @@ def _tests(analysis: Analysis) -> Iterator[Block]:
         )
 
 
-def _f_tests(results: Iterable[Result]) -> Iterator[tuple[str, FTest]]:
+def _f_tests(results: Iterable[AnalysisResult]) -> Iterator[tuple[str, FTest]]:
     for result in results:
         yield from ((effect, test) for effect, test in tests_of(result) if isinstance(test, FTest))
 
@@ -209,7 +198,7 @@ def _pairs(analysis: Analysis) -> tuple[Block, ...]:
         f"Equivalent: Tukey's test finds no difference, and two one-sided tests show that it is below {bound:g} "
         "standard deviations. Undecided: neither is shown; that is no evidence of no effect."
     )
-    return (Table((*PAIR_HEAD, *PAIR_HEAD_MORE), rows), *([about] if rows else []))
+    return (TableBlock(PAIR_HEAD, rows), *([about] if rows else []))
 
 
 def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
@@ -223,7 +212,7 @@ def _mixtures(analysis: Analysis) -> tuple[Block, ...]:
         "Mixtures of beta-binomial distributions of accepted visits; the smallest BIC fits best."
     )
     head = ("condition", "kinds", "shares", "mean acceptance", "log likelihood", "BIC")
-    return (about, Table(head, rows)) if rows else ()
+    return (about, TableBlock(head, rows)) if rows else ()
 
 
 def _mixed(analysis: Analysis) -> Iterator[Block]:
@@ -258,7 +247,6 @@ def _mixed(analysis: Analysis) -> Iterator[Block]:
 
 
 def _houses(analysis: Analysis) -> Iterator[Block]:
-    """Homes by their rooms, and differences between conditions for other homes."""
     found, labels = analysis.table, _labels(analysis)
     rooms, area, density = found.numbers(ROOMS), found.numbers("area_m2"), found.densities()
     rows = []
@@ -287,7 +275,7 @@ def _power(analysis: Analysis) -> tuple[Block, ...]:
         rows.append((labels[r.measure], r.objects, r.value["detectable_eta_squared"], p))
     bound = analysis.measures.equivalence.eta_squared
     head = ("measure", "objects", "partial η² found in 80 % of such studies", f"p of η² ≥ {bound:g}")
-    return (Table(head, rows),)
+    return (TableBlock(head, rows),)
 
 
 def _paths(analysis: Analysis, folder: Path) -> tuple[Block, ...]:
@@ -298,6 +286,6 @@ def _paths(analysis: Analysis, folder: Path) -> tuple[Block, ...]:
 
 
 def _missing(analysis: Analysis) -> tuple[Block, ...]:
-    rows: list[Result] = [r for r in analysis.results if r.reason is not None]
+    rows: list[AnalysisResult] = [r for r in analysis.results if r.reason is not None]
     reasons = [(r.measure, r.kind, r.objects, r.reason) for r in rows]
-    return (Table(("measure", "test", "objects", "reason"), reasons),)
+    return (TableBlock(("measure", "test", "objects", "reason"), reasons),)

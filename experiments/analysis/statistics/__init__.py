@@ -1,4 +1,1 @@
-"""Statistics of studies between subjects, on plain arrays: tests, effect sizes, models, power.
-
-For `mjsim study` and the scripts in `studies/`. statsmodels comes with the extra `study`.
-"""
+"""Statistics of between-subjects studies, on plain arrays. statsmodels comes with the extra `study`."""

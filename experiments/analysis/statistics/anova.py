@@ -1,4 +1,4 @@
-"""Analyses of variance between subjects, with one or two factors."""
+"""Between-subjects analyses of variance with one or two factors."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,43 +12,45 @@ from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
 OWN_VARIANCE = "variance, each group in units of its own"
-EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of variance, in order
+EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of variance
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Check that groups can be compared: two or more, of at least `least` values each, which vary within groups."""
+    """Check that there are two groups or more, with at least `least` values each, that vary within groups.
+
+    Raises:
+        StatisticsError: The groups cannot be compared.
+    """
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
     if small:
         raise StatisticsError(f"{small[0]} has {len(groups[small[0]])} known values, {least} are needed")
     if people_in(groups) <= len(groups):
-        raise StatisticsError("each group has one person only; the variance within groups is unknown")
+        raise StatisticsError("each group has only one person; the variance within groups is unknown")
     if not any(varies(values) for values in groups.values()):
         raise StatisticsError("the values do not vary within any group")
 
 
 def varies(values: Values) -> bool:
-    """Whether values (n,) differ by more than rounding."""
+    """Return True if values (n,) differ by more than rounding."""
     return bool(len(values) > 1 and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))
 
 
 def people_in(groups: Mapping[str, Values]) -> int:
-    """Number of values in all groups."""
     return sum(len(values) for values in groups.values())
 
 
 def one_way(groups: Mapping[str, Values]) -> FTest:
-    """Fisher's analysis of variance of one factor."""
     check_groups(groups)
     return _fisher(groups)
 
 
 def welch(groups: Mapping[str, Values]) -> FTest:
-    """Welch's analysis of variance, which does not assume equal variances; every group must vary.
+    """Compute Welch's analysis of variance, which does not assume equal variances. Every group must vary.
 
-    F df1 estimates the sum of n (mean - weighted mean)^2 / variance over groups, whatever df2 is: the effect size and
-    its interval are both of this sum and of the people, as if every group had variance 1.
+    F df1 estimates the sum of n (mean - weighted mean)^2 / variance over groups, independently of df2. The effect size
+    and its interval are based on this sum and the number of people, as if every group had variance 1.
 
     Source: Welch 1951, doi:10.1093/biomet/38.3-4.330.
     """
@@ -73,9 +75,9 @@ def welch(groups: Mapping[str, Values]) -> FTest:
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
     """Test for equal variances: an analysis of variance of the distances from the median, without structural zeros.
 
-    The median takes one distance from each group: of d1 <= d2 <= ... <= dn, d1 is 0 where n is odd, and d1 equals d2
-    where n is even. So d2, ..., dn are compared, with (d1 + d2) / sqrt(2) in place of d2 where n is even. With d1 the
-    test finds a difference in 3.5 % of studies of the published sizes that have none.
+    The median fixes one distance in each group: of d1 <= d2 <= ... <= dn, d1 is 0 if n is odd, and equal to d2 if n is
+    even. So d2, ..., dn are compared, with (d1 + d2) / sqrt(2) in place of d2 if n is even. With d1, the test would
+    have a false positive rate of 3.5 % at the published sizes.
 
     Sources: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955; Hines and Hines 2000,
     doi:10.1111/j.0006-341X.2000.00451.x.
@@ -84,7 +86,7 @@ def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
     distances = {name: _distances(values) for name, values in groups.items()}
     if people_in(distances) <= len(groups):
         raise StatisticsError(
-            "each group has two persons at most; how their distances from the median vary is unknown"
+            "each group has at most two people; the variance of their distances from the median is unknown"
         )
     if not any(varies(values) for values in distances.values()):
         raise StatisticsError("the distances from the median do not vary within any group")
@@ -94,7 +96,6 @@ def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
 
 
 def _distances(values: Values) -> Values:
-    """Distances of values (n,) from their median, (n - 1,)."""
     distances = np.sort(np.abs(values - np.median(values)))
     if len(values) % 2 == 0:
         distances[1] = (distances[0] + distances[1]) / np.sqrt(2.0)
@@ -102,7 +103,7 @@ def _distances(values: Values) -> Values:
 
 
 def _fisher(groups: Mapping[str, Values]) -> FTest:
-    """statsmodels has no number for a group of one person."""
+    """Compute the test without statsmodels, which fails for a group of one person."""
     members, people = list(groups.values()), people_in(groups)
     grand = np.concatenate(members).mean()
     between = sum(len(v) * float(v.mean() - grand) ** 2 for v in members)
@@ -113,17 +114,22 @@ def _fisher(groups: Mapping[str, Values]) -> FTest:
 
 @dataclass(frozen=True)
 class Cells:
-    """Values by cell of a design with one or two factors; arrays have one entry per cell, (c,)."""
+    """Values by cell of a design with one or two factors, for c cells and n people.
 
-    # columns of a linear model by effect, (c, columns) each: sum coded, 1 at a level, -1 at the last one, else 0
+    Attributes:
+        columns: Columns of a linear model by effect, (c, columns): sum coded, 1 at a level, -1 at the last one, else 0.
+        member: Cell of each person, (n,).
+        squares: Sums of squares around the means, (c,), like `people` and `means`.
+    """
+
     columns: Mapping[str, Values]
-    member: NDArray[np.int64]  # cell of each person, (n,)
+    member: NDArray[np.int64]
     people: NDArray[np.int64]
     means: Values
-    squares: Values  # sums of squares around the means
+    squares: Values
 
     def residual(self, names: Iterable[str]) -> float:
-        """Residual sum of squares of a linear model with these effects, without the squares within cells."""
+        """Return the residual sum of squares of a linear model with these effects, without the squares within cells."""
         weights = np.sqrt(self.people)[:, None]
         design = np.hstack([self.columns[name] for name in names]) * weights
         wanted = self.means * weights[:, 0]
@@ -131,9 +137,10 @@ class Cells:
 
 
 def cells_of(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
-    """The cells of a design; where the second factor has one level, of the first factor alone.
+    """Group values and factors, (n,) each, into cells. If the second factor has one level, it is ignored.
 
-    Values and both factors have one entry per person, (n,). Raises `StatisticsError` if a cell is empty.
+    Raises:
+        StatisticsError: A cell is empty, or the first factor has one level.
     """
     names, others = np.unique(first), np.unique(second)
     if len(names) < 2:
@@ -160,16 +167,19 @@ def _sum_coded(levels: int) -> Values:
 
 
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
-    """Analysis of variance of two crossed factors with unequal numbers of people, by name of `EFFECTS`.
+    """Compute an analysis of variance of two crossed factors with unequal numbers of people, by name of `EFFECTS`.
 
-    Values and both factors have one entry per person, (n,); `kind` is type 2 or 3 of the sums of squares. Raises
-    `StatisticsError` if a cell is empty, each has one person only, or nothing varies within cells.
+    Values and factors have shape (n,). `kind` is the type of the sums of squares, 2 or 3.
+
+    Raises:
+        StatisticsError: A cell is empty, each cell has only one person, or nothing varies within cells.
+
     Source: Langsrud 2003, doi:10.1023/A:1023260610025.
     """
     cells = _crossed(values, first, second)
     freedom = len(values) - len(cells.people)
     if freedom < 1:
-        raise StatisticsError("each cell has one person only; the variance within cells is unknown")
+        raise StatisticsError("each cell has only one person; the variance within cells is unknown")
     residual = float(cells.squares.sum())
     if residual <= 1e-20 * max(1.0, float((values**2).sum())):
         raise StatisticsError("the values do not vary within any cell")
@@ -184,7 +194,7 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
 def two_way_squares(
     values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
 ) -> dict[str, float]:
-    """Sums of squares of the effects of a two-way analysis; arguments as in `two_way`."""
+    """Return the sums of squares of the effects of a two-way analysis. Arguments are as in `two_way`."""
     return _squares(_crossed(values, first, second), kind)
 
 
@@ -196,9 +206,10 @@ def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells
 
 
 def _squares(cells: Cells, kind: int) -> dict[str, float]:
-    """Each is the reduction of the residual sum of squares by the effect.
+    """Return the reduction of the residual sum of squares by each effect.
 
-    In Type II compared with the model without it and its interaction, in Type III with the full model without it.
+    In Type II, it is relative to the model without the effect and its interaction, in Type III to the full model
+    without it.
     """
     sums = {}
     for effect in EFFECTS:
@@ -209,18 +220,18 @@ def _squares(cells: Cells, kind: int) -> dict[str, float]:
 
 
 def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """Welch's test of each effect, with Johansen's approximate degrees of freedom.
+    """Compute Welch's test of each effect, with Johansen's approximate degrees of freedom.
 
-    All arrays have one entry per person, (n,). Source: Johansen 1980, doi:10.1093/biomet/67.1.85.
+    All arrays have shape (n,). Source: Johansen 1980, doi:10.1093/biomet/67.1.85.
     """
     return _tests(values, assistance, objects, 0, _johansen)
 
 
 def hc3(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """F tests with the heteroscedasticity-consistent covariance HC3 of the linear model with all effects.
+    """Compute F tests with the heteroscedasticity-consistent covariance HC3 of the linear model with all effects.
 
-    In a model with a mean for each cell, it is the cells' variances over their people less one. Arguments as in
-    `welch_james`. Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
+    In a model with a mean per cell, the covariance is the variance of each cell over its number of people less one.
+    Arguments are as in `welch_james`. Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
     """
     return _tests(values, assistance, objects, 1, lambda statistic, q, _: (statistic / q, None))
 
@@ -237,10 +248,10 @@ def _tests(
     fewer: int,
     scaled: Callable[[float, int, Values], tuple[float, float | None]],
 ) -> dict[str, FTest]:
-    """Wald tests of each effect, the variance of a cell's mean being its variance over its people less `fewer`."""
+    """Compute Wald tests of each effect. The variance of a cell's mean is its variance over its people less `fewer`."""
     cells = cells_of(values, assistance, objects)
     if cells.people.min() < 2:
-        raise StatisticsError("a cell has one person only; its variance is unknown")
+        raise StatisticsError("a cell has only one person; its variance is unknown")
     if not all(varies(values[cells.member == k]) for k in range(len(cells.people))):
         raise StatisticsError("the values of a cell do not vary")
     variances = cells.squares / (cells.people - 1) / (cells.people - fewer)
@@ -255,7 +266,7 @@ def _tests(
 
 
 def _contrasts(cells: Cells) -> dict[str, Values]:
-    """Rows by effect, (q, cells), that give its parameters from the means of the cells."""
+    """Return matrices (q, cells) by effect that map cell means to its parameters."""
     rows = np.asarray(np.linalg.inv(np.hstack(list(cells.columns.values()))), float)
     found, start = {}, 0
     for effect, block in cells.columns.items():

@@ -1,36 +1,51 @@
-"""Effect sizes with confidence intervals: partial eta squared of an F test, Hedges' g of two groups."""
+"""Effect sizes with confidence intervals, and power of F tests."""
 
+import bisect
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc, gammaln, ncfdtr
+from scipy.optimize import brentq
+from scipy.special import fdtr, fdtrc, gammaln, ncfdtr, nctdtr
+from scipy.stats import f, ncf
 
-from experiments.analysis.statistics.noncentral import Interval, f_interval, t_interval
+from experiments.errors import StatisticsError
 
-ETA_CONFIDENCE = 0.90  # its lower bound is above 0 exactly where p < .05 (Steiger 2004)
+ETA_CONFIDENCE = 0.90  # the lower bound is above 0 if and only if p < .05 (Steiger 2004)
 CONFIDENCE = 0.95
 ALPHA = 0.05
+POWER = 0.8
+MAX_PEOPLE = 100_000  # per cell
+MAX_WIDTH = 12  # range in which the noncentrality of a t is searched, in standard errors
+MAX_STEPS = 60
+
+Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class FTest:
-    """An F test with its effect size."""
+    """An F test with its effect size.
 
-    statistic: float  # F
-    df1: int  # degrees of freedom of the effect
-    df2: float  # of the error; not a whole number in Welch's test
-    people: int  # sample size
-    # degrees of freedom within groups, if they are not df2; and what the effect size is a share of
+    Attributes:
+        df2: Degrees of freedom of the error, not a whole number in Welch's test.
+        people: Sample size.
+        within: Degrees of freedom within groups, if they are not df2.
+        of: Quantity of which the effect size is a share.
+    """
+
+    statistic: float
+    df1: int
+    df2: float
+    people: int
     within: int | None = None
     of: str = "variance"
 
     @cached_property
     def p(self) -> float:
-        """Probability of such an F or a larger one without an effect."""
         return float(fdtrc(self.df1, self.df2, self.statistic))
 
     @property
@@ -40,40 +55,36 @@ class FTest:
 
     @cached_property
     def interval(self) -> Interval | None:
-        """90 % confidence interval of partial eta squared; the noncentrality L gives L / (L + people).
+        """90 % confidence interval of partial eta squared. A noncentrality L corresponds to L / (L + people).
 
         Source: Steiger 2004, doi:10.1037/1082-989X.9.2.164, equations 9 and 17.
         """
         found = f_interval(self.statistic, self.df1, self.df2, ETA_CONFIDENCE)
-        return (
-            None
-            if found is None
-            else (found[0] / (found[0] + self.people), found[1] / (found[1] + self.people))
-        )
+        if found is None:
+            return None
+        return found[0] / (found[0] + self.people), found[1] / (found[1] + self.people)
 
     def p_of_equivalence(self, bound: float) -> float:
-        """Probability of such an F or a smaller one if partial eta squared were `bound`: below .05, it is smaller.
+        """Return the probability of such an F or a smaller one if partial eta squared were `bound`.
 
-        Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
+        Below .05, partial eta squared is smaller. Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
         """
         return float(ncfdtr(self.df1, self.df2, self.people * bound / (1.0 - bound), self.statistic))
 
     def as_json(self) -> dict[str, Any]:
-        """The test, its p, and its effect size."""
         names = ("statistic", "df1", "df2", "people", "p", "eta_squared", "interval", "of")
         return {name: getattr(self, name) for name in names}
 
 
 def partial_eta_squared(statistic: float, df1: float, df2: float) -> float:
-    """Share of the variance, without that of other effects, that an effect explains in the sample."""
     return statistic * df1 / (statistic * df1 + df2)
 
 
 def hedges_g(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float | None, Interval | None]:
-    """Difference of means, second minus first, in pooled standard deviations, without the bias of small samples.
+    """Return the bias-corrected standardized difference of means, second minus first, and its 95 % interval.
 
-    Groups have shapes (n,) and (m,). The 95 % confidence interval is by the noncentral t; None where it is undefined.
-    Source: Hedges 1981, doi:10.3102/10769986006002107.
+    Groups have shapes (n,) and (m,). The interval is by the noncentral t. Both are None if undefined. Source: Hedges
+    1981, doi:10.3102/10769986006002107.
     """
     n, m = len(first), len(second)
     freedom = n + m - 2
@@ -89,3 +100,88 @@ def hedges_g(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[f
     found = t_interval(gap / spread / scale, freedom, CONFIDENCE)
     unit = scale * correction
     return gap / spread * correction, None if found is None else (found[0] * unit, found[1] * unit)
+
+
+def t_interval(statistic: float, freedom: int, confidence: float) -> Interval | None:
+    """Return the confidence interval of the noncentrality of a t statistic, or None if none is found.
+
+    Source: Cumming and Finch 2001, doi:10.1177/0013164401614002.
+    """
+    step = math.sqrt(1.0 + statistic**2 / (2 * freedom))
+
+    def bound(share: float) -> float | None:
+        def excess(center: float) -> float:
+            return float(nctdtr(freedom, center, statistic)) - share
+
+        # The range grows step by step, because scipy returns NaN far from the statistic.
+        for width in step * np.arange(1.0, MAX_WIDTH):
+            if excess(statistic - width) > 0 > excess(statistic + width):
+                return _root(excess, statistic - width, statistic + width)
+        return None
+
+    return _both(bound, confidence)
+
+
+def f_interval(statistic: float, df1: int, df2: float, confidence: float) -> Interval | None:
+    """Return the confidence interval of the noncentrality of an F statistic, at least 0, or None if none is found.
+
+    Source: Steiger 2004, doi:10.1037/1082-989X.9.2.164.
+    """
+
+    def bound(share: float) -> float | None:
+        def excess(center: float) -> float:
+            return float(ncfdtr(df1, df2, center, statistic)) - share
+
+        if not fdtr(df1, df2, statistic) > share:
+            return 0.0
+        low, high = 0.0, max(statistic * df1, 1.0)
+        for _ in range(MAX_STEPS):
+            value = excess(high)
+            if not value > 0:
+                return None if math.isnan(value) else _root(excess, low, high)
+            low, high = high, high * 1.15
+        return None
+
+    return _both(bound, confidence)
+
+
+def _both(bound: Callable[[float], float | None], confidence: float) -> Interval | None:
+    low, high = bound(0.5 + confidence / 2), bound(0.5 - confidence / 2)
+    return None if low is None or high is None else (low, high)
+
+
+def _root(excess: Callable[[float], float], low: float, high: float) -> float | None:
+    try:
+        return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
+    except ValueError:  # scipy returned NaN for a value in between
+        return None
+
+
+def power_of(eta_squared: float, df1: int, df2: float, people: int, alpha: float = ALPHA) -> float:
+    """Return the probability that an F test detects an effect of this partial eta squared.
+
+    The noncentrality is people eta squared / (1 - eta squared). Source: Cohen 1988, Statistical Power Analysis for the
+    Behavioral Sciences, chapter 8.
+    """
+    critical = f.ppf(1.0 - alpha, df1, df2)
+    return float(ncf.sf(critical, df1, df2, people * eta_squared / (1.0 - eta_squared)))
+
+
+def detectable_eta_squared(df1: int, df2: float, people: int, power: float = POWER) -> float:
+    """Return the smallest partial eta squared that such a test detects with this probability."""
+    return float(brentq(lambda eta: power_of(eta, df1, df2, people) - power, 1e-9, 0.999))
+
+
+def people_per_cell(
+    eta_squared: float, df1: int, cells: int, power: float = POWER, alpha: float = ALPHA
+) -> int:
+    """Return the smallest number of people in each of `cells` equal cells with which a test has a power."""
+
+    def enough(people: int) -> bool:
+        return power_of(eta_squared, df1, cells * (people - 1), cells * people, alpha) >= power
+
+    if not enough(MAX_PEOPLE):
+        raise StatisticsError(
+            f"an eta squared of {eta_squared:.2g} needs more than {MAX_PEOPLE} people in each cell"
+        )
+    return bisect.bisect_left(range(MAX_PEOPLE), True, lo=2, key=enough)

@@ -1,6 +1,7 @@
-"""A linear model with crossed random factors, such as person and house, by restricted maximum likelihood."""
+"""Linear models with crossed random factors, such as person and house, and a bootstrap over houses."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +13,16 @@ from experiments.analysis.statistics.anova import Values, cells_of, varies
 from experiments.analysis.statistics.variance_components import VarianceComponents
 from experiments.errors import StatisticsError
 
-MIN_LEVELS = 5  # fewer say little about the variance between them
+MIN_LEVELS = 5  # fewer levels say little about the variance between them
+RESAMPLES = 2000
+BATCH = 100  # resamples in memory at a time
 
 
 @dataclass(frozen=True)
 class WaldTest:
     """A Wald F test of a model's term, with Satterthwaite's degrees of freedom of the error."""
 
-    statistic: float  # F
+    statistic: float
     df1: int
     df2: float
     p: float
@@ -27,23 +30,28 @@ class WaldTest:
 
 @dataclass(frozen=True)
 class RandomFactor:
-    """A random factor of a model."""
+    """A random factor of a model.
+
+    Attributes:
+        variance: Variance between levels, in squared units of the measure.
+        share: Share of the variance within conditions, from 0 to 1.
+        interval: 95 % interval of the share, by the profile of the restricted likelihood; None in models with a
+            covariate.
+    """
 
     levels: int
-    variance: float  # between levels, in squared units of the measure
-    share: float  # of the variance within conditions, from 0 to 1
-    # its 95 % interval, by the profile of the restricted likelihood; None in models with a covariate
+    variance: float
+    share: float
     interval: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A linear model with crossed random factors."""
+    """A linear model with crossed random factors. Tests are by effect, those of a covariate last."""
 
-    # by effect: `assistance`, and where there are several levels, `objects` and `interaction`; then the covariate's
     tests: Mapping[str, WaldTest]
-    random: Mapping[str, RandomFactor]  # by name
-    residual_variance: float  # what is left, in squared units of the measure
+    random: Mapping[str, RandomFactor]
+    residual_variance: float
 
 
 def mixed_model(
@@ -53,11 +61,13 @@ def mixed_model(
     random: Mapping[str, NDArray[Any]],
     covariate: tuple[str, Values] | None = None,
 ) -> MixedModel:
-    """Fit assistance, number of objects and both together as fixed effects, and random intercepts of the factors.
+    """Fit fixed effects of assistance, number of objects and their interaction, and random intercepts of the factors.
 
-    All arrays have one entry per trial, (n,). A covariate, with its name, is linear, and so is its part in the
-    differences between conditions. Raises `StatisticsError` if levels are few, a cell is empty or the variances cannot
-    be told apart.
+    All arrays have one entry per trial, (n,). A named covariate has linear effects on the values and on the differences
+    between conditions.
+
+    Raises:
+        StatisticsError: There are too few levels, a cell is empty, or the variances cannot be distinguished.
     """
     members = {name: np.unique(levels, return_inverse=True)[1] for name, levels in random.items()}
     for name, member in members.items():
@@ -99,3 +109,52 @@ def _with_covariate(name: str, values: Values, conditions: Values) -> dict[str, 
         raise StatisticsError(f"{name} is the same everywhere")
     column = ((values - values.mean()) / values.std())[:, None]
     return {name: column, f"{name} x assistance": column * conditions}
+
+
+@dataclass(frozen=True)
+class HouseDifference:
+    """Difference of means, second less first, with a 95 % interval by resampling houses with all their trials."""
+
+    first: str
+    second: str
+    difference: float
+    interval: tuple[float, float]
+
+
+def differences_by_house(
+    values: Values,
+    assistance: NDArray[Any],
+    objects: NDArray[np.int64],
+    houses: NDArray[Any],
+    conditions: Sequence[str],
+    seed: int = 0,
+) -> list[HouseDifference]:
+    """Compare all pairs of `conditions` by a percentile bootstrap over houses. Arrays have one entry per trial, (n,).
+
+    Raises:
+        StatisticsError: There are too few houses, or a cell has no trials.
+    """
+    names, house = np.unique(houses, return_inverse=True)
+    if len(names) < MIN_LEVELS:
+        raise StatisticsError(f"resampling needs at least {MIN_LEVELS} houses; there are {len(names)}")
+    levels = np.unique(objects)
+    shape = len(names), len(conditions), len(levels)
+    sums, counts = np.zeros(shape), np.zeros(shape)
+    index = {condition: k for k, condition in enumerate(conditions)}
+    cell = house, np.array([index[c] for c in assistance]), np.searchsorted(levels, objects)
+    np.add.at(sums, cell, values)
+    np.add.at(counts, cell, 1.0)
+    if not counts.sum(axis=0).all():
+        raise StatisticsError("a condition has no trials at some number of objects")
+    rng = np.random.default_rng(seed)
+    even, resampled = np.full(len(names), 1 / len(names)), []
+    for _ in range(0, RESAMPLES, BATCH):
+        drawn = rng.multinomial(len(names), even, BATCH)
+        with np.errstate(invalid="ignore"):  # a resample may leave a cell empty
+            resampled.append(np.tensordot(drawn, sums, 1) / np.tensordot(drawn, counts, 1))
+    means, own = np.concatenate(resampled).mean(axis=2), (sums.sum(axis=0) / counts.sum(axis=0)).mean(axis=1)
+    found = []
+    for i, j in itertools.combinations(range(len(conditions)), 2):
+        low, high = np.nanquantile(means[:, j] - means[:, i], (0.025, 0.975)).tolist()
+        found.append(HouseDifference(conditions[i], conditions[j], float(own[j] - own[i]), (low, high)))
+    return found

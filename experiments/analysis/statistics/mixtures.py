@@ -1,7 +1,7 @@
-"""Kinds of people by how often they accept suggestions: a mixture of beta-binomial distributions.
+"""Kinds of people by their acceptance of suggestions, from a mixture of beta-binomial distributions.
 
-Each person of a kind has a rate of acceptance from a Beta distribution and accepts each visit with that probability.
-The number of kinds is chosen by Schwarz's criterion (BIC).
+Each person of a kind has an acceptance rate from a Beta distribution and accepts each visit with that probability. The
+number of kinds is chosen by Schwarz's criterion (BIC).
 """
 
 import math
@@ -17,34 +17,41 @@ from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # logarithms of a + b; beyond the upper one, people of a kind do not differ
-STARTS = 10  # random means, besides those that the data and the fit of fewer kinds suggest
+PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper one, people of a kind hardly differ
+STARTS = 10  # random starting points, in addition to those from the data and from the fit of fewer kinds
 
 Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture that was fitted."""
+    """A fitted mixture of k kinds, by falling mean acceptance rate.
 
-    shares: tuple[float, ...]  # share of people of each kind, (k,), sums to 1
-    means: tuple[float, ...]  # their mean rates of acceptance, (k,), falling
-    # a + b of their Beta distributions, (k,); the larger, the more alike people of a kind are
+    Attributes:
+        precisions: a + b of the Beta distributions, (k,); the larger, the more alike people of a kind are.
+        bic: Schwarz's criterion; smaller is better.
+    """
+
+    shares: tuple[float, ...]
+    means: tuple[float, ...]
     precisions: tuple[float, ...]
-    log_likelihood: float  # of the visits in their order
-    bic: float  # Schwarz's criterion; smaller is better
+    log_likelihood: float
+    bic: float
 
 
 def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
-    """Mixtures of one to three kinds by maximum likelihood, the best by BIC first.
+    """Fit mixtures of one to three kinds by maximum likelihood, to accepted visits and all visits of each person, (n,).
 
-    Accepted visits and all visits of each person, (n,). Raises `StatisticsError` where there are too few people.
+    The best mixture by BIC comes first.
+
+    Raises:
+        StatisticsError: There are too few people, or the numbers are invalid.
     """
     if len(accepted) < MIN_PEOPLE:
         raise StatisticsError(f"a mixture needs at least {MIN_PEOPLE} people; there are {len(accepted)}")
     if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
-        raise StatisticsError("a number of accepted visits is below 0 or above that of all visits")
-    # Equal people are counted, not computed again.
+        raise StatisticsError("a number of accepted visits is below 0 or above the number of visits")
+    # Equal people are counted instead of computed repeatedly.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
     found: list[Mixture] = []
     for kinds in range(1, MAX_KINDS + 1):
@@ -53,7 +60,7 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
 
 
 def _fit(cases: Counts, people: Counts, kinds: int, fewer: Mixture | None) -> Mixture:
-    """The best of several climbs; `cases` are accepted and all visits, (m, 2), `people` how many have them, (m,)."""
+    """Return the best of several climbs. `cases` has accepted and all visits, (m, 2), `people` their counts, (m,)."""
     bounds = [(-8.0, 8.0)] * (2 * kinds - 1) + [PRECISIONS] * kinds
     climbs = [
         minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)
@@ -75,8 +82,7 @@ def _fit(cases: Counts, people: Counts, kinds: int, fewer: Mixture | None) -> Mi
 def _starts(
     cases: Counts, people: Counts, kinds: int, fewer: Mixture | None
 ) -> Iterator[NDArray[np.float64]]:
-    """Parameters to climb from: quantiles, the fit of one kind less with each kind in two halves, random means."""
-    rng = np.random.default_rng(kinds)  # of the starts alone
+    rng = np.random.default_rng(kinds)
     rates = np.sort(np.repeat(cases[:, 0] / cases[:, 1], people))
     spread = np.quantile(rates, (np.arange(kinds) + 0.5) / kinds).clip(0.02, 0.98)
     yield _start(np.ones(kinds), spread, np.full(kinds, math.exp(2.0)))
@@ -103,7 +109,7 @@ def _start(
 def _parts(
     parameters: NDArray[np.float64], kinds: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Logarithms of shares, means, precisions, (k,) each."""
+    """Return log shares, means and precisions, (k,) each."""
     weights = np.append(parameters[: kinds - 1], 0.0)
     means = expit(parameters[kinds - 1 : 2 * kinds - 1])
     return weights - np.logaddexp.reduce(weights), means, np.exp(parameters[2 * kinds - 1 :])
@@ -112,11 +118,10 @@ def _parts(
 def _loss(
     parameters: NDArray[np.float64], cases: Counts, people: Counts, kinds: int
 ) -> tuple[float, NDArray[np.float64]]:
-    """Minus the log likelihood and its gradient."""
     weights, means, precisions = _parts(parameters, kinds)
     accepted, others = cases[:, :1], cases[:, 1:] - cases[:, :1]
     a, b = means * precisions, (1 - means) * precisions
-    # Of the beta-binomial, but for the number of orders, which is the same in all mixtures.
+    # The binomial coefficient is left out because it is the same for all mixtures.
     each = betaln(accepted + a, others + b) - betaln(a, b) + weights
     everyone = np.logaddexp.reduce(each, axis=1)
     belonging = np.exp(each - everyone[:, None]) * people[:, None]

@@ -1,6 +1,6 @@
-"""Proportional odds of ordinal answers, by Newton's method.
+"""Proportional odds of ordinal answers, by Newton's method, and diagnostics of residuals.
 
-The likelihood has one maximum; statsmodels climbs to 1e-4 of it, in a hundred times the time.
+The likelihood has one maximum. statsmodels finds it only to 1e-4 and takes a hundred times as long.
 """
 
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 MAX_STEPS = 60
-FARTHEST = 25.0  # of a cut or a shift, in logits: beyond, it goes to infinity
+FARTHEST = 25.0  # limit of cuts and shifts, in logits; larger ones diverge
 
 
 @dataclass(frozen=True)
 class Chi2Test:
-    """A chi squared test of a model's term: statistic, degrees of freedom, and p."""
+    """A chi squared test of a model's term."""
 
     statistic: float
     df: int
@@ -30,16 +30,15 @@ class Chi2Test:
 
 @dataclass(frozen=True)
 class OrdinalModel:
-    """Proportional odds of answers by condition."""
+    """Proportional odds of answers by condition, relative to the first condition, with a likelihood ratio test."""
 
-    test: Chi2Test  # likelihood ratio test of the condition
-    # by condition: odds of a higher answer, over those under the first condition
+    test: Chi2Test
     odds_ratios: Mapping[str, float]
-    people: int  # number of answers
+    people: int
 
 
 def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
-    """Fit proportional odds to answers by condition; answers must be whole numbers.
+    """Fit proportional odds to whole-number answers by condition.
 
     Source: McCullagh 1980, doi:10.1111/j.2517-6161.1980.tb01109.x.
     """
@@ -62,11 +61,10 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
 
 
 def _climb(counts: Values) -> tuple[float, Values]:
-    """The largest log likelihood of counts (groups, answers), and the shifts of all groups but the first."""
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     share = counts.sum(axis=0).cumsum()[:-1] / counts.sum()
     point = np.concatenate([logit(share), np.zeros(groups - 1)])
-    # logits of "at most this answer" by cut and group: the cut less the shift of the group
+    # Logit of "at most this answer" by cut and group: the cut less the shift of the group
     member = np.repeat(np.eye(groups)[:, 1:], cuts, axis=0)
     design = np.hstack([np.tile(np.eye(cuts), (groups, 1)), -member])
     value, gradient, curvature = _likelihood(counts, design, point)
@@ -87,7 +85,7 @@ def _climb(counts: Values) -> tuple[float, Values]:
 
 
 def _likelihood(counts: Values, design: Values, point: Values) -> tuple[float, Values, Values]:
-    """Log likelihood, its gradient, and minus its second derivatives; minus infinity where cuts are not in order."""
+    """Return the log likelihood, its gradient, and minus its Hessian. It is minus infinity if cuts are not in order."""
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     below = expit(design @ point).reshape(groups, cuts)
     chance = np.diff(below, prepend=0.0, append=1.0, axis=1)
@@ -106,26 +104,34 @@ def _likelihood(counts: Values, design: Values, point: Values) -> tuple[float, V
     return float((counts * np.log(chance)).sum()), design.T @ by_logit.ravel(), curvature
 
 
-MAX_PEOPLE = 5000  # for which the p of Shapiro and Wilk's test is known
+MAX_SHAPIRO = 5000  # largest sample for which the p of Shapiro and Wilk's test is known
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Residuals of a measure around the means of its cells."""
+    """Residuals of a measure around the means of its cells.
 
-    shapiro_wilk: float  # W of the residuals; 1 where they lie on the line of the normal quantiles
-    shapiro_wilk_p: float | None  # None for more than `MAX_PEOPLE`
+    Attributes:
+        shapiro_wilk: W of the residuals; 1 for perfectly normal residuals.
+        shapiro_wilk_p: Its p; None for samples above `MAX_SHAPIRO`.
+        kurtosis: Excess kurtosis, 0 for normal residuals.
+        equal_variances: Brown and Forsythe's test over all cells.
+        largest_deviation: Cell with the largest standard deviation, and this deviation.
+    """
+
+    shapiro_wilk: float
+    shapiro_wilk_p: float | None
     skewness: float
-    kurtosis: float  # 0 for normal values
-    equal_variances: FTest  # Brown and Forsythe's, over all cells
-    largest_deviation: tuple[str, float]  # cell, and its standard deviation
+    kurtosis: float
+    equal_variances: FTest
+    largest_deviation: tuple[str, float]
     smallest_deviation: tuple[str, float]
 
 
 def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
-    """Diagnostics of values by cell, two or more in each.
+    """Compute diagnostics of values by cell, at least two in each.
 
-    Source: Shapiro and Wilk 1965, doi:10.1093/biomet/52.3-4.591; p by Royston 1995, AS R94.
+    Sources: Shapiro and Wilk 1965, doi:10.1093/biomet/52.3-4.591; p by Royston 1995, AS R94.
     """
     check_groups(cells, least=2)
     residuals = residuals_of(cells)
@@ -134,7 +140,7 @@ def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
     low, high = min(spreads, key=spreads.__getitem__), max(spreads, key=spreads.__getitem__)
     return Diagnostics(
         float(shapiro.statistic),
-        float(shapiro.pvalue) if len(residuals) <= MAX_PEOPLE else None,
+        float(shapiro.pvalue) if len(residuals) <= MAX_SHAPIRO else None,
         float(stats.skew(residuals)),
         float(stats.kurtosis(residuals)),
         brown_forsythe(cells),
@@ -144,5 +150,5 @@ def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
 
 
 def residuals_of(cells: Mapping[str, Values]) -> Values:
-    """Values less the mean of their cell, cell by cell, (n,)."""
+    """Return values less the mean of their cell, cell by cell, (n,)."""
     return np.concatenate([values - values.mean() for values in cells.values()])

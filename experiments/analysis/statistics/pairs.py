@@ -1,4 +1,4 @@
-"""Every two groups compared: which differ, by how much, and which are shown to be about equal."""
+"""Comparisons of all pairs of groups: differences, their sizes, and equivalence."""
 
 import itertools
 import math
@@ -13,37 +13,44 @@ from scipy.optimize import brentq
 from scipy.special import gammainccinv, gammaincinv, gammaln, ndtr
 
 from experiments.analysis.statistics.anova import Values, check_groups, people_in, varies
-from experiments.analysis.statistics.effects import ALPHA, CONFIDENCE, hedges_g
-from experiments.analysis.statistics.noncentral import Interval
+from experiments.analysis.statistics.effects import ALPHA, CONFIDENCE, Interval, hedges_g
 from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
-TAIL = 1e-18  # of the distribution of the standard deviation, left out at either end
-WIDEST = 1e4  # range that a quantile may have
+TAIL = 1e-18  # probability left out at each end of the distribution of the standard deviation
+WIDEST = 1e4  # upper limit of quantiles of the studentized range
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two groups compared. p values are two-sided; None where they cannot be computed."""
+    """Two groups compared. p values are two-sided, and None if they cannot be computed.
 
-    first: str  # name of one group
-    second: str  # name of the other
-    difference: float  # mean of the second minus mean of the first
-    interval: Interval  # its 95 % confidence interval, simultaneous over all pairs (Tukey)
-    tukey_p: float  # Tukey's honestly significant difference, which assumes equal variances
-    games_howell_p: float | None  # the same with unequal variances
-    holm_p: float | None  # Welch's t tests, corrected after Holm over all pairs
-    g: float | None  # Hedges' g, or None
-    g_interval: Interval | None  # its 95 % confidence interval, or None
-    equivalence_bound: float  # largest difference that counts as none, in units of the values
-    # two one-sided Welch tests: below .05, the difference is smaller than the bound
+    Attributes:
+        difference: Mean of the second less mean of the first.
+        interval: 95 % confidence interval of the difference, simultaneous over all pairs (Tukey).
+        holm_p: Welch's t test, corrected over all pairs by Holm's method.
+        equivalence_bound: Largest difference that counts as equivalent, in units of the values.
+        equivalence_p: Two one-sided Welch tests; below .05, the difference is smaller than the bound.
+        verdict: `different` (Tukey), else `equivalent`, else `undecided`.
+    """
+
+    first: str
+    second: str
+    difference: float
+    interval: Interval
+    tukey_p: float
+    games_howell_p: float | None
+    holm_p: float | None
+    g: float | None
+    g_interval: Interval | None
+    equivalence_bound: float
     equivalence_p: float | None
-    verdict: str  # `different` (Tukey), else `equivalent`, else `undecided`: neither is shown
+    verdict: str
 
 
 def compare_pairs(groups: Mapping[str, Values], bound: float) -> list[Pair]:
-    """Compare every two groups; `bound` is the largest difference that counts as none, in pooled SDs within groups."""
+    """Compare all pairs of groups. `bound` is the largest equivalent difference, in pooled SDs within groups."""
     check_groups(groups)
     pairs = list(itertools.combinations(groups, 2))
     welch = {
@@ -85,7 +92,7 @@ def _compare(
 
 
 def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool:
-    """Whether Tukey's test finds a difference of two of several groups at .05; quicker than its p."""
+    """Return True if Tukey's test finds a difference of two of several groups at .05. This is faster than its p."""
     check_groups(groups)
     if missing := [name for name in (first, second) if name not in groups]:
         raise StatisticsError(f"no people in {missing[0]}")
@@ -94,14 +101,14 @@ def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool
 
 
 def _difference(groups: Mapping[str, Values], first: str, second: str) -> tuple[float, float, int]:
-    """Difference of two means, second minus first, its pooled standard error, and degrees of freedom."""
+    """Return the difference of two means, second minus first, its pooled standard error, and degrees of freedom."""
     one, other = groups[first], groups[second]
     error = pooled_deviation(groups) * math.sqrt(1 / len(one) + 1 / len(other))
     return float(other.mean() - one.mean()), error, people_in(groups) - len(groups)
 
 
 def tukey_p(statistic: float, groups: int, freedom: float) -> float:
-    """p of a difference of two of several groups, in standard errors, by the studentized range.
+    """Return the p of a difference of two of several groups, in standard errors, by the studentized range.
 
     Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal numbers of people.
     """
@@ -109,7 +116,7 @@ def tukey_p(statistic: float, groups: int, freedom: float) -> float:
 
 
 def tukey_quantile(groups: int, freedom: float) -> float:
-    """Standard errors by which two of several groups may differ by chance, at 95 %."""
+    """Return the 95 % quantile of the difference of two of several groups, in standard errors."""
     return range_quantile(CONFIDENCE, groups, freedom) / math.sqrt(2)
 
 
@@ -119,7 +126,7 @@ def pooled_deviation(groups: Mapping[str, Values]) -> float:
 
 
 def holm(p: Values) -> Values:
-    """p values corrected for their number, (n,).
+    """Correct p values (n,) for their number.
 
     Source: Holm 1979, Scandinavian Journal of Statistics 6.
     """
@@ -129,17 +136,16 @@ def holm(p: Values) -> Values:
     return found
 
 
-def _placed(low: float, high: float) -> tuple[Values, Values]:
+def _quadrature(low: float, high: float) -> tuple[Values, Values]:
     half = (high - low) / 2
     return low + half * (NODES + 1), half * WEIGHTS
 
 
-PLACES, _WEIGHTS = _placed(-9.0, 9.0)
+PLACES, _WEIGHTS = _quadrature(-9.0, 9.0)
 DENSITY, BELOW = np.exp(-(PLACES**2) / 2) / math.sqrt(2 * math.pi) * _WEIGHTS, ndtr(PLACES)
 
 
 def range_sf(statistic: float, groups: int, freedom: float) -> float:
-    """Probability of a larger studentized range."""
     deviations, weights = _deviations(freedom)
     smaller = ndtr(PLACES - statistic * deviations[:, None])
     larger = groups * (BELOW ** (groups - 1) - (BELOW - smaller) ** (groups - 1)) @ DENSITY
@@ -148,21 +154,20 @@ def range_sf(statistic: float, groups: int, freedom: float) -> float:
 
 @lru_cache(maxsize=256)
 def range_quantile(share: float, groups: int, freedom: float) -> float:
-    """The range below which this share lies."""
     return float(
         brentq(lambda q: 1 - range_sf(q, groups, freedom) - share, 0.0, WIDEST, xtol=1e-13, rtol=1e-14)
     )
 
 
 def _deviations(freedom: float) -> tuple[Values, Values]:
-    """Standard deviations of samples whose true one is 1, and their probabilities.
+    """Return sample standard deviations for a true one of 1, and their weights in an integral.
 
-    Placed by their root, in which the density is smooth at 0 whatever the degrees of freedom.
+    The nodes are spaced by the root of the deviation, in which the density is smooth at 0 for any degrees of freedom.
     """
     low, high = (
         2 * end / freedom for end in (gammaincinv(freedom / 2, TAIL), gammainccinv(freedom / 2, TAIL))
     )
-    roots, weights = _placed(low**0.25, high**0.25)
+    roots, weights = _quadrature(low**0.25, high**0.25)
     found = roots**2
     logs = (freedom - 1) * np.log(found) - freedom * found**2 / 2
     constant = freedom / 2 * math.log(freedom / 2) - gammaln(freedom / 2) + math.log(2)

@@ -1,7 +1,7 @@
 """Variances of crossed random factors by restricted maximum likelihood.
 
-statsmodels climbs to 1e-4, has no degrees of freedom of the error, and needs minutes for crossed factors. Here the
-deviance at given ratios of variances is one Cholesky decomposition, and Newton's steps lead to its minimum.
+statsmodels has a precision of 1e-4, no degrees of freedom of the error, and needs minutes for crossed factors. Here,
+the deviance at given ratios of variances takes one Cholesky decomposition, and Newton's method finds its minimum.
 """
 
 from functools import cache
@@ -16,19 +16,19 @@ from scipy.special import chdtri
 from experiments.analysis.statistics.anova import Values
 from experiments.errors import StatisticsError
 
-STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # ratios of variances tried first
-MOST = 1e6  # the largest ratio
+STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # starting ratios of variances
+MAX_RATIO = 1e6
 NEWTON_STEPS = 30
-DENSE = 400  # levels of all factors, above which crossproducts are stored as a sparse matrix
-PRECISION = 1e-4  # of the ends of intervals
+DENSE = 400  # number of levels above which crossproducts are sparse
+PRECISION = 1e-4  # of interval ends
 
 
 class VarianceComponents:
-    """A linear model with random factors at ratios of the variances, factors over residual.
+    """A linear model with random factors, at given ratios of their variances to the residual variance.
 
     V is the covariance over the residual variance, and P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1. Everything is computed
-    from the crossproducts of the indicators Z, the design X and the values y, so its cost depends on the levels of the
-    factors and not on the number of trials. The factor with the most levels and the factors that it is nested in are
+    from the crossproducts of the indicators Z, the design X and the values y, so the cost depends on the levels of the
+    factors, not on the number of trials. The factor with the most levels, and the factors that it is nested in, are
     eliminated one by one, because their crossproducts are diagonal. Crossproducts of many levels are sparse.
     """
 
@@ -40,9 +40,9 @@ class VarianceComponents:
         self.crossed = [k for k in range(len(members)) if k not in self.nested]
         order = [*self.nested, *self.crossed]
         ends = np.cumsum(self.sizes[order]).tolist()
-        self.places = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
+        self.slices = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
         self.levels = ends[-1]
-        self.start = ends[len(self.nested) - 1]  # of the levels that are crossed, and then of the effects
+        self.start = ends[len(self.nested) - 1]  # first crossed level; the effects come after the levels
         ones, rows = np.ones(len(values)), np.arange(len(values))
         parts = [csr_array((ones, (rows, members[k]))) for k in order]
         columns = hstack([*parts, csr_array(np.column_stack([design, values]))], "csr")
@@ -54,19 +54,21 @@ class VarianceComponents:
         self._check_variances()
 
     def _check(self, columns: Any, member: NDArray[np.int64]) -> None:
-        """Refuse trials that leave nothing for the residual, or nothing for the factors."""
+        """Raise a `StatisticsError` if the trials leave nothing for the residual or for the factors."""
         trials, count = columns.shape[0], self.levels - self.start + self.effect_count
-        within, _ = _swept(self.products, self.places[self.nested[0]], np.inf)
+        within, _ = _swept(self.products, self.slices[self.nested[0]], np.inf)
         products = _dense(within[-count - 1 :, -count - 1 :])
         sizes, turn = np.linalg.eigh(products[:-1, :-1])
         kept = sizes > trials * columns.shape[1] * np.finfo(float).eps
         rank = self.sizes.max() + kept.sum()
         if rank >= trials:
-            raise StatisticsError("there are as many houses and cells as people; their variances are one")
+            raise StatisticsError(
+                "houses and cells are as many as people; their variances cannot be distinguished"
+            )
         if rank <= self.effect_count:
-            raise StatisticsError("each cell has houses of its own, one each; their variance is not known")
-        told = turn[:, kept] @ ((turn[:, kept].T @ products[:-1, -1]) / sizes[kept])
-        left = columns[:, -count - 1 :] @ np.append(-told, 1.0)
+            raise StatisticsError("each cell has its own house; the variance of houses is unknown")
+        explained = turn[:, kept] @ ((turn[:, kept].T @ products[:-1, -1]) / sizes[kept])
+        left = columns[:, -count - 1 :] @ np.append(-explained, 1.0)
         left -= (np.bincount(member, left) / np.bincount(member))[member]
         if float(np.square(left).mean()) < 1e-20:
             raise StatisticsError("people in the same house and condition do not differ")
@@ -74,17 +76,17 @@ class VarianceComponents:
     def _check_variances(self) -> None:
         traces = self._traces()[0]
         sizes = traces.diagonal()
-        aliased = sizes.min() <= 1e-13 * self.freedom**2  # by the effects
+        aliased = sizes.min() <= 1e-13 * self.freedom**2  # with the effects
         if aliased or np.linalg.cond(traces / np.sqrt(np.outer(sizes, sizes))) > 1e8:
-            raise StatisticsError("the design cannot tell the variances of the random factors apart")
+            raise StatisticsError("the design cannot distinguish the variances of the random factors")
 
     def at(self, ratios: Values) -> None:
-        """Generalised least squares at ratios, (k,)."""
+        """Compute generalized least squares at ratios (k,)."""
         self.ratios = ratios
         self.active = np.flatnonzero(ratios > 0.0)
         products = self.products
         for k in self.nested:
-            products = _swept(products, self.places[k], ratios[k], keep=True)[0]
+            products = _swept(products, self.slices[k], ratios[k], keep=True)[0]
         levels, effects = self.levels, slice(-self.effect_count, None)
         self.between = products[:levels, :levels]
         wide = _dense(products[:, self.start :])
@@ -102,13 +104,13 @@ class VarianceComponents:
         self.residual = self.squares / self.freedom
 
     def _roots(self, ratios: Values) -> tuple[Values, Values]:
-        """Roots of the ratios of crossed levels, then 1 for each effect; and 1 for each crossed level, then 0."""
+        """Return the roots of the ratios of crossed levels, then ones for the effects. Add the identity's diagonal."""
         levels = np.repeat(np.sqrt(ratios[self.crossed]), self.sizes[self.crossed])
         ones = np.ones(self.effect_count)
         return np.append(levels, ones), np.append(np.ones(len(levels)), 0.0 * ones)
 
     def deviance(self, ratios: Values) -> float:
-        """Minus twice the restricted log likelihood at ratios, (k,), up to a constant."""
+        """Return minus twice the restricted log likelihood at ratios (k,), up to a constant."""
         products, fixed = self.products, 0.0
         for k in self.nested:
             products, more = _swept(products, slice(0, self.sizes[k]), ratios[k])
@@ -120,7 +122,6 @@ class VarianceComponents:
         return fixed + 2.0 * float(steps[:-1].sum() + self.freedom * steps[-1])
 
     def climb(self) -> None:
-        """Go to the ratios of the largest likelihood."""
         count = len(self.sizes)
         start = min((np.full(count, ratio / count) for ratio in STARTS), key=self.deviance)
         self.at(self._lowest(self.deviance, start, 1e-10)[0])
@@ -129,7 +130,7 @@ class VarianceComponents:
             free = (self.ratios > 0.0) | (slope < 0.0)
             step = np.zeros(count)
             step[free] = -np.linalg.solve(curve[np.ix_(free, free)], slope[free])
-            new = np.clip(self.ratios + step, 0.0, MOST)
+            new = np.clip(self.ratios + step, 0.0, MAX_RATIO)
             done = np.abs(new - self.ratios).max() <= 1e-8 * (1.0 + new.max())
             self.at(new)
             if done:
@@ -138,26 +139,29 @@ class VarianceComponents:
 
     @staticmethod
     def _lowest(function: Any, start: Values, precision: float = 1e-6) -> tuple[Values, float]:
-        """Minimize a function of ratios to a relative precision. Return the place and the value."""
+        """Minimize a function of ratios to a relative precision. Return the minimizer and the minimum."""
         if not len(start):
             return start, float(function(start))
         found = minimize(
-            function, start, method="L-BFGS-B", bounds=[(0.0, MOST)] * len(start), options={"ftol": precision}
+            function,
+            start,
+            method="L-BFGS-B",
+            bounds=[(0.0, MAX_RATIO)] * len(start),
+            options={"ftol": precision},
         )
         return found.x, float(found.fun)
 
     def share(self, k: int) -> float:
-        """Share of a factor in the variance."""
         return float(self.ratios[k] / (1.0 + self.ratios.sum()))
 
     def interval(self, k: int) -> tuple[float, float]:
-        """Shares of a factor in the variance that a likelihood ratio test at 5 % does not refuse."""
+        """Return the shares of a factor in the variance that a likelihood ratio test at 5 % does not reject."""
         lowest, limit = self.deviance(self.ratios), float(np.sqrt(chdtri(1, 0.05)))
-        others, best, last = np.delete(self.ratios, k), self.share(k), MOST / (1.0 + MOST)
+        others, best, last = np.delete(self.ratios, k), self.share(k), MAX_RATIO / (1.0 + MAX_RATIO)
 
-        @cache  # a second value at the same share would have another start, and perhaps another sign
+        @cache  # repeated evaluations would start elsewhere and might change sign
         def above(share: float) -> float:
-            nonlocal others  # near those of the last share
+            nonlocal others  # start from those of the last share
             if share == best:
                 return -limit
             odds = share / (1.0 - share)
@@ -166,29 +170,29 @@ class VarianceComponents:
                 return self.deviance(np.insert(ratios, k, odds * (1.0 + ratios.sum())))
 
             others, height = self._lowest(of_others, others)
-            return float(np.sqrt(max(height - lowest, 0.0))) - limit  # the root is nearly straight
+            return float(np.sqrt(max(height - lowest, 0.0))) - limit  # the root is nearly linear in the share
 
         low = float(brentq(above, 0.0, best, xtol=PRECISION)) if best > 0.0 and above(0.0) > 0.0 else 0.0
         return low, float(brentq(above, best, last, xtol=PRECISION)) if above(last) > 0.0 else 1.0
 
-    def test(self, places: NDArray[np.int64]) -> tuple[float, int, float]:
-        """Test the effects at these places of the design: F and its degrees of freedom.
+    def test(self, indices: NDArray[np.int64]) -> tuple[float, int, float]:
+        """Test the effects with these indices. Return F and its degrees of freedom.
 
         Source of the degrees of freedom: Fai and Cornelius 1996, doi:10.1080/00949659608811740.
         """
-        block = self.covariance[np.ix_(places, places)] * self.residual
+        block = self.covariance[np.ix_(indices, indices)] * self.residual
         sizes, turn = np.linalg.eigh(block)
-        squares = (turn.T @ self.effects[places]) ** 2 / sizes
-        slopes = [(turn.T @ d[np.ix_(places, places)] @ turn).diagonal() for d in self._slopes()]
-        gradient = np.array(slopes)  # of `sizes` by the variances, (k, q)
+        squares = (turn.T @ self.effects[indices]) ** 2 / sizes
+        slopes = [(turn.T @ d[np.ix_(indices, indices)] @ turn).diagonal() for d in self._slopes()]
+        gradient = np.array(slopes)  # of `sizes` with respect to the variances, (k, q)
         freedom = 2.0 * sizes**2 / np.einsum("iq,ij,jq->q", gradient, self._variances(), gradient)
-        q, statistic = len(places), float(squares.mean())
+        q, statistic = len(indices), float(squares.mean())
         return statistic, q, _joint_freedom(freedom)
 
     def _slopes(self) -> list[Values]:
-        """Derivatives of the covariance of the effects by the variances: of the factors above 0, and the residual."""
+        """Return derivatives of the effects' covariance by the variances of nonzero factors and the residual."""
         effects = self.bent[:, -self.effect_count :].T
-        moved = [effects[:, self.places[k]] for k in self.active.tolist()]
+        moved = [effects[:, self.slices[k]] for k in self.active.tolist()]
         slopes = [one @ one.T for one in moved]
         factors = sum(
             (self.ratios[k] * one for k, one in zip(self.active, slopes, strict=True)), np.zeros(())
@@ -196,51 +200,51 @@ class VarianceComponents:
         return [*slopes, self.covariance - factors]
 
     def _traces(self) -> tuple[Values, Values]:
-        """Traces of P V_k P V_l for all factors and the residual, (k + 1, k + 1), and of P V_k, (k,)."""
+        """Return traces of P V_k P V_l for all factors and the residual, (k + 1, k + 1), and of P V_k, (k,)."""
         diagonal = self.between.diagonal() - (self.bent * self.through).sum(axis=1)
-        places = [self.places[k] for k in range(len(self.sizes))]
+        places = [self.slices[k] for k in range(len(self.sizes))]
         single = np.array([diagonal[place].sum() for place in places])
         halves = [self.core @ (self.through[place].T @ self.through[place]) for place in places]
         traces = np.zeros((len(places), len(places)))
         for k, m in np.ndindex(traces.shape):
             block = self.between[places[k], places[m]]
-            # The squares of a sparse matrix less a product of narrow ones.
+            # The squares of a sparse matrix minus a product of narrow matrices.
             crossing = float((self.bent[places[k]] * (block @ self.through[places[m]])).sum())
             traces[k, m] = (block**2).sum() - 2.0 * crossing + float((halves[k] * halves[m].T).sum())
         return self._with_residual(traces, single, float(self.freedom)), single
 
     def _with_residual(self, of_factors: Values, single: Values, total: float) -> Values:
-        """Add the residual to traces or forms of P V_k P V_l, (k, k), by V = 1 + sum of ratios V_k."""
+        """Add the residual to traces or quadratic forms of P V_k P V_l, (k, k), using V = 1 + sum of ratios V_k."""
         mixed = single - of_factors @ self.ratios
         last = total - self.ratios @ single - self.ratios @ mixed
         return np.block([[of_factors, mixed[:, None]], [mixed[None], np.array([[last]])]])
 
-    def _moved(self) -> tuple[Values, Values]:
-        """Forms y' P V_k P V_l P y for all factors and the residual, (k + 1, k + 1), and y' P V_k P y, (k,)."""
+    def _quadratic_forms(self) -> tuple[Values, Values]:
+        """Return y' P V_k P V_l P y for all factors and the residual, (k + 1, k + 1), and y' P V_k P y, (k,)."""
         parts = np.zeros((self.levels, len(self.sizes)))
-        for k, place in self.places.items():
+        for k, place in self.slices.items():
             parts[place, k] = self.left[place]
         crossed = parts.T @ (self.between @ parts) - parts.T @ self.bent @ (self.through.T @ parts)
         single = (parts**2).sum(axis=0)
         return self._with_residual(crossed, single, self.squares), single
 
     def _slopes_of_deviance(self) -> tuple[Values, Values]:
-        """First and second derivatives of the deviance by the ratios, (k,) and (k, k)."""
+        """Return first and second derivatives of the deviance by the ratios, (k,) and (k, k)."""
         traces, single = self._traces()
-        moved, squares = self._moved()
+        moved, squares = self._quadratic_forms()
         squares = squares / self.residual
         curve = 2.0 * moved[:-1, :-1] / self.residual - traces[:-1, :-1]
         return single - squares, curve - np.outer(squares, squares) / self.freedom
 
     def _variances(self) -> Values:
-        """Covariance of the estimated variances by second derivatives of the likelihood; those at 0 are left out."""
+        """Return the covariance of the nonzero estimated variances, from second derivatives of the likelihood."""
         kept = np.append(self.active, len(self.sizes))
-        observed = self._moved()[0] / self.residual - self._traces()[0] / 2.0
+        observed = self._quadratic_forms()[0] / self.residual - self._traces()[0] / 2.0
         return np.asarray(np.linalg.inv(observed[np.ix_(kept, kept)]) * self.residual**2)
 
 
 def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[int]:
-    """List the factor with the most levels, and each factor that the one before is nested in."""
+    """Return the factor with the most levels, and each factor that the previous one is nested in."""
     first, *rest = np.argsort(-sizes, kind="stable").tolist()
     chain = [first]
     for k in rest:
@@ -251,7 +255,7 @@ def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[
 
 
 def _swept(products: Any, place: slice, ratio: float, *, keep: bool = False) -> tuple[Any, float]:
-    """Eliminate the factor at `place`. Return the crossproducts, its own only if `keep`, and the log determinant."""
+    """Eliminate the factor in a slice. Return the crossproducts, its own only if `keep`, and the log determinant."""
     block = products[place]
     counts = block[:, place].diagonal()
     shrink = np.zeros(len(counts)) if ratio == 0.0 else 1.0 / (1.0 / ratio + counts)
@@ -268,7 +272,7 @@ def _dense(matrix: Any) -> Values:
 
 
 def _joint_freedom(freedom: Values) -> float:
-    """Degrees of freedom of an F whose parts have their own, (q,)."""
+    """Return the degrees of freedom of an F whose parts have different ones, (q,)."""
     if np.ptp(freedom) < 1e-8 * freedom.max():
         return float(freedom.mean())
     expected = float((freedom / (freedom - 2.0))[freedom > 2.0].sum())

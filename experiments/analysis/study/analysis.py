@@ -1,4 +1,4 @@
-"""The analysis of a study: descriptions, tests and models; those that cannot be computed give a reason."""
+"""The analysis of a study: descriptions, tests and models, or the reasons why they cannot be computed."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -19,31 +19,34 @@ from experiments.analysis.statistics.anova import (
     welch,
     welch_james,
 )
-from experiments.analysis.statistics.by_house import HouseDifference, differences_by_house
-from experiments.analysis.statistics.effects import FTest
-from experiments.analysis.statistics.mixed import MIN_LEVELS, MixedModel, WaldTest, mixed_model
+from experiments.analysis.statistics.effects import POWER, FTest, detectable_eta_squared
+from experiments.analysis.statistics.mixed import (
+    MIN_LEVELS,
+    HouseDifference,
+    MixedModel,
+    WaldTest,
+    differences_by_house,
+    mixed_model,
+)
 from experiments.analysis.statistics.mixtures import fit_mixtures
 from experiments.analysis.statistics.models import Chi2Test, OrdinalModel, diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
-from experiments.analysis.statistics.power import POWER, detectable_eta_squared
 from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
 from experiments.analysis.study.table import StudyTable
 from experiments.errors import StatisticsError
 
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
-OUT_OF_MEMORY = (
-    "there is not enough memory; analyse fewer trials, or trials with fewer persons, houses or conditions"
-)
-STRICT = "nd_strict_2n"  # holds how many visits deviated, as its denominator is known
+OUT_OF_MEMORY = "not enough memory; analyse fewer trials, or trials with fewer people, houses or conditions"
+STRICT = "nd_strict_2n"  # from which the number of deviations follows, because its denominator is known
 
 
 Test = FTest | WaldTest | Chi2Test
 
 
 @dataclass(frozen=True)
-class Result:
-    """A test or model of a measure at a number of objects (None: over all), or the reason why it has no value."""
+class AnalysisResult:
+    """A test or model of a measure, over all numbers of objects if `objects` is None, or the reason for no value."""
 
     measure: str
     kind: str
@@ -54,7 +57,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Description:
-    """A measure in a cell; `interval` is Student's 95 % confidence interval of the mean, None for one person."""
+    """Statistics of a measure in a cell. Interval (Student's, 95 %) and deviation are None for one person."""
 
     measure: str
     assistance: str
@@ -68,15 +71,14 @@ class Description:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The people and measures of a study, with descriptions by measure and cell, tests and models."""
+    """Descriptions, tests and models of a study's people and measures."""
 
     table: StudyTable
     measures: Measures
     descriptions: tuple[Description, ...]
-    results: tuple[Result, ...]
+    results: tuple[AnalysisResult, ...]
 
-    def find(self, measure: str, kind: str, objects: int | None = None) -> Result | None:
-        """The result of this measure, kind and number of objects."""
+    def find(self, measure: str, kind: str, objects: int | None = None) -> AnalysisResult | None:
         wanted = measure, kind, objects
         return next((r for r in self.results if (r.measure, r.kind, r.objects) == wanted), None)
 
@@ -123,8 +125,8 @@ def analyse(table: StudyTable, measures: Measures) -> Analysis:
     return Analysis(table, measures, tuple(_describe(table)), tuple(results))
 
 
-def test_results(table: StudyTable, measures: Measures) -> list[Result]:
-    """Everything that `tests_of` a result yields: F tests, mixed and ordinal models."""
+def test_results(table: StudyTable, measures: Measures) -> list[AnalysisResult]:
+    """Return all F tests, mixed models and ordinal models, from which `tests_of` yields tests."""
     results = []
     for name in table.columns:
         answers = name.startswith(LIKERT_PREFIX)
@@ -140,8 +142,8 @@ def test_results(table: StudyTable, measures: Measures) -> list[Result]:
     return results
 
 
-def tests_of(result: Result) -> Iterator[tuple[str, Test]]:
-    """Tests of a result with the names of their effects."""
+def tests_of(result: AnalysisResult) -> Iterator[tuple[str, Test]]:
+    """Yield the tests of a result with the names of their effects."""
     if isinstance(result.value, FTest):
         yield EFFECTS[0], result.value
     elif isinstance(result.value, OrdinalModel):
@@ -152,27 +154,28 @@ def tests_of(result: Result) -> Iterator[tuple[str, Test]]:
         yield from ((effect, test) for effect, test in result.value.items() if isinstance(test, FTest))
 
 
-def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], Any]) -> Result:
+def _attempt(measure: str, kind: str, objects: int | None, work: Callable[[], Any]) -> AnalysisResult:
     try:
-        return Result(measure, kind, objects, work(), None)
+        return AnalysisResult(measure, kind, objects, work(), None)
     except StatisticsError as error:
-        return Result(measure, kind, objects, None, str(error))
+        return AnalysisResult(measure, kind, objects, None, str(error))
     except MemoryError:
-        return Result(measure, kind, objects, None, OUT_OF_MEMORY)
+        return AnalysisResult(measure, kind, objects, None, OUT_OF_MEMORY)
 
 
-def _sensitivity(result: Result, measures: Measures) -> Iterator[Result]:
-    """What a study of this size can show, of Fisher's analysis of a measure."""
+def _sensitivity(result: AnalysisResult, measures: Measures) -> Iterator[AnalysisResult]:
     test, bound = result.value, measures.equivalence.eta_squared
     if result.kind == ONE_WAY and test is not None and not result.measure.startswith(LIKERT_PREFIX):
         size = detectable_eta_squared(test.df1, test.df2, test.people)
         of = result.measure, result.objects
-        yield Result(of[0], "equivalence", of[1], {"bound": bound, "p": test.p_of_equivalence(bound)}, None)
-        yield Result(of[0], "power", of[1], {"power": POWER, "detectable_eta_squared": size}, None)
+        yield AnalysisResult(
+            of[0], "equivalence", of[1], {"bound": bound, "p": test.p_of_equivalence(bound)}, None
+        )
+        yield AnalysisResult(of[0], "power", of[1], {"power": POWER, "detectable_eta_squared": size}, None)
 
 
-def one_way_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
-    """F tests of a measure at a number of objects."""
+def one_way_tests(table: StudyTable, name: str, objects: int) -> list[AnalysisResult]:
+    """Return F tests of a measure at a number of objects."""
     groups = table.groups(name, objects)
     members = [c for c, values in groups.items() for _ in values]
     pooled = np.concatenate([np.empty(0), *groups.values()]), np.array(members), np.zeros(len(members))
@@ -184,8 +187,8 @@ def one_way_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
     ]
 
 
-def two_way_tests(table: StudyTable, name: str) -> list[Result]:
-    """F tests of a measure over all numbers of objects."""
+def two_way_tests(table: StudyTable, name: str) -> list[AnalysisResult]:
+    """Return F tests of a measure over all numbers of objects."""
     known = ~np.isnan(table.columns[name])
     factors = table.columns[name][known], table.assistance[known], table.objects[known]
     return [
@@ -197,7 +200,7 @@ def two_way_tests(table: StudyTable, name: str) -> list[Result]:
 
 
 def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
-    """Known values of a column by cell, those of each number of objects together."""
+    """Return the known values of a column by cell."""
     return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
 
 
@@ -213,15 +216,14 @@ def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
 
 
 def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
-    """The house, and what repeats besides: people with several trials, their order, conditions within a house."""
+    """Return the random factors of a mixed model: house, and if repeated, person, trial number, house x condition."""
     rows, houses = len(table.rows), len(set(table.houses.tolist()))
     found: dict[str, NDArray[Any]] = {}
     if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
         found["person"] = table.people
         trials = table.numbers("trial_number")
-        if (
-            len(set(trials.tolist())) > 2 and not np.isnan(trials).any()
-        ):  # two levels say nothing of a variance
+        # Two levels say nothing about a variance.
+        if len(set(trials.tolist())) > 2 and not np.isnan(trials).any():
             found["trial_number"] = trials
     if houses >= MIN_LEVELS or not found:
         found["house"] = table.houses
@@ -239,23 +241,24 @@ def _by_house(table: StudyTable, name: str) -> list[HouseDifference]:
     )
 
 
-def _acceptance(table: StudyTable) -> list[Result]:
-    """Mixtures by condition, over the visits that each person made."""
+def _acceptance(table: StudyTable) -> list[AnalysisResult]:
     if STRICT not in table.columns:
-        return [Result(STRICT, "acceptance", None, None, f"{STRICT} is not known")]
+        return [AnalysisResult(STRICT, "acceptance", None, None, f"{STRICT} is not known")]
     results = []
     for condition in table.conditions():
         made = table.visits()
         here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
         visits = made[here]
         deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
-        accepted = np.clip(visits - deviations, 0, visits)  # without `visits`, drops count as deviations only
+        accepted = np.clip(
+            visits - deviations, 0, visits
+        )  # without a column `visits`, dropped objects count as deviations
         kind = f"acceptance, {condition}"
         results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))
     return results
 
 
-def _answer_tests(table: StudyTable, name: str, objects: int) -> list[Result]:
+def _answer_tests(table: StudyTable, name: str, objects: int) -> list[AnalysisResult]:
     groups: Mapping[str, Values] = table.groups(name, objects)
     return [
         _attempt(name, ONE_WAY, objects, partial(one_way, groups)),

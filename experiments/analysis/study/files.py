@@ -1,4 +1,4 @@
-"""Files of an analysis: statistics, a tidy table of people, a table of tests, the report."""
+"""Writes the files of an analysis: statistics, tables of people and of tests, and the report."""
 
 import csv
 import io
@@ -27,13 +27,13 @@ TEST_COLUMNS = (
 
 
 def check_files(folder: Path, *, replace: bool) -> None:
-    """Raise a RecordError if an analysis may not be written to `folder`: files are there and may not be replaced."""
+    """Raise a `RecordError` if `folder` has files that may not be replaced."""
     for name in FILES:
         check_file(folder / name, replace=replace)
 
 
 def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mapping[str, Any]) -> None:
-    """Write all files, each whole or not at all; `report` is the page, `further` more entries of the statistics."""
+    """Write all files atomically. `report` is the page, `further` has more entries of the statistics."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)
@@ -46,7 +46,7 @@ def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mappi
 
 
 def people_table(table: StudyTable) -> pa.Table:
-    """A row per person: seeds, cell, and all measures under the names of the analysis."""
+    """Return a row per person: seeds, cell, and all measures under the names of the analysis."""
     columns: dict[str, Any] = {
         "origin": [table.origin] * len(table.rows),
         **{name: [row.get(name) for row in table.rows] for name in ("user", "participant", "house", *SEEDS)},
@@ -57,7 +57,7 @@ def people_table(table: StudyTable) -> pa.Table:
         **table.columns,
     }
     found = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
-    # A column without values has no type.
+    # Columns without values have no type and are left out.
     return found.select([c for c in found.column_names if not pa.types.is_null(found.schema.field(c).type)])
 
 

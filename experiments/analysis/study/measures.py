@@ -1,5 +1,6 @@
-"""Which columns of a table of trials are analysed: experiments/trials/designs/metrics.toml, or another such file."""
+"""The measures of an analysis and their columns, read from experiments/trials/designs/metrics.toml or another file."""
 
+import difflib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
@@ -7,69 +8,82 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
-from experiments.errors import ConfigError, shown
-from experiments.record.displays import Displays
-from experiments.record.metrics import CIRCUMSTANCES, Metrics
+from experiments.errors import ConfigError, RecordError, shown
+from experiments.record.metrics import CIRCUMSTANCES, Displays, Metrics
 from experiments.trials.designs import FOLDER
 from experiments.trials.trial_config import SETTINGS
 from mjsim.support.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
-SHOWN = 20  # columns in a sentence
+MAX_COLUMNS_SHOWN = 20  # in a sentence
 _OF_A_TRIAL = re.compile(
     r"(person|behaviour|max|mean|p99)_\w+|simulated(_s)?|fingerprint|participant|releases_settled|ejections|"
     "tunnellings|grips_lost"
 )
 LIKERT_PREFIX = "likert_"  # columns of answers
+ANSWERS = (1, 5)  # smallest and largest answer of Likert items
 
 
 class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A measure of the paper and its column."""
+    """A measure of the paper and its scored column.
 
-    label: str  # its name in figures and tables
-    column: str  # the column that is scored
-    why: str = ""  # reason for it
-    unit: str = ""  # unit of the column, or nothing
-    range: tuple[float, float] = (0.0, 1e6)  # of its columns; other values cannot be
-    without: str | None = None  # the column used instead if that one has no values
-    others: tuple[str, ...] = ()  # other readings of the measure, reported as well
+    Attributes:
+        why: Reason for this column.
+        range: Valid values of its columns.
+        without: Column used instead if `column` has no values.
+        others: Other readings of the measure, which are reported as well.
+    """
+
+    label: str
+    column: str
+    why: str = ""
+    unit: str = ""
+    range: tuple[float, float] = (0.0, 1e6)
+    without: str | None = None
+    others: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return tuple(c for c in (self.column, self.without, *self.others) if c is not None)
 
     def axis(self) -> str:
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
 
 class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Largest effects that count as none: of a pair, in standard deviations within groups; partial eta squared."""
+    """Largest equivalent effects: difference of a pair in standard deviations within groups, partial eta squared."""
 
     pair: float
     eta_squared: float
 
 
 class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The measures of an analysis by short name, and labels of survey items (columns `likert_` and the name)."""
+    """The measures of an analysis by short name, and labels of survey items by name (columns `likert_NAME`)."""
 
     objective: dict[str, Measure] = msgspec.field(name="measures")
     likert: dict[str, str]
     equivalence: Equivalence
 
     def answers(self) -> dict[str, str]:
-        """Labels of answers by column."""
+        """Return the labels of answers by column."""
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
 
 
 def read_measures(path: Path = FILE) -> Measures:
-    """The measures of a file, by default the committed choice; a ConfigError says what is wrong with it."""
+    """Read a file of measures, by default that of the paper. Raises a `ConfigError` if the file is not valid."""
     try:
         return decoded_measures(read_bytes(path))
     except OSError as error:
         raise ConfigError(f"cannot read measures {path}: {error.strerror}") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: {error}; {FILE} shows what such a file holds") from error
+        raise ConfigError(f"{path}: {error}; {FILE} is an example of such a file") from error
 
 
 def decoded_measures(content: bytes) -> Measures:
-    """The measures in the content of a file; what msgspec raises where there are none."""
+    """Decode the content of a file of measures. Raises errors of msgspec."""
     return msgspec.toml.decode(content, type=Measures)
 
 
@@ -78,18 +92,57 @@ def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
-    """A sentence on columns that are neither measures nor part of a trial's record, if there are any."""
-    read = {c for m in measures.objective.values() for c in (m.column, m.without, *m.others)}
-    told = (field.name for kind in (Metrics, Displays) for field in fields(kind))
-    known = {*read, *SETTINGS, *CIRCUMSTANCES, *told}
+    """Return a sentence on columns that are neither measures nor part of a trial's record, or an empty list."""
+    read = {c for m in measures.objective.values() for c in m.columns}
+    recorded = (field.name for kind in (Metrics, Displays) for field in fields(kind))
+    known = {*read, *SETTINGS, *CIRCUMSTANCES, *recorded}
     answers = {LIKERT_PREFIX + name for name in measures.likert}
     unread = [shown(c) for c in columns if c not in known | answers and not _OF_A_TRIAL.fullmatch(c)]
-    more = f" and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""
-    return [f"Nothing here analyses the table's further columns: {', '.join(unread[:SHOWN])}{more}."] * bool(
-        unread
-    )
+    more = f" and {len(unread) - MAX_COLUMNS_SHOWN} more" if len(unread) > MAX_COLUMNS_SHOWN else ""
+    if not unread:
+        return []
+    return [f"These columns of the table are not analysed: {', '.join(unread[:MAX_COLUMNS_SHOWN])}{more}."]
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:
-    """The column of a measure among those with values; None where it has none."""
+    """Return the column of a measure among those with values, or None."""
     return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)
+
+
+def check_answer_columns(columns: Sequence[str], measures: Measures, path: Path) -> None:
+    """Raise a `RecordError` if a column of answers is not a survey item."""
+    known = measures.answers()
+    for name in columns:
+        if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
+            near = difflib.get_close_matches(name, known, 1, cutoff=0.0)[0]
+            raise RecordError(
+                f"{path} has answers {name!r}, which is not a survey item (the nearest is {near}); rename or drop "
+                f"the column, or add the item to [likert] in a copy of {FILE}, for --measures"
+            )
+
+
+def check_ranges(
+    rows: Mapping[int, Mapping[str, Any]],
+    numbers: Mapping[str, NDArray[np.float64]],
+    measures: Measures,
+    path: Path,
+) -> None:
+    """Raise a `RecordError` if a column has a value outside the range of its measure."""
+    for measure in measures.objective.values():
+        low, high = measure.range
+        for name in measure.columns:
+            values = numbers.get(name, np.empty(0))
+            for index in np.flatnonzero((values < low) | (values > high)).tolist():
+                k = list(rows)[index]
+                raise RecordError(
+                    f"{path}: row {k} (person seed {rows[k].get('person_seed')}) has the {name} {values[index]:g}, "
+                    f"not a number from {low:g} to {high:g}; correct it, or exclude the person by --exclude"
+                )
+
+
+def check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
+    """Raise a `RecordError` if a column of answers has an invalid value."""
+    given = values[~np.isnan(values)]
+    bad = given[(given != np.round(given)) | (given < ANSWERS[0]) | (given > ANSWERS[1])]
+    if len(bad):
+        raise RecordError(f"{path}: {name} has the answer {bad[0]:g}; answers are whole numbers from 1 to 5")

@@ -1,4 +1,4 @@
-"""Whom a study leaves out, how its results change without each rule, and what departs from its preregistration."""
+"""Exclusions of a study, the effect of each rule on the results, and departures from the preregistration."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from experiments.analysis.page import Block, Paragraph, Table, p_value, table
+from experiments.analysis.page import Block, Paragraph, TableBlock, p_value, table
 from experiments.analysis.statistics.effects import ALPHA
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Test, plain, test_results, tests_of
 from experiments.analysis.study.measures import LIKERT_PREFIX, Measures
@@ -15,13 +15,18 @@ from experiments.analysis.study.table import StudyTable, study_table
 from experiments.errors import RecordError
 from experiments.trials.exclusions import BY_NAME, UNFINISHED, Exclusions, LeftOut
 
-SHOWN = "the main tests, and all others that decide otherwise; stats.json holds every test."
+SHOWN_TESTS = "the main tests, and all others whose decisions change; stats.json holds every test."
+MAIN = (ONE_WAY, TWO_WAY, "ordinal", "mixed model")
+CHANGE_HEAD = (
+    *("measure", "test", "effect", "objects", "F or χ²", "without", "p", "without"),
+    *("partial η²", "without", "decision"),
+)
 Key = tuple[str, str, str, int | None]  # measure, test, effect, objects
 
 
 @dataclass(frozen=True)
 class Change:
-    """A test with all rules, and without one of them; None where it cannot be computed."""
+    """A test with all rules and without one of them. Either is None if it cannot be computed."""
 
     measure: str
     test: str
@@ -29,27 +34,33 @@ class Change:
     objects: int | None
     all_rules: Mapping[str, Any] | None
     without: Mapping[str, Any] | None
-    decision_changes: bool  # whether it is significant at .05 in one of the two alone
+    decision_changes: bool
 
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """What a rule does."""
+    """The effect of a rule.
+
+    Attributes:
+        alone: Number of people whom only this rule excludes.
+        changes: Changes of every test without the rule; empty if it excludes no one alone.
+        refused: Why there are no results without the rule, or None.
+    """
 
     rule: str
     reason: str
-    leaves_out: int  # people
-    alone: int  # people whom no other rule leaves out: they are back without it
-    changes: tuple[Change, ...]  # of every test; empty where the rule changes no one's inclusion
-    refused: str | None = None  # why there are no results without it
+    leaves_out: int
+    alone: int
+    changes: tuple[Change, ...]
+    refused: str | None = None
 
 
 def leave_one_out(
-    everybody: Sequence[Mapping[str, Any]], measures: Measures, path: Path, exclusions: Exclusions
+    people: Sequence[Mapping[str, Any]], measures: Measures, path: Path, exclusions: Exclusions
 ) -> list[LeaveOneOut]:
-    """For each rule, and for the people who are left out by name, the tests with and without it."""
+    """Compare the tests with and without each rule, and with and without the people excluded by id."""
     found = []
-    whole = study_table(everybody, measures, path, exclusions)
+    whole = study_table(people, measures, path, exclusions)
     tests = _tests(whole, measures)
     for rule, reason, rest in _without_each(exclusions):
         theirs = [person for person in whole.left_out if rule in person.rules]
@@ -57,11 +68,11 @@ def leave_one_out(
         changes: tuple[Change, ...] = ()
         refused = None
         try:
-            others = _tests(study_table(everybody, measures, path, rest), measures) if alone else {}
+            others = _tests(study_table(people, measures, path, rest), measures) if alone else {}
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
-        except RecordError as error:  # the rule leaves out an impossible value, which is refused without it
+        except RecordError as error:  # without the rule, the table has an invalid value
             refused = str(error)
         found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
     return found
@@ -93,11 +104,11 @@ def _change(key: Key, one: Test | None, other: Test | None) -> Change:
 
 @dataclass(frozen=True)
 class Selection:
-    """What was decided about the people of a study."""
+    """Exclusions of a study, and departures from its preregistration, given as SHA-256."""
 
     rules: Sequence[LeaveOneOut]
-    preregistration: str | None = None  # SHA-256 of the file
-    departures: Sequence[str] = ()  # from it
+    preregistration: str | None = None
+    departures: Sequence[str] = ()
 
     def as_json(self) -> dict[str, Any]:
         frozen = {"sha256": self.preregistration, "departures": list(self.departures)}
@@ -107,18 +118,19 @@ class Selection:
         }
 
     def sections(self, people: StudyTable) -> tuple[tuple[str, Iterable[Block]], ...]:
-        told = (("Preregistration", _preregistered(self)),) if self.preregistration is not None else ()
-        return (*told, ("People who are left out", _left_out(people, self.rules)))
+        preregistered = (
+            (("Preregistration", _preregistered(self)),) if self.preregistration is not None else ()
+        )
+        return (*preregistered, ("People who are left out", _left_out(people, self.rules)))
 
 
 def _preregistered(selection: Selection) -> Iterator[Block]:
     yield Paragraph(f"SHA-256 of the preregistration: {selection.preregistration}.")
-    yield Paragraph("It departs from it:" if selection.departures else "Nothing departs from it.")
+    yield Paragraph("Departures:" if selection.departures else "There are no departures.")
     yield from map(Paragraph, selection.departures)
 
 
-def left_out_table(people: Iterable[LeftOut]) -> Table:
-    """Who is left out, by which rules and for what reasons."""
+def left_out_table(people: Iterable[LeftOut]) -> TableBlock:
     return table(
         ("left out", "condition", "objects", "by", "reason"),
         [
@@ -154,30 +166,15 @@ def _left_out(people: StudyTable, found: Sequence[LeaveOneOut]) -> Iterator[Bloc
     )
     for one in found:
         if one.changes or one.refused:
-            yield Paragraph(f"Without {one.rule}: {one.refused or SHOWN}")
+            yield Paragraph(f"Without {one.rule}: {one.refused or SHOWN_TESTS}")
         yield table(
-            (
-                "measure",
-                "test",
-                "effect",
-                "objects",
-                "F or χ²",
-                "without",
-                "p",
-                "without",
-                "partial η²",
-                "without",
-                "decision",
-            ),
+            CHANGE_HEAD,
             [
                 _change_row(c)
                 for c in one.changes
                 if c.decision_changes or (c.measure in main and c.test in MAIN)
             ],
         )
-
-
-MAIN = (ONE_WAY, TWO_WAY, "ordinal", "mixed model")
 
 
 def _change_row(change: Change) -> tuple[object, ...]:

@@ -1,52 +1,52 @@
-"""`mjsim study analyze`: figures, tests and models of a study between subjects, in a report of one file."""
+"""`mjsim study analyze`: analyse a between-subjects study and write a report."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
-from experiments.cli.requirements import require_extra
 
 DESCRIPTION = """\
-Analyse a study, a batch or the folder of `mjsim play` (or of several): a row of trials.parquet, or a visit, per person,
-each in one cell of assistance x number of objects. Writes
+Analyse a study, a batch, or one or several folders of `mjsim play`. Each person, in one cell of assistance x number of
+objects, is a row of trials.parquet or a visit. Write to --out:
 
-  report.html             all of it in one file, with figures
-  stats.json              every number
+  report.html             the whole analysis in one file, with figures
+  stats.json              all numbers
   people.parquet, .csv    a row per person
   tests.csv               a row per test
 
-People who did not finish are left out, and so are those that --exclude selects by rules over columns or by id; the
-report lists them, the reasons, and how results change without each rule.
+People who did not finish are left out, and so are those whom --exclude selects by rules over columns or by id. The
+report lists them with the reasons, and shows how results change without each rule.
 
-Which column stands for which measure, and what the items of the survey are called, is fixed in
-experiments/trials/designs/metrics.toml, or in a file of your own. docs/analysis.md explains how to read it. All output
-from simulated people is marked as such."""
+The file experiments/trials/designs/metrics.toml, or your own (--measures), maps columns to measures and names the
+survey items. docs/analysis.md explains how to read the report. All output from simulated participants is marked as
+such."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
-        commands, "analyze", run, summary="figures, tests and a report of a study", description=DESCRIPTION
+        commands, "analyze", run, summary="analyse a study and write a report", description=DESCRIPTION
     )
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study, a batch or mjsim play")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: DIR/analysis)")
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder of a study, a batch or `mjsim play`")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="output folder (default: DIR/analysis)")
     parser.add_argument(
         "--exclude",
         type=Path,
         metavar="RULES.toml",
-        help="who is left out: rules and people, or a study file",
+        help="rules of exclusion and excluded people, or a study file",
     )
     parser.add_argument(
         "--preregistration",
         type=Path,
         metavar="FILE",
-        help="ZIP of `mjsim study preregister`: its exclusions apply, and the report says what departs from it",
+        help="ZIP file of `mjsim study preregister`; its exclusions apply, and the report lists departures",
     )
     parser.add_argument(
         "--measures",
         type=Path,
         metavar="FILE.toml",
-        help="measures and items of the survey (default: those preregistered, else those of the paper)",
+        help="measures and survey items (default: the preregistered ones, else those of the paper)",
     )
     add_force(parser, "replace an earlier analysis")
 
@@ -73,12 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
     measures = read_measures() if frozen is None else frozen.measures
     if arguments.measures is not None:
         measures = read_measures(arguments.measures)
-    path, everybody = people_path(arguments.folder), read_people(arguments.folder)
-    analysis = analyse(study_table(everybody, measures, path, exclusions), measures)
-    without = leave_one_out(everybody, measures, path, exclusions)
+    path, people = people_path(arguments.folder), read_people(arguments.folder)
+    analysis = analyse(study_table(people, measures, path, exclusions), measures)
+    without = leave_one_out(people, measures, path, exclusions)
     selection = Selection(without)
     if frozen is not None:
-        departing = departures(frozen, exclusions, everybody, arguments.folder, measures)
+        departing = departures(frozen, exclusions, people, arguments.folder, measures)
         selection = Selection(without, frozen.sha256, departing)
     note_derived(arguments.folder, "analysis", out)
     write_analysis(out, analysis, report(analysis, arguments.folder, selection), selection.as_json())

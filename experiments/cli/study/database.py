@@ -1,12 +1,12 @@
-"""The study file and the database of a study with people, as commands name them."""
+"""The study file and the database of a study, as arguments of commands."""
 
 import argparse
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from experiments.cli.requirements import require_extra
+from experiments.cli.doctor import require_extra
 from experiments.errors import ConfigError, RecordError
 from experiments.session.signals import run_until_signal
 
@@ -19,17 +19,27 @@ DATABASE = "study.db"
 URL = "MJSIM_STUDY_DATABASE"  # environment variable
 
 
+def add_study_file(parser: argparse.ArgumentParser, **settings: Any) -> None:
+    parser.add_argument(
+        "study", metavar="STUDY.toml", help="study file, or `paper` for the published study", **settings
+    )
+
+
 def add_served_study(parser: argparse.ArgumentParser) -> None:
-    """Add the study file and the folder of a study that has been served."""
-    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
+    """Add the arguments STUDY.toml and DIR."""
+    add_study_file(parser)
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
 
 
 def people_study(arguments: argparse.Namespace) -> "Study":
-    """Read the study file of a command; a ConfigError if the extra `people` is missing or the file is unusable."""
+    """Read the study file of a command.
+
+    Raises:
+        ConfigError: The extra `people` is missing, or the file is not usable.
+    """
     require_extra("people")
     from experiments.study.file import read_people_study
-    from experiments.trials.simulate import study_path
+    from experiments.trials.designs import study_path
 
     return read_people_study(study_path(arguments.study))
 
@@ -40,7 +50,7 @@ def with_store(
     work: "Callable[[Store], Awaitable[T]]",
     url: str | None = None,
 ) -> T:
-    """Open the database of a study, do `work` with it, and close it, also after a signal. Return the result."""
+    """Run `work` with the database of a study, which is closed afterwards, even after a signal. Return the result."""
     from experiments.visit.store import Store
 
     async def opened() -> T:
@@ -54,18 +64,16 @@ def with_store(
 
 
 def add_database(parser: argparse.ArgumentParser) -> None:
-    """Add `--database`."""
     parser.add_argument(
         "--database",
         metavar="URL",
         default=os.environ.get(URL),
-        help="database of people and answers, such as postgresql://USER:PASSWORD@HOST/NAME or mysql://... (default: "
-        f"what {URL} says, which no list of processes shows, else {DATABASE} in the study's folder)",
+        help="database of the study, such as postgresql://USER:PASSWORD@HOST/NAME or mysql://... (default: the value "
+        f"of {URL}, which lists of processes do not show, else {DATABASE} in the study's folder)",
     )
 
 
 def database_url(arguments: argparse.Namespace) -> str:
-    """The URL of the database of a study that has been served."""
     if arguments.database:
         return str(arguments.database)
     path: Path = arguments.folder / DATABASE

@@ -1,4 +1,4 @@
-"""`mjsim study pay`: who gets what, and what was paid."""
+"""`mjsim study pay`: decide and make payments."""
 
 import argparse
 from datetime import timedelta
@@ -15,45 +15,54 @@ if TYPE_CHECKING:
     from experiments.visit.store import Store
 
 DESCRIPTION = """\
-Print who gets what by the rules of [study.pay], why, and whether it was paid. What is printed is noted in the ledger,
-where it stays: a rule that is changed later changes nothing that was decided. --dry-run notes nothing.
+Print the payments that follow from the rules of [study.pay], with the reason and whether each was made. Printed
+payments are recorded in the ledger, so that later changes of the rules do not affect them. --dry-run records nothing.
 
---send then lets the platform pay all that is owed. It may be repeated, and killed, at any time: nothing is paid twice.
-Its secret comes from the environment (MJSIM_PROLIFIC_TOKEN, MJSIM_CONNECT_KEY or MJSIM_EXTERNAL_QUESTION_TOKEN).
-Or pay by hand, then note each payment: --paid KEY --reference TEXT. A payment is noted once; a second time is refused.
-Both want a rehearsal of the study file that passed (`mjsim study rehearse`): --rehearsal OUT names it once.
---reject PERSON --reason TEXT, before payments are decided, lets the platform reject what somebody did."""
+With --send, the platform also makes all payments that are owed. The command may be repeated, or killed, at any time:
+nothing is paid twice. The platform's secret is read from the environment (MJSIM_PROLIFIC_TOKEN, MJSIM_CONNECT_KEY or
+MJSIM_EXTERNAL_QUESTION_TOKEN).
+
+If you pay manually, record each payment with --paid KEY --reference TEXT. Recording a payment twice is refused. Both
+--send and --paid require a rehearsal of the study file that passed (`mjsim study rehearse`): name it once with
+--rehearsal OUT.
+
+--reject PERSON --reason TEXT, before the payment is decided, makes the platform reject a submission."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(
-        commands, "pay", run, summary="who gets what, and what was paid", description=DESCRIPTION
-    )
+    parser = add_command(commands, "pay", run, summary="decide and make payments", description=DESCRIPTION)
     add_served_study(parser)
-    parser.add_argument("--dry-run", action="store_true", help="note nothing")
-    parser.add_argument("--send", action="store_true", help="let the platform pay all that is owed")
-    parser.add_argument("--paid", metavar="KEY", help="note that a payment was made, such as p00012-reward")
+    parser.add_argument("--dry-run", action="store_true", help="print payments, but record nothing")
     parser.add_argument(
-        "--reference", metavar="TEXT", help="the receipt, or the platform's number, of --paid"
+        "--send", action="store_true", help="make all payments that are owed, by the platform"
     )
-    parser.add_argument("--reject", metavar="PERSON", help="reject a person who finished, such as p00012")
-    parser.add_argument("--reason", metavar="TEXT", help="what the person is told about --reject")
+    parser.add_argument("--paid", metavar="KEY", help="record a payment that was made, such as p00012-reward")
+    parser.add_argument("--reference", metavar="TEXT", help="receipt or transaction number for --paid")
     parser.add_argument(
-        "--rehearsal", type=Path, metavar="OUT", help="folder of a rehearsal that passed; needed once, to pay"
+        "--reject", metavar="PERSON", help="reject the submission of a participant, such as p00012"
     )
-    parser.add_argument("--without-rehearsal", action="store_true", help="pay without one; it is noted")
+    parser.add_argument("--reason", metavar="TEXT", help="reason that the participant sees for --reject")
+    parser.add_argument(
+        "--rehearsal",
+        type=Path,
+        metavar="OUT",
+        help="folder of a rehearsal that passed; needed once before paying",
+    )
+    parser.add_argument(
+        "--without-rehearsal", action="store_true", help="pay without a rehearsal; this is recorded"
+    )
     add_database(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     if bool(arguments.paid) != bool(arguments.reference):
-        raise ConfigError("--paid and --reference belong together: which payment was made, and its receipt")
+        raise ConfigError("--paid and --reference belong together: name the payment and its receipt")
     if bool(arguments.reject) != bool(arguments.reason):
-        raise ConfigError("--reject and --reason belong together: who is rejected, and why")
+        raise ConfigError("--reject and --reason belong together: name the participant and the reason")
     wanted = [name for name in ("dry_run", "send", "paid", "reject") if getattr(arguments, name)]
     if len(wanted) > 1:
         first, second = (name.replace("_", "-") for name in wanted[:2])
-        raise ConfigError(f"--{first} and --{second} cannot be used at once; leave out one of them")
+        raise ConfigError(f"--{first} and --{second} cannot be combined; leave one of them out")
     study = people_study(arguments)
     return with_store(study, arguments, lambda store: _run(study, store, arguments))
 
@@ -107,7 +116,6 @@ async def _print(store: "Store", study: "Study", *, dry: bool) -> None:
 
 
 async def _send(store: "Store", study: "Study", client: "Payer") -> int:
-    """Let the platform pay; 1 if something is still owed then."""
     from experiments.study.payments.payouts import Sender
 
     async for sent in Sender(study.settings.name, store, client).send():
@@ -123,16 +131,16 @@ async def _reject(store: "Store", study: "Study", client: "Payer", arguments: ar
 
     if len(arguments.reason) < client.shortest_reason:
         raise ConfigError(
-            f"--reason has {len(arguments.reason)} characters; the platform wants at least {client.shortest_reason}"
+            f"--reason has {len(arguments.reason)} characters; the platform requires at least {client.shortest_reason}"
         )
     person = await store.person(person_number(arguments.reject))
     await reject(store, person, study.settings.pay.currency, arguments.reason)
-    print(f"{arguments.reject} is to be rejected; --send tells the platform")
+    print(f"{arguments.reject} will be rejected by --send")
 
 
 async def _note(store: "Store", key: str, reference: str) -> None:
     attempt = await store.ledger.begin_sending(key)
     if attempt is None:
-        raise ConfigError(f"{key} is paid already, or another payment of it is under way")
+        raise ConfigError(f"{key} is already paid, or a payment of it is in progress")
     await store.ledger.confirm(key, attempt, reference)
     print(f"{key} is paid ({reference})")

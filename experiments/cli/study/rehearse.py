@@ -1,14 +1,14 @@
-"""`mjsim study rehearse`: a whole study with simulated people, before real ones come."""
+"""`mjsim study rehearse`: rehearse a whole study with simulated participants."""
 
 import argparse
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
 from experiments.cli.server import number
-from experiments.cli.study.database import DATABASE, people_study, sqlite_url
+from experiments.cli.study.database import DATABASE, add_study_file, people_study, sqlite_url
 from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
@@ -18,42 +18,56 @@ if TYPE_CHECKING:
     from experiments.study.rehearsal.report import RehearsalReport
     from experiments.study.rehearsal.run import RehearsalSettings
 
-SHOWN = 20  # faults that are printed
+MAX_FAULTS_SHOWN = 20
 DESCRIPTION = """\
-Send simulated people through the whole study: the real server (OUT/served), its pages by HTTP, its trials by WebSocket.
-They arrive at random, answer at random, leave, come back, reload, lose the connection, and send things twice. Waiting
-takes 1/FACTOR of its time, and trials run as fast as they are played, but for every twentieth person, who plays in real
-time. Everything they leave is marked as a rehearsal; `collect` and `serve` keep it apart from people.
+Rehearse a whole study with simulated participants. They use the real server (OUT/served), with pages by HTTP and trials
+by WebSocket. They arrive and answer at random, leave, return, reload, lose the connection, and submit forms twice.
+Waiting takes 1/FACTOR of the real time, and trials run faster than real time, except for every twentieth participant.
+All data are marked as a rehearsal, and `collect` and `serve` keep them apart from real participants.
 
-Then writes the tables (OUT/table), the export (OUT/export), the analysis (OUT/analysis) and OUT/rehearsal.json: what
-went wrong. `mjsim study pay` asks for it before anybody is paid. An interrupted rehearsal is continued by the same
-command."""
+Then write the tables (OUT/table), the export (OUT/export), the analysis (OUT/analysis) and a list of faults,
+OUT/rehearsal.json. `mjsim study pay` requires a rehearsal without faults. Repeat the command to continue after an
+interruption."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
-        commands, "rehearse", run, summary="a whole study with simulated people", description=DESCRIPTION
+        commands,
+        "rehearse",
+        run,
+        summary="rehearse a study with simulated participants",
+        description=DESCRIPTION,
     )
-    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
-    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder of the rehearsal")
-    parser.add_argument("--people", type=number(1, 100_000), metavar="N", help="(default: as many as wanted)")
-    parser.add_argument("--seed", type=number(0, 2**53), default=0, help="of people (default: %(default)s)")
+    add_study_file(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="OUT", help="folder for the rehearsal")
     parser.add_argument(
-        "--per-minute", type=_positive, default=2.0, metavar="N", help="arrivals (default: %(default)s)"
+        "--people",
+        type=number(1, 100_000),
+        metavar="N",
+        help="participants (default: all of the study)",
+    )
+    parser.add_argument("--seed", type=number(0, 2**53), default=0, help="seed of the participants")
+    parser.add_argument(
+        "--per-minute",
+        type=_positive,
+        default=2.0,
+        metavar="N",
+        help="arrivals per minute",
     )
     parser.add_argument(
-        "--dropouts", type=_share, default=0.2, metavar="SHARE", help="who leave (default: %(default)s)"
+        "--dropouts",
+        type=_share,
+        default=0.2,
+        metavar="SHARE",
+        help="share of participants who leave",
     )
+    parser.add_argument("--factor", type=_positive, default=20.0, help="speed-up of waiting")
     parser.add_argument(
-        "--factor", type=_positive, default=20.0, help="by which waiting is shorter (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
+        "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: one is made)"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Rehearse; 1 if something went wrong."""
     study = people_study(arguments)
     require_extra("study")
     from experiments.study.rehearsal.report import REPORT
@@ -64,10 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
         study.sha256, people, arguments.seed, arguments.per_minute, arguments.dropouts, arguments.factor
     )
     found = run_until_signal(_run(study, settings, arguments))
-    for fault in found.faults[:SHOWN]:
+    for fault in found.faults[:MAX_FAULTS_SHOWN]:
         print(fault)
-    if len(found.faults) > SHOWN:
-        print(f"and {len(found.faults) - SHOWN} more")
+    if len(found.faults) > MAX_FAULTS_SHOWN:
+        print(f"and {len(found.faults) - MAX_FAULTS_SHOWN} more")
     for what, count in sorted(found.outcomes.items()):
         print(f"{count:6d} {what}")
     print(f"finished by cell: {', '.join(str(count) for count in found.cells.values())}")
@@ -80,16 +94,13 @@ def run(arguments: argparse.Namespace) -> int:
 async def _run(
     study: "Study", settings: "RehearsalSettings", arguments: argparse.Namespace
 ) -> "RehearsalReport":
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-
-    from experiments.cli.terminal import error_console, progress_bars
+    from experiments.cli.terminal import counting_bars
     from experiments.study.rehearsal.report import report
     from experiments.study.rehearsal.run import SERVED, rehearse
     from experiments.visit.store import Store
 
-    columns = TextColumn("people"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     outcomes: Counter[str] = Counter()
-    with progress_bars(error_console(), *columns, TextColumn("{task.fields[outcomes]}")) as bars:
+    with counting_bars("people", "{task.fields[outcomes]}") as bars:
         bar = bars.add_task("people", total=settings.people, outcomes="")
 
         def show(rehearsed: "Rehearsed") -> None:
@@ -107,7 +118,7 @@ async def _run(
 
 
 def _analyse(study: "Study", out: Path) -> None:
-    """Analyse as real people are analysed; too few people for that are no fault of the study."""
+    """Analyse the rehearsal like a study. Too few participants for an analysis are not a fault of the study."""
     from experiments.cli.study import analyze
     from experiments.errors import RecordError
     from experiments.study.rehearsal.report import TABLE
@@ -123,12 +134,12 @@ def _analyse(study: "Study", out: Path) -> None:
 def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
     return value
 
 
 def _share(text: str) -> float:
     value = float(text)
     if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is not from 0 to 1")
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
     return value

@@ -1,4 +1,4 @@
-"""`mjsim study researcher`: who may see the researcher's page."""
+"""`mjsim study researcher`: manage the accounts of researchers."""
 
 import argparse
 import getpass
@@ -21,36 +21,39 @@ if TYPE_CHECKING:
     from experiments.visit.store import Store
 
 ROLES = ("owner", "assistant", "viewer")
-SHORTEST = 12  # characters of a password
+MIN_PASSWORD = 12  # characters
 DESCRIPTION = f"""\
-Who may see the researcher's page of `mjsim study serve --researcher-port`. `add` lets somebody in, `change` gives
-another role or password and ends all logins, `disable` and `enable` shut somebody out and in again, `list` shows all.
+Manage the accounts for the researcher's page (`mjsim study serve --researcher-port`). `add` creates an account,
+`change` changes its role or password and ends its logins, `disable` and `enable` switch it off and on, and `list` lists
+all accounts.
 
-A viewer sees everything and watches sessions, an assistant also pauses the study and reads the audit log, an owner also
-stops it and changes quotas. The password is asked for, or read from standard input, or made with --generate; it has at
-least {SHORTEST} characters."""
+A viewer sees everything and watches sessions. An assistant can also pause the study and read the audit log. An owner
+can also stop the study and change quotas. The password, of at least {MIN_PASSWORD} characters, is asked for, read from
+standard input, or made with --generate."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
-        commands, "researcher", run, summary="who may see the researcher's page", description=DESCRIPTION
+        commands, "researcher", run, summary="manage the accounts of researchers", description=DESCRIPTION
     )
-    parser.add_argument("what", choices=("add", "change", "disable", "enable", "list"), help="what to do")
+    parser.add_argument("what", choices=("add", "change", "disable", "enable", "list"), help="action")
     add_served_study(parser)
-    parser.add_argument("name", nargs="?", metavar="NAME", help="of the researcher: a-z, 0-9 and . _ @ -")
-    parser.add_argument("--role", choices=ROLES, help="of a new researcher, or another one")
-    parser.add_argument("--generate", action="store_true", help="make a password, and print it")
-    parser.add_argument("--keep-password", action="store_true", help="change the role alone")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="name of the account: a-z, 0-9 and . _ @ -")
+    parser.add_argument("--role", choices=ROLES, help="role of a new account, or a new role")
+    parser.add_argument("--generate", action="store_true", help="generate a password and print it")
+    parser.add_argument("--keep-password", action="store_true", help="change only the role")
     add_database(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     if arguments.what != "list" and not arguments.name:
-        raise ConfigError(f"`{arguments.what}` needs the NAME of a researcher")
+        raise ConfigError(f"`{arguments.what}` needs the NAME of an account")
     if arguments.what == "add" and not arguments.role:
         raise ConfigError(f"`add` needs --role: {', '.join(ROLES)}")
     study = people_study(arguments)
-    arguments.folder.mkdir(parents=True, exist_ok=True)  # the first owner may come before the study is served
+    arguments.folder.mkdir(
+        parents=True, exist_ok=True
+    )  # the first account may be created before the study is served
     url = arguments.database or sqlite_url(arguments.folder / DATABASE)
     with_store(study, arguments, lambda store: _do(store, arguments), url)
     return 0
@@ -75,7 +78,7 @@ async def _do(store: "Store", arguments: argparse.Namespace) -> None:
 
 
 def _password(arguments: argparse.Namespace) -> str:
-    """Never from the command line, where other users of the machine could read it."""
+    """Ask for a password, which must not be an option: other users could read it from the command line."""
     if arguments.generate:
         password = secrets.token_urlsafe(18)
         print(password)
@@ -83,9 +86,9 @@ def _password(arguments: argparse.Namespace) -> str:
     if sys.stdin.isatty():
         password = getpass.getpass(f"Password of {arguments.name}: ")
         if getpass.getpass("Again: ") != password:
-            raise ConfigError("the two passwords differ; nothing was changed")
+            raise ConfigError("the passwords differ; nothing was changed")
     else:
         password = sys.stdin.readline().rstrip("\n")
-    if len(password) < SHORTEST:
-        raise ConfigError(f"a password has at least {SHORTEST} characters; --generate makes one")
+    if len(password) < MIN_PASSWORD:
+        raise ConfigError(f"a password needs at least {MIN_PASSWORD} characters; --generate makes one")
     return password

@@ -1,4 +1,4 @@
-"""`mjsim study serve`: a study with people, from the first page to the last."""
+"""`mjsim study serve` and `mjsim study hosts`: serve a study from one or several hosts."""
 
 import argparse
 import asyncio
@@ -20,52 +20,90 @@ from experiments.cli.server import (
     prepare_process,
     serve,
 )
-from experiments.cli.study.database import DATABASE, add_database, people_study, sqlite_url
+from experiments.cli.study.database import (
+    DATABASE,
+    add_database,
+    add_served_study,
+    add_study_file,
+    people_study,
+    sqlite_url,
+    with_store,
+)
 from experiments.errors import ConfigError
 from experiments.record.phases import FLYTHROUGH
 
-if TYPE_CHECKING:  # imported when the command runs, so that other commands start fast
+if TYPE_CHECKING:
     from experiments.study.file import Study
+    from experiments.visit.store import Store
     from experiments.web.server.pool import WorkerPool
 
 SECRET_FILE, FILM = "secret", "flythrough.mp4"
 SECRET = "MJSIM_STUDY_SECRET"
 DESCRIPTION = f"""\
-Serve a study with people: consent, a check of the computer, the story, a film of the house, questions about the task,
-training, task, survey, and the way back to where people came from. STUDY.toml is a design with a table [study]
-(docs/study.md); `paper` is the published study. Prints the URL on a separate line and opens it.
+Serve a study with its phases: consent, a check of the computer, the story, a film of the house, questions about the
+task, training, task, survey, and the return to the recruitment platform. STUDY.toml is a design with a table [study]
+(docs/study.md). Print the URL on a separate line and open it.
 
-Everything is kept in --out: the database, run directories and journals of trials, the film, and the secret from
-which people who come from a platform are recognised ({SECRET} sets another one). Ctrl-C ends the server; the same
-command continues the study, and everybody in it continues where they stopped."""
+All data are stored in --out: the database, run directories and journals of trials, the film, and the secret by which
+participants of a platform are recognised ({SECRET} sets another secret). Ctrl-C stops the server. Repeat the command to
+continue the study; participants continue where they stopped."""
+
+
+HOSTS = """\
+List the hosts that serve a study (`mjsim study serve --host-name`), stop new visits on one of them, or hand over the
+visits of a host that is gone. Before a handover, copy the folders DIR/visits/* of that host to the same place on
+another host. Each visit then continues on the host that has its journal."""
 
 
 def add_parser(commands: Any) -> None:
-    parser = add_command(commands, "serve", run, summary="serve a study with people", description=DESCRIPTION)
-    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the study")
+    parser = add_command(commands, "serve", run, summary="serve a study", description=DESCRIPTION)
+    add_study_file(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the study")
     add_database(parser)
     parser.add_argument(
-        "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: made once)"
+        "--film", type=Path, metavar="FILE.mp4", help="film of the house (default: one is made)"
     )
-    parser.add_argument("--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS)  # of `rehearse`
+    parser.add_argument(
+        "--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS
+    )  # used by `rehearse`
     server = parser.add_argument_group("server")
     add_server_options(server)
     server.add_argument(
         "--workers",
         type=number(1, 10_000),
         metavar="N",
-        help="trials at a time, each in a process; others wait (default: as many as the machine holds)",
+        help="number of trials at a time, each in a process; others wait (default: as many as the machine can run)",
     )
     server.add_argument(
-        "--host-name", metavar="NAME", help="of this host, where several share a database (docs/deploy.md)"
+        "--host-name", metavar="NAME", help="name of this host, if several share a database (docs/deploy.md)"
     )
     group = parser.add_argument_group("researcher's page, health and metrics")
-    group.add_argument("--researcher-port", type=number(0, 65535), metavar="PORT", help="serve them here")
+    group.add_argument(
+        "--researcher-port",
+        type=number(0, 65535),
+        metavar="PORT",
+        help="port of these pages (default: none)",
+    )
     group.add_argument(
         "--researcher-host", default="127.0.0.1", metavar="ADDRESS", help="address to listen at"
     )
-    group.add_argument("--researcher-url", metavar="URL", help="URL under which a proxy makes them public")
+    group.add_argument("--researcher-url", metavar="URL", help="public URL of these pages behind a proxy")
+    _add_hosts(commands)
+
+
+def _add_hosts(commands: Any) -> None:
+    parser = add_command(
+        commands, "hosts", run_hosts, summary="manage the hosts that serve a study", description=HOSTS
+    )
+    add_served_study(parser)
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--drain", metavar="NAME", help="stop new visits on a host")
+    group.add_argument("--open", metavar="NAME", help="allow new visits on a drained host")
+    group.add_argument("--hand-over", metavar="NAME", help="release the visits of a host that is gone")
+    parser.add_argument(
+        "--who", default="mjsim", metavar="NAME", help="name of the person who does this, for the audit log"
+    )
+    add_database(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -78,23 +116,23 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.study.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
-    phases_of(plan_of(study))  # custom phases or codes of the platform may be missing
+    phases_of(plan_of(study))  # fails early if a custom phase or a completion code is missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
-    prepare_process()  # the folder is nobody else's either
+    prepare_process()  # before the folder is created
     arguments.out.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as open_things:
-        listener = open_things.enter_context(listen(arguments.host, arguments.port))
+    with ExitStack() as stack:
+        listener = stack.enter_context(listen(arguments.host, arguments.port))
         researchers = None
         if arguments.researcher_port is not None:
             at = listen(arguments.researcher_host, arguments.researcher_port)
-            researchers = open_things.enter_context(at)
-        open_things.enter_context(locked(arguments.out))
+            researchers = stack.enter_context(at)
+        stack.enter_context(locked(arguments.out))
         (arguments.out / INDEX).touch()
         from experiments.web.server.pool import WorkerPool
 
         pool = WorkerPool(study.cells[0].trial(0).house)
-        pool.warm_up()  # in parallel to the film
+        pool.warm_up()  # in parallel with the film
         film = _film(study, arguments)
         asyncio.run(_serve(study, pool, film, (listener, researchers), arguments))
     return 0
@@ -137,16 +175,30 @@ async def _serve(
     )
     server = VisitServer(procedure, pool, options)
     app = Timed(server.app(arguments.host, arguments.public_url), metrics)
-    beside, (listener, researchers) = [], listeners
+    others, (listener, researchers) = [], listeners
     if researchers is not None:
         watched = ResearcherContext(study, store, server.sessions, metrics)
         page = ResearcherServer(watched, arguments.researcher_url, arguments.trusted_proxy)
-        beside.append((page.app(arguments.researcher_host), researchers))
-    await serve(app, listener, arguments, beside)
+        others.append((page.app(arguments.researcher_host), researchers))
+    await serve(app, listener, arguments, others)
+
+
+def run_hosts(arguments: argparse.Namespace) -> int:
+    with_store(people_study(arguments), arguments, lambda store: _change_hosts(store, arguments))
+    return 0
+
+
+async def _change_hosts(store: "Store", arguments: argparse.Namespace) -> None:
+    if name := arguments.drain or arguments.open:
+        await store.drain(name, arguments.drain is not None, arguments.who)
+    if name := arguments.hand_over:
+        visits = await store.hand_over(name, arguments.who)
+        print(f"{visits} visits of {name} continue where their journals are")
+    for host in await store.hosts():
+        print(f"{host.name}  last heartbeat {host.seen:%F %T} UTC{'  takes no new visits' * host.draining}")
 
 
 def _secret(folder: Path) -> bytes:
-    """The study's secret: of the environment, or a file that is made once."""
     if text := os.environ.get(SECRET):
         return text.encode()
     path = folder / SECRET_FILE
@@ -159,12 +211,11 @@ def _secret(folder: Path) -> bytes:
 
 
 def _film(study: "Study", arguments: argparse.Namespace) -> Path | None:
-    """The film that the study shows, made now if there is none."""
     if FLYTHROUGH not in study.settings.phases:
         return None
     if arguments.film is not None:
         if not arguments.film.is_file():
-            raise ConfigError(f"there is no film {arguments.film}; leave out --film, or name an MP4 file")
+            raise ConfigError(f"film {arguments.film} does not exist; leave out --film, or name an MP4 file")
         return Path(arguments.film)
     path: Path = arguments.out / FILM
     if not path.is_file():

@@ -16,7 +16,7 @@ from experiments.record.files import write_json
 from experiments.study.data.collect import FREE, Collected, collect, harmless, person_name
 from experiments.study.data.copies import INDEX, note_copy
 from experiments.study.file import Study
-from experiments.trials.dictionary import trial_columns
+from experiments.trials.table import trial_columns
 from experiments.visit.plan import SURVEY
 from experiments.visit.store import Answer, PersonRow, Store, TrialRow
 from experiments.visit.texts.items import Item

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from experiments.analysis.statistics.power import POWER, detectable_eta_squared
+from experiments.analysis.statistics.effects import POWER, detectable_eta_squared
 from experiments.house import House
 from experiments.record.phases import FLYTHROUGH, HUMAN, TASK, TRAINING
 from experiments.session.camera_path import camera_path

@@ -1,26 +1,43 @@
-"""Comparing a replay with the record, control step by control step."""
+"""Compares a replay with the record, and reports the result for each file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from experiments.errors import RecordError
+from experiments.record import records
 from experiments.record.columns import TRAJECTORY_COLUMNS
-from experiments.record.phases import BROKEN_OFF, COMPLETE, PHYSICS_ERROR
+from experiments.record.files import CHECKSUMS
+from experiments.record.phases import (
+    BROKEN_OFF,
+    COMPLETE,
+    FLYTHROUGH,
+    PHYSICS_ERROR,
+    TASK,
+    TRAINING,
+    is_simulated,
+    phases_of,
+)
 from experiments.record.reader import Record
-from experiments.record.records import EVENTS, RECORDING, TRAJECTORY, Event
+from experiments.record.records import EVENTS, PHASE_ENDED, RECORDING, TRAJECTORY, Event, read_events
 from experiments.record.verify import Mismatch
+from experiments.session.familiarise import watch_flythrough
 from experiments.session.assistant import WORLD_EVENTS
 from experiments.trials.replay.replayer import Replayer
 
-# Events that follow from the physics, and what the assistant makes of them. Searches of the planner are not repeated:
-# its plans and regrets are those of the log, and the hashes of the log protect them.
+# Events that follow from the physics and the assistant. Plans and regrets are taken from the log without a new search;
+# only the hashes of the log protect them.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
 REGRETS = frozenset({"regret_m", "suggested_regret_m"})
+SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # checked by simulating the run again
+DERIVED = (records.PLAN, records.METRICS)  # follow from those
 
 
 def simulated_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
-    """Where a finished replay differs from the states, poses, checkpoints and events of the record."""
+    """Yield differences between a finished replay and the states, poses, checkpoints and events of the record."""
     if replayer.mismatch is not None:
         yield replayer.mismatch
     replayed = replayer.replayed()
@@ -49,7 +66,7 @@ def _compare_trajectory(replayer: Replayer, replayed: Record) -> Iterator[Mismat
 
 
 def _first_difference(replayed: NDArray[Any], recorded: NDArray[Any]) -> int | None:
-    """Index of the first row that differs in any bit; None if all rows that both have are equal."""
+    """Return the index of the first row that differs in any bit, or None. Extra rows at the end are ignored."""
     rows = enumerate(zip(replayed, recorded, strict=False))
     return next((i for i, (a, b) in rows if a.tobytes() != b.tobytes()), None)
 
@@ -67,7 +84,7 @@ def _compare_checkpoints(replayer: Replayer, replayed: Record) -> Iterator[Misma
 def _compare_events(replayer: Replayer, replayed: Record) -> Iterator[Mismatch]:
     record = replayer.record
     broke_off = record.reason not in (*COMPLETE, PHYSICS_ERROR)
-    end = max(record.steps - broke_off, 1)  # the last step of a run that broke off is not simulated again
+    end = max(record.steps - broke_off, 1)  # the last step of an interrupted run is not simulated again
     logged = [
         (step, _comparable(event))
         for step, event in zip(record.steps_of_events, record.events, strict=True)
@@ -86,7 +103,6 @@ def _compare_events(replayer: Replayer, replayed: Record) -> Iterator[Mismatch]:
 
 
 def _is_broken_end(event: Event) -> bool:
-    """Whether this is the end of a run that broke off, to which a replay does not get."""
     return event["event"] == "end" and event["reason"] in BROKEN_OFF
 
 
@@ -103,3 +119,100 @@ def _difference(then: Event, now: Event) -> str:
 
 def _describe(event: Event) -> str:
     return f"{event['event']} {event.get('object') or ''}".strip() + f" at {event['t']} s"
+
+
+def phase_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
+    """Yield differences in the phases before the task of a simulated participant, and in the bins that it saw.
+
+    The training has its own run directory, which is replayed separately.
+    """
+    record = replayer.record
+    if not is_simulated(record.start.get("user")):
+        return
+    ended = {e["phase"]: e for e in record.events if e["event"] == PHASE_ENDED}
+    expected = tuple(name for name in phases_of(record.start.get("phases", TASK)) if name != TASK)
+    if tuple(ended) != expected:
+        logged = ", ".join(ended) or "none"
+        yield _mismatch(f"the trial has the phases {', '.join(expected) or 'none'}, logged were {logged}")
+        return
+    if FLYTHROUGH in ended:
+        yield from _compare(ended[FLYTHROUGH], watch_flythrough(replayer.house, record.person))
+    if TRAINING in ended:
+        try:
+            *_, end = read_events(replayer.directory / TRAINING / EVENTS)
+        except (RecordError, ValueError) as error:
+            yield _mismatch(f"the training has no record: {error}")
+            return
+        yield from _compare(ended[TRAINING], {"duration_s": end.get("t"), "reason": end.get("reason")})
+
+
+def _compare(logged: Event, found: dict[str, Any]) -> Iterator[Mismatch]:
+    for name, value in found.items():
+        if logged.get(name) != value:
+            yield _mismatch(f"{name} of the {logged['phase']} is {logged.get(name)!r}, it must be {value!r}")
+
+
+def _mismatch(message: str) -> Mismatch:
+    return Mismatch(0, f"{EVENTS}: {message}", EVENTS)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Result of a replay for one file, with a text that says what was checked or what is wrong."""
+
+    file: str
+    verified: bool
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.file:<15} {'verified' if self.verified else 'NOT VERIFIED'}: {self.text}"
+
+
+def verdicts(
+    directory: Path, record: Record, mismatches: Sequence[Mismatch], first: int, end: int
+) -> tuple[Verdict, ...]:
+    """Return a verdict for each file of the run that exists or should exist.
+
+    Args:
+        directory: The run directory.
+        record: Its record.
+        mismatches: All differences.
+        first: First control step that was simulated again.
+        end: Control step after the last one.
+    """
+    wrong: dict[str, str] = {}
+    for mismatch in mismatches:
+        wrong.setdefault(mismatch.file, mismatch.message)
+    present = [name for name in records.FILES if (directory / name).exists() or name in wrong]
+    others = [name for name in wrong if name not in present]
+    simulated = end > first and not any(name in wrong for name in SIMULATED)
+
+    def verdict(name: str) -> Verdict:
+        if name in wrong:
+            return Verdict(name, False, wrong[name])
+        if name in DERIVED and not simulated:
+            return Verdict(name, False, "the files that it follows from are not as recorded")
+        if name in SIMULATED and not simulated:
+            steps = f"only steps {first} to {end} were" if end > first else "nothing was"
+            return Verdict(name, False, f"no fault was found, but {steps} simulated again")
+        return Verdict(name, True, _checked(record, name, first))
+
+    return tuple(verdict(name) for name in (*present, *others))
+
+
+def _checked(record: Record, name: str, first: int) -> str:
+    start = f" from step {first} on" if first else ""
+    match name:
+        case records.EPISODE:
+            return "the episode of the log"
+        case records.EVENTS:
+            return f"{len(record.events)} events, simulated again{start}; plans and regrets by hash"
+        case records.TRAJECTORY:
+            return f"{record.steps} steps, simulated again{start}"
+        case records.RECORDING:
+            return f"{record.steps} states and {len(record.checkpoint_steps)} checkpoints{start}"
+        case records.PLAN:
+            return f"the {len(record.plans)} plans of the log"
+        case records.METRICS:
+            return "every number computed again; renderer, wall time and hash of the frames by SHA-256"
+    return f"unchanged, by its SHA-256 in {CHECKSUMS}"

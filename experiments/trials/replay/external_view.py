@@ -1,4 +1,4 @@
-"""Films a run from outside: from above, or from around the house, with the person and the guidance drawn."""
+"""Films a run from above or from around the house, with the person and the guidance."""
 
 import math
 from collections.abc import Callable
@@ -17,30 +17,32 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-# Simulated time, s -> where the camera is.
+# Simulated time, s -> camera pose
 CameraPath = Callable[[float], CameraPose]
 Bounds = tuple[float, float, float, float]
 
-_TOP_DOWN_FOV = math.radians(20.0)  # narrow, from far away, so that walls hide little of the floor
+_TOP_DOWN_FOV = math.radians(
+    20.0
+)  # narrow, so that the camera is far away and walls hide little of the floor
 _FREE_FOV = math.radians(50.0)
-_MARGIN = 1.12  # the tops of the walls are nearer to the camera than the floor
-_ORBIT_PERIOD = 90.0  # s
+_MARGIN = 1.12  # because the tops of walls are nearer to the camera than the floor
+_ORBIT_PERIOD_S = 90.0
 _ELEVATION = math.radians(52.0)
-_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # nothing in a house has this colour
+_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that no object in a house has
 _HEAD_COLOUR: Rgba = (0.93, 0.74, 0.22, 1.0)
 
 
 def camera_path(
     camera: str, bounds: Bounds, aspect: float, eye: Vec3 | None = None, target: Vec3 | None = None
 ) -> CameraPath:
-    """Where an external camera is over time.
+    """Return the pose of an external camera over time.
 
     Args:
-        camera: `top-down`, or `free`.
+        camera: `top-down` or `free`.
         bounds: Bounds of the floor: x_min, y_min, x_max, y_max, m.
         aspect: Width of the frames divided by their height.
-        eye: Position of a free camera, m; None for one that circles the house.
-        target: Point that a free camera looks at, m; None for the middle of the floor.
+        eye: Position of a free camera, m, or None to circle the house.
+        target: Target of a free camera, m, or None for the middle of the floor.
     """
     x_min, y_min, x_max, y_max = bounds
     middle = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
@@ -53,12 +55,12 @@ def camera_path(
     if eye is not None:
         fixed = CameraPose.looking_at(eye, aim, _FREE_FOV)
         return lambda _: fixed
-    # A sphere around the floor fits into the view.
+    # At this distance, a sphere around the floor fits into the view.
     half_angle = math.atan(math.tan(_FREE_FOV / 2) * min(1.0, aspect))
     distance = 0.5 * math.hypot(width, depth) / math.sin(half_angle)
 
     def circle(time: float) -> CameraPose:
-        angle = 2.0 * math.pi * time / _ORBIT_PERIOD - math.pi / 2
+        angle = 2.0 * math.pi * time / _ORBIT_PERIOD_S - math.pi / 2
         out = math.cos(_ELEVATION)
         offset = np.array([out * math.cos(angle), out * math.sin(angle), math.sin(_ELEVATION)])
         return CameraPose.looking_at(aim + distance * offset, aim, _FREE_FOV)
@@ -67,16 +69,16 @@ def camera_path(
 
 
 class ExternalViewer:
-    """A viewer of a session that films it from outside, without ceilings. Use as a context manager.
+    """A viewer that films a session from outside, without ceilings. Use it as a context manager.
 
     Args:
         scene: The scene to render.
         film: Frame size and render profile.
-        camera: Simulated time -> pose of the camera.
-        video: Takes the frames.
+        camera: Camera pose by simulated time.
+        video: Receives the frames.
 
     Raises:
-        RenderError: No off-screen GL context could be made, or the size or profile is unusable.
+        RenderError: No off-screen GL context could be made, or size or profile is invalid.
     """
 
     def __init__(self, scene: Scene, film: FilmConfig, camera: CameraPath, video: VideoWriter) -> None:
@@ -87,11 +89,11 @@ class ExternalViewer:
         self._video = video
 
     def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - part of the protocol
-        """None, as the HUD is not seen from outside."""
+        """Return None, because the HUD is not visible from outside."""
         return None
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Film one frame: house, person, and the world-locked markers of the HUD."""
+        """Film one frame with the house, the person, and the world-locked markers of the HUD."""
         markers = [*hud_state.markers, *figure(observation, self._person)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
@@ -108,7 +110,7 @@ class ExternalViewer:
 
 
 def figure(observation: Observation, person: PersonParameters) -> tuple[Marker, ...]:
-    """Markers for the person: body, head, and a nose that shows the heading."""
+    """Return markers for the person: a body, a head, and a nose that shows the heading."""
     x, y = (float(v) for v in observation.position)
     c, s = math.cos(observation.heading), math.sin(observation.heading)
     height, radius = person.eye_height, person.body_radius

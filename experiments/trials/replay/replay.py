@@ -15,34 +15,32 @@ from experiments.session.film_config import CAMERAS, FIRST_PERSON, FREE, FilmCon
 from experiments.session.first_person import Filming, FirstPersonRenderer
 from experiments.session.session import Viewer
 from experiments.session.video import VideoWriter
-from experiments.trials.replay.comparison import simulated_mismatches
+from experiments.trials.replay.comparison import Verdict, phase_mismatches, simulated_mismatches, verdicts
 from experiments.trials.replay.external_view import ExternalViewer, camera_path
-from experiments.trials.replay.phases import phase_mismatches
 from experiments.trials.replay.replayer import Replayer, mismatch_error
-from experiments.trials.replay.verdicts import Verdict, verdicts
 from mjsim.support.files import replacing
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
-MAX_WIDTH = 1280  # px of the picture in a film of what a page showed
+MAX_WIDTH = 1280  # widest view in a film that has the shape of a page, px
 
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class ReplayFilm:
-    """How to film a replay.
+    """Settings of the film of a replay.
 
     Attributes:
         path: Video file to write.
-        config: Frame size and render profile; None for what the person's page showed, or else the usual one, with
+        config: Frame size and render profile, or None for the shape of the person's page, else the default size, with
             `profile`.
         camera: `first-person` (with the HUD), `top-down`, or `free`.
-        eye: Position of a free camera, m; None for one that circles the house.
-        target: Point that a free camera looks at, m; None for the middle of the floor.
+        eye: Position of a free camera, m, or None to circle the house.
+        target: Target of a free camera, m, or None for the middle of the floor.
 
     Raises:
-        ConfigError: There is no such camera, or it cannot be moved.
+        ConfigError: The camera is unknown or cannot be moved.
     """
 
     path: Path
@@ -64,15 +62,13 @@ class ReplayReport:
     """Result of a replay without mismatches.
 
     Attributes:
-        first: Control step at which it started.
+        first: Control step at which the replay started.
         steps: Number of verified control steps.
         ended: Why the run ended.
         failure: Error of the physics that ended run and replay, or None.
-        person: Who took part.
-        differences: Versions and models that differ from those of the recording, without effect.
-        verdicts: What was checked of each file.
+        differences: Versions and models that differ from those of the recording, without effect on the result.
         frames_sha256: Hash of the filmed frames, or None.
-        as_filmed: Whether they equal the frames of the run's video bit for bit; None if one of the two has no film.
+        as_filmed: Whether these frames equal those of the run's video bit for bit; None if one of them has no film.
     """
 
     first: int
@@ -101,29 +97,28 @@ def replay(
     """Simulate a run again and compare every control step with the record.
 
     Args:
-        directory: Directory of a run, or of a failed run.
-        start: Simulated time, s; the replay starts at the last checkpoint at or before it.
-        film: How to film it, or None.
-        watch: Gives a viewer of the replay, instead of a film, or None.
+        directory: Run directory.
+        start: Simulated time, s. The replay starts at the last checkpoint at or before it.
+        film: Settings of the film, or None.
+        watch: Makes a viewer of the replay in place of a film, or None.
         assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are the
             recorded ones in any case.
         house: The house of the run, if it is loaded already.
-        catalogue: Where its catalogue lies now, if not where it was; its content must be the recorded one.
-        language: Language of the words in the film.
+        catalogue: Path of the house's catalogue, if it was moved. Its content must be the recorded one.
+        language: Language of the texts in the film.
         on_progress: Called with the numbers of replayed and of recorded control steps.
 
     Raises:
         RecordError: `directory` is not a run directory.
-        ReplayError: It cannot be replayed, or differs from the record; `step` and the message name the first
-            bad control step.
-        ConfigError, MjsimError, HudError: The house, the condition or the film is unusable.
+        ReplayError: The run cannot be replayed, or differs from the record.
+        ConfigError, MjsimError, HudError: The house, the condition or the film is not usable.
     """
     record = read_run(directory)
     if faults := damage(record):
         faults += checksum_mismatches(directory, record)
         raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
     duration = float(record.trajectory["time"][-1])
-    if start > round(duration, 6):  # the log is rounded like that
+    if start > round(duration, 6):  # as times in the log
         raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
     house = (house or _house_of(directory, record, catalogue)).in_language(language)
     shown = assistance or str(record.start["assistance"])
@@ -154,10 +149,7 @@ def replay(
 
 
 def _mismatches(replayer: Replayer) -> list[Mismatch]:
-    """Everything in which a finished replay or the files on disk differ from the record.
-
-    The earliest step comes first; that a file has another checksum comes last, as it is the least specific.
-    """
+    """Return all differences of a replay and of files, by step. The least specific, checksums, come last."""
     directory, record = replayer.directory, replayer.record
     simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
     found = sorted(simulated, key=lambda mismatch: mismatch.step)
@@ -167,30 +159,25 @@ def _mismatches(replayer: Replayer) -> list[Mismatch]:
 
 
 def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
-    """The house of a run, from where it was or from where it lies now."""
     name = catalogue or str(record.start["house"])
     try:
         house = House.load(name)
     except AssetError as error:
         raise ConfigError(
-            f"the house of {directory} cannot be loaded: {error}; if it lies elsewhere now, name its catalogue "
-            "with --house"
+            f"cannot load the house of {directory}: {error}; if it was moved, name its catalogue with --house"
         ) from error
     recorded = record.start["inputs"].get("house")
     if catalogue is not None and house.catalogue.content != recorded:
         raise ReplayError(
             f"{catalogue} is not the house of {directory}: its content has the hash {house.catalogue.content}, "
-            f"recorded was {recorded}; name the catalogue as it was",
+            f"not {recorded} as recorded; name the unchanged catalogue",
             0,
         )
     return house
 
 
 def as_seen(record: Record, profile: str) -> FilmConfig:
-    """A film like the page on which the browser drew last: its shape, its field of view, and the lists beside it.
-
-    Where no browser drew, the usual film.
-    """
+    """Return film settings like the page on which the browser drew last, or the defaults."""
     views = [
         event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
     ]
@@ -208,7 +195,6 @@ def as_seen(record: Record, profile: str) -> FilmConfig:
 
 
 def _open_film(replayer: Replayer, film: ReplayFilm, stack: ExitStack) -> tuple[Viewer, VideoWriter]:
-    """A viewer that films to a file, which appears if the replay succeeds."""
     path = stack.enter_context(replacing(film.path))
     config, scene, house = (
         film.config or as_seen(replayer.record, film.profile),

@@ -1,6 +1,6 @@
-"""Simulates the session of a recorded run again."""
+"""Simulates the session of a recorded run again, with the plans of its log."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Never
 
@@ -15,35 +15,36 @@ from experiments.record.writer import RecordWriter, provenance
 from experiments.session.assistant import Assistant
 from experiments.session.session import Session, Viewer
 from experiments.session.task_board import TaskBoard
-from experiments.trials.replay.log_source import LogSource
 from mjsim.house.scene.scene import compose
 from mjsim.values.errors import ActionError, PhysicsError, StateError
 from mjsim.values.observation import Steps
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
+from planner.errors import ProblemError
+from planner.plan import Plan, Status, Visit, VisitKind
 from planner.regret import RegretEvaluator
+from planner.route import PlanSource, Route, TaskState
 from planner.service import Planner
 
 
 class Replayer:
-    """One replay.
+    """A replay of one run.
 
     Args:
         directory: The run directory.
-        record: The undamaged record in it.
+        record: Its undamaged record.
         house: The house of the run.
-        start: Simulated time, s; the replay starts at the last checkpoint at or before it.
+        start: Simulated time, s. The replay starts at the last checkpoint at or before it.
         assistance: Assistance condition whose HUD is shown.
 
     Attributes:
-        scene: The composed episode.
         first: Control step at which the replay starts.
         mismatch: Why the replay stopped before the end of the record, or None.
         differences: Versions and models that differ from those of the recording.
         failure: Error of the physics in the replay, or None.
 
     Raises:
-        ReplayError: The record cannot be replayed by this version.
+        ReplayError: This version cannot replay the record.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class Replayer:
             self._world = World(self.scene, WorldOptions(**record.start["world"]))
         except (TypeError, ActionError) as error:
             raise ReplayError(
-                f"the options of the recorded world are not those of this version: {error}; the first bad step is 0",
+                f"this version has other options of the world: {error}; the first bad step is 0",
                 0,
             ) from error
         self._assistance = assistance
@@ -82,7 +83,7 @@ class Replayer:
             self.failure = str(error)
 
     def replayed(self) -> Record:
-        """The record of the replay from `first` on; its log also has the events before."""
+        """Return the record of the replay from step `first` on. Its log also has the earlier events."""
         return self._written.record()
 
     @property
@@ -91,7 +92,6 @@ class Replayer:
         return self.record.events_before(self.first) if self.first else 0
 
     def _restored_session(self, viewer: Viewer | None) -> Session:
-        """The session at the start of the run, or at the checkpoint."""
         record = self.record
         evaluator = RegretEvaluator(self.house.geodesics, capacity=self._world.options.capacity)
         assistant = Assistant(
@@ -113,7 +113,7 @@ class Replayer:
         return session
 
     def _repeat(self, session: Session, step: int) -> bool:
-        """Repeat a control step, or the end of the session; whether there is more to repeat."""
+        """Repeat a control step, or the end of the session. Return True if there is more to repeat."""
         record, is_last = self.record, step == self.record.steps - 1
         if (reason := session.end_reason) is not None:
             session.end(reason)
@@ -124,7 +124,9 @@ class Replayer:
             action = record.action(step)
         except RecordError as error:
             return self._stop(step, str(error))
-        if is_last and record.reason != PHYSICS_ERROR:  # it broke off in this step: only the state is known
+        if (
+            is_last and record.reason != PHYSICS_ERROR
+        ):  # the run was interrupted in this step, so only the state is known
             seen = self._written.pass_checkpoint(self._world, self._world.observation())
             self._written.append(seen, self._world.health_sample, self._world.state_hash(), Steps(action))
         else:
@@ -139,7 +141,7 @@ class Replayer:
 
 
 class _NoParticipant:
-    """Takes the place of the participant in a replay, which repeats recorded actions."""
+    """Placeholder for the participant of a replay, which repeats recorded actions."""
 
     needs: frozenset[str] = frozenset()
 
@@ -154,7 +156,7 @@ def mismatch_error(
     differences: tuple[str, ...] = (),
     verdicts: tuple[object, ...] = (),
 ) -> ReplayError:
-    """The error of a mismatch: one line with the first bad step, the fault and possible reasons."""
+    """Return a one-line error with the first bad step, the fault and possible reasons."""
     timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
     where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
     reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
@@ -172,3 +174,63 @@ def _differences(then: Event, now: Mapping[str, Any]) -> list[str]:
     if then.get("model") != now["model"]:
         found.append(f"the compiled house was {then.get('model')}, is {now['model']}")
     return found
+
+
+class LogSource(PlanSource):
+    """Plans of a log, each at its logged time, in place of new plans.
+
+    Args:
+        plans: The `plan` events of the log, in order.
+        clock: Returns the simulated time, s.
+    """
+
+    def __init__(self, plans: Sequence[Event], clock: Callable[[], float] = lambda: 0.0) -> None:
+        self.clock = clock
+        self._plans = list(plans)
+
+    def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
+        """The visits that are not done; None if a plan was logged now."""
+        return None if self._is_due else tuple(v for v in route.visits if _is_open(v, state))
+
+    def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:  # noqa: ARG002 - both are logged
+        """The plan that was logged now.
+
+        Raises:
+            ReplayError: The log has no plan at the start, or the event does not describe a plan.
+        """
+        if not self._is_due:
+            raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
+        return _route(self._plans.pop(0), state)
+
+    @property
+    def pending(self) -> bool:
+        """Whether a better plan for the same task was logged now."""
+        return self._is_due and bool(self._plans[0].get("improved", False))
+
+    def better(self, state: TaskState, route: Route) -> Route | None:
+        """The better plan that was logged now, or None; raises as `plan` does."""
+        return self.plan(state, route, shown=True) if self.pending else None
+
+    @property
+    def _is_due(self) -> bool:
+        return bool(self._plans) and self._plans[0]["t"] <= round(self.clock(), 6)
+
+
+def _is_open(visit: Visit, state: TaskState) -> bool:
+    if visit.kind is VisitKind.PICK:
+        return visit.object in state.loose
+    return visit.object in state.loose or visit.object in state.carried
+
+
+def _route(event: Event, state: TaskState) -> Route:
+    try:
+        cost = float(event["cost_m"])
+        plan = Plan((), cost, float(event["lower_bound_m"]), Status(event["status"]), seconds=0.0)
+        visits = []
+        for kind, name in event["visits"]:
+            if name not in (state.loose if kind == "pick" else state.deliveries):
+                raise ValueError(f"nothing to {kind} is called {name!r}")
+            visits.append(Visit(VisitKind(kind), name))
+        return Route(tuple(visits), plan)
+    except (KeyError, TypeError, ValueError, ProblemError) as error:
+        raise ReplayError(f"the plan logged at t = {event['t']} s is malformed: {error!r}") from error

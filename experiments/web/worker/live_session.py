@@ -12,16 +12,16 @@ import msgspec
 from experiments.errors import RecordError, ReplayError
 from experiments.house import House
 from experiments.participants.base import Percept
-from experiments.record.export import save_record
-from experiments.record.journal import JOURNAL, Entry, Header, Journal, read_entries, sync_folder
+from experiments.record.journal import JOURNAL, Header, Journal, JournalEntry, read_entries, sync_folder
 from experiments.record.phases import INTERRUPTED
 from experiments.record.reader import read_journal, read_run, same_record
 from experiments.record.records import TOPDOWN, EventLog
 from experiments.record.run_directory import JOURNALS, is_run, run_directory
 from experiments.record.verify import checksum_mismatches
+from experiments.record.writer import save_record
 from experiments.session.familiarise import Familiarisation
 from experiments.session.session import Viewer
-from experiments.trials.replay.log_source import LogSource
+from experiments.trials.replay.replayer import LogSource
 from experiments.trials.setup import (
     draw_person,
     prepare_session,
@@ -226,7 +226,9 @@ def _config_in(journal: Journal) -> TrialConfig | None:
 def is_over(journal: Journal) -> bool:
     """Return True if the session of an open journal is over."""
     last = journal.entries[-1] if journal.entries else None
-    return isinstance(last, Entry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
+    return (
+        isinstance(last, JournalEntry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
+    )
 
 
 def open_journal(folder: Path) -> Journal:

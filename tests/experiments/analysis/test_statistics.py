@@ -16,13 +16,17 @@ from study_people import SIZES
 
 from experiments.analysis.statistics import variance_components
 from experiments.analysis.statistics.anova import brown_forsythe, cells_of, one_way, two_way, welch
-from experiments.analysis.statistics.by_house import differences_by_house
-from experiments.analysis.statistics.effects import FTest, hedges_g
-from experiments.analysis.statistics.mixed import mixed_model
+from experiments.analysis.statistics.effects import (
+    FTest,
+    detectable_eta_squared,
+    hedges_g,
+    people_per_cell,
+    power_of,
+)
+from experiments.analysis.statistics.mixed import differences_by_house, mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
 from experiments.analysis.statistics.models import ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs, holm, tukey_differs
-from experiments.analysis.statistics.power import detectable_eta_squared, people_per_cell, power_of
 from experiments.errors import StatisticsError
 
 EXACT = {"rel": 1e-8, "abs": 1e-12}
@@ -70,7 +74,7 @@ def test_variances_are_compared_without_what_the_median_takes(sizes):
 
 
 def test_variances_of_pairs_alone_are_not_compared():
-    with pytest.raises(StatisticsError, match="two persons at most"):
+    with pytest.raises(StatisticsError, match="at most two people"):
         brown_forsythe(groups((2, 2, 2)))
 
 
@@ -298,7 +302,7 @@ def test_the_interval_of_the_share_of_houses_holds_the_true_one(share):
 
 @pytest.mark.parametrize(
     ("people", "message"),
-    [(8, "as many houses and cells as people"), (80, "each cell has houses of its own, one each")],
+    [(8, "houses and cells are as many as people"), (80, "each cell has its own house")],
 )
 def test_houses_that_are_people_or_cells_are_refused(people, message):
     values = np.random.default_rng(0).normal(size=people)
@@ -324,7 +328,7 @@ def test_the_interval_by_house_leaves_out_what_all_conditions_of_a_house_share(s
 def test_factors_that_the_design_cannot_tell_apart_are_refused():
     rng, people = np.random.default_rng(0), np.repeat(np.arange(20), 4)
     condition, levels = np.tile([*"ab"], 40), np.full(80, 6)
-    with pytest.raises(StatisticsError, match="cannot tell the variances of the random factors apart"):
+    with pytest.raises(StatisticsError, match="cannot distinguish the variances of the random factors"):
         mixed_model(rng.normal(size=80), condition, levels, {"person": people, "house": people})
 
 
@@ -332,7 +336,7 @@ def test_a_factor_that_only_says_the_cell_is_refused_next_to_another_factor():
     rng, person = np.random.default_rng(1), np.repeat(np.arange(20), 6)
     condition, levels = np.tile([*"aabbcc"], 20), np.tile([6, 12], 60)
     cells = np.char.add(condition, levels.astype(str))
-    with pytest.raises(StatisticsError, match="cannot tell the variances of the random factors apart"):
+    with pytest.raises(StatisticsError, match="cannot distinguish the variances of the random factors"):
         mixed_model(rng.normal(size=120), condition, levels, {"person": person, "house": cells})
 
 
@@ -362,7 +366,7 @@ def test_a_mixed_model_of_many_houses_is_their_paired_t_test():
 def test_factors_with_as_many_levels_as_trials_or_the_same_ones_are_refused_at_once(copied):
     rows = np.arange(40_000)
     factors = {"person": rows // 2, "house": -(rows // 2)} if copied else {"house": rows}
-    message = "cannot tell the variances" if copied else "as many houses and cells as people"
+    message = "cannot distinguish the variances" if copied else "houses and cells are as many as people"
     with pytest.raises(StatisticsError, match=message):
         mixed_model(np.random.default_rng(0).normal(size=len(rows)), rows % 2, np.full(len(rows), 6), factors)
 
@@ -409,7 +413,7 @@ def test_power_by_simulation_and_its_inverse():
     [
         ({"a": np.arange(5.0)}, "only one group"),
         ({"a": np.ones(5), "b": np.zeros(5)}, "do not vary"),
-        ({"a": np.ones(1), "b": np.zeros(1)}, "one person only"),
+        ({"a": np.ones(1), "b": np.zeros(1)}, "only one person"),
     ],
 )
 def test_groups_that_cannot_be_compared(data, message):
@@ -420,7 +424,7 @@ def test_groups_that_cannot_be_compared(data, message):
 
 def test_cells_that_cannot_be_compared():
     first, second = np.array(["a", "a", "b", "b"]), np.array([6, 12, 6, 12])
-    with pytest.raises(StatisticsError, match="one person only"):
+    with pytest.raises(StatisticsError, match="only one person"):
         two_way(np.arange(4.0), first, second)
     with pytest.raises(StatisticsError, match="no people in the cell b, 12"):
         two_way(np.arange(6.0), np.array([*"aaaabb"]), np.array([6, 6, 12, 12, 6, 6]))

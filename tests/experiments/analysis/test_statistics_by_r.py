@@ -19,11 +19,11 @@ from experiments.analysis.statistics.anova import (
     welch,
     welch_james,
 )
+from experiments.analysis.statistics.effects import detectable_eta_squared
 from experiments.analysis.statistics.mixed import mixed_model
 from experiments.analysis.statistics.mixtures import fit_mixtures
 from experiments.analysis.statistics.models import diagnose, ordinal_model
 from experiments.analysis.statistics.pairs import compare_pairs
-from experiments.analysis.statistics.power import detectable_eta_squared
 from studies.score_rules import _below, _trend
 
 BY_R = Path(__file__).parent / "by_r"

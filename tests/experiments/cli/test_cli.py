@@ -23,7 +23,7 @@ DEFAULTS = {  # some that the help of a command names
     "run": ["objects, 1 to --points (default: 6)", "(default: optimal)", "size, px (default: 640x480)"],
     "batch": ["(default: 0:10)", "(default: none,highlight,optimal)", "(default: apartment)"],
     "play": ["(default: story,flythrough,training,task)"],
-    "replay": ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: it circles"],
+    "replay": ["(default: 0.0)", "(default: first-person)", "a free camera, m (default: circles"],
 }
 
 
@@ -84,14 +84,17 @@ def test_the_overview_names_every_command():
         ([*PLAY, "--user", "follower"], "belongs to `mjsim run`"),
         ([*PLAY, "--assistance", "nonsense"], "no assistance condition"),
         ([*PLAY, "--objects", "0"], "objects is 0"),
-        ([*PLAY, "--film", "nothing.mp4"], "there is no film"),
+        ([*PLAY, "--film", "nothing.mp4"], "film nothing.mp4 does not exist"),
         ([*PLAY, "--public-url", "ftp://x"], "must be of the form"),
-        ([*PLAY, "--minimum", "flythrough=60"], "about the phase flythrough, which is not shown"),
-        ([*PLAY, "--phases", "task", "--questions", "q.toml"], "about the phase story, which is not shown"),
+        ([*PLAY, "--minimum", "flythrough=60"], "refers to the phase flythrough, which is not shown"),
+        (
+            [*PLAY, "--phases", "task", "--questions", "q.toml"],
+            "refers to the phase story, which is not shown",
+        ),
         ([*PLAY, "--questions", "nothing.toml"], "cannot read the questions nothing.toml"),
-        ([*PLAY, "--host", "no.such.host.invalid"], "name another --port (0 for any) or --host"),
+        ([*PLAY, "--host", "no.such.host.invalid"], "choose another --port (0 for any) or --host"),
         (["batch", DESIGN, "--user", "searcher", "--seeds", "1"], "leave out --seeds, --user"),
-        (["batch", "--seeds", "1,1"], "--seeds names a value twice"),
+        (["batch", "--seeds", "1,1"], "--seeds has a value twice"),
         (["batch", "--seeds", "0", "--workers", "0"], "at least one worker, got 0"),
         (["batch", "--assistance", ","], "at least one value for --assistance"),
     ],

@@ -43,7 +43,7 @@ def test_questions_are_asked_in_order_after_the_story(tmp_path):
 def test_questions_that_cannot_be_asked_are_refused(tmp_path, text):
     path = tmp_path / "questions.toml"
     path.write_text(text)
-    with pytest.raises(ConfigError, match="has no questions"):
+    with pytest.raises(ConfigError, match="has no valid questions"):
         plan("--questions", str(path))
 
 

@@ -265,7 +265,7 @@ def test_a_file_is_never_written_elsewhere(tmp_path):
     with closing(sqlite3.connect(archive)) as database, database:
         database.execute("UPDATE sqlar SET name = 'one/../../out' WHERE name = 'one/plan.json'")
     (tmp_path / "in").mkdir()
-    with pytest.raises(RecordError, match="not the name of a file"):
+    with pytest.raises(RecordError, match="not a valid file name"):
         unpack(archive, "one", tmp_path / "in")
     assert not (tmp_path / "out").exists()
 

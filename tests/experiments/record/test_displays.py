@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.record.displays import displays
+from experiments.record.metrics import displays
 from experiments.trials.exclusions import Exclusions, Rule, left_out
 
 

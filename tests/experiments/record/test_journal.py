@@ -11,13 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import RecordError
-from experiments.record.journal import MAGIC, Entry, Journal, read_entries
+from experiments.record.journal import MAGIC, Journal, JournalEntry, read_entries
 from experiments.web.protocol import Taken
 from experiments.web.worker.clock import _Acknowledger
 
-ENTRIES = st.builds(Entry, st.binary(max_size=300), st.lists(st.text(max_size=20), max_size=3))
+ENTRIES = st.builds(JournalEntry, st.binary(max_size=300), st.lists(st.text(max_size=20), max_size=3))
 RECORDS = st.lists(ENTRIES, max_size=12)
-LATER, FULL = Entry(b"later", []), Entry(b"x" * 100, ["line"])
+LATER, FULL = JournalEntry(b"later", []), JournalEntry(b"x" * 100, ["line"])
 encode = msgspec.msgpack.encode
 FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -166,7 +166,7 @@ def test_a_full_disk_leaves_whole_records(tmp_path):
 def test_a_journal_belongs_to_one_process_at_a_time(tmp_path, monkeypatch):
     path = tmp_path / "journal"
     with Journal(path):
-        monkeypatch.setattr("experiments.record.journal.LOCK_TIMEOUT", 0.1)
+        monkeypatch.setattr("experiments.record.journal.LOCK_TIMEOUT_S", 0.1)
         with pytest.raises(RecordError, match="in use by another process"):
             Journal(path)
     with Journal(path) as journal:

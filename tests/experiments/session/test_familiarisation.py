@@ -148,7 +148,7 @@ def test_a_story_of_ones_own_is_read(tmp_path):
     story = tmp_path / "story.txt"
     story.write_text("Tidy up. " * 119)
     assert reading_time(story_text(story)) == 60.0
-    with pytest.raises(ConfigError, match="no phase to read it in"):
+    with pytest.raises(ConfigError, match="the phases lack story"):
         TrialConfig(objects=1, assistance="none", seed=0, story=str(story))
     with pytest.raises(ConfigError, match="cannot read the story"):
         story_text(tmp_path / "missing")
@@ -182,7 +182,7 @@ def test_everybody_has_the_same_training_whatever_the_task_shows():
     conditions = ("none", "highlight", "optimal", "guided-minimap")
     assert {shown(name) for name in conditions} == {"none"}
     assert {shown(name, training_assistance="highlight") for name in conditions} == {"highlight"}
-    with pytest.raises(ConfigError, match="but no training"):
+    with pytest.raises(ConfigError, match="the phases lack training"):
         TrialConfig(objects=6, assistance="none", seed=5, training_assistance="highlight")
 
 
@@ -207,7 +207,8 @@ def test_a_replay_verifies_a_session_with_its_training(session, house):
 
 def test_a_replay_works_out_anew_what_was_seen(session, house, monkeypatch):
     monkeypatch.setattr(
-        "experiments.trials.replay.phases.watch_flythrough", lambda *_: {"phase": "flythrough", "bins": {}}
+        "experiments.trials.replay.comparison.watch_flythrough",
+        lambda *_: {"phase": "flythrough", "bins": {}},
     )
     with pytest.raises(ReplayError, match="bins of the flythrough"):
         replay(session, house=house)

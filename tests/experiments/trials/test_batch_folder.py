@@ -12,9 +12,8 @@ from experiments.house import House
 from experiments.participants.distribution import Distributions
 from experiments.record import records
 from experiments.trials.batch import run_batch
-from experiments.trials.batch_checks import check_trials
 from experiments.trials.batch_folder import read_trial, trial_name
-from experiments.trials.batch_plan import plan_batch
+from experiments.trials.batch_plan import check_trials, plan_batch
 from experiments.trials.design import Design, confounded, factorial
 from experiments.trials.fingerprint import plugin_digest, trial_inputs
 from experiments.trials.trial import run_trial

@@ -7,8 +7,8 @@ from sessions import prepared
 
 from experiments.errors import ConfigError
 from experiments.trials.design import numbers, read_design
+from experiments.trials.designs import read_study, study_path
 from experiments.trials.setup import trial_episode
-from experiments.trials.simulate import read_study, study_path
 from experiments.trials.trial_config import TrialConfig
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "designs"
@@ -52,7 +52,7 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
     ("text", "fault"),
     [
         ("", "missing required field `cells`"),
-        ("[[cells]]\nobjects = 6", r"people must be given.*\$.cells\[0\]"),
+        ("[[cells]]\nobjects = 6", r"people or seeds are missing.*\$.cells\[0\]"),
         ("[[cells]]\npeople = 2", r"missing required field `objects`.*\$.cells\[0\]"),
         ('[[cells]]\npeople = "2"', r"Expected `int \| null`, got `str` - at `\$.cells\[0\].people`"),
         ("[[cells]]\nasistance = 'none'", "unknown field `asistance`"),

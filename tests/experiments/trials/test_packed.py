@@ -7,15 +7,14 @@ import pytest
 from user_code import participant
 
 from experiments.analysis.planning.preregistration import _settings_of_runs
-from experiments.analysis.report.paths import _run_of
+from experiments.analysis.report.figures import _run_of
 from experiments.cli.main import main
 from experiments.record import records
 from experiments.record.archive import adopt, new_archive, pack, run_paths
 from experiments.record.run_directory import TRIALS
 from experiments.trials import batch, trial_reader
 from experiments.trials.batch import run_batch
-from experiments.trials.batch_checks import check_trials
-from experiments.trials.batch_plan import plan_batch
+from experiments.trials.batch_plan import check_trials, plan_batch
 from experiments.trials.design import Design
 from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig

@@ -44,7 +44,7 @@ def test_more_homes_help_where_effects_differ_between_homes_and_more_people_othe
 
 def test_a_pool_that_cannot_tell_and_designs_that_are_none_are_refused():
     table = table_of(made_up_people({("none", 6): 12, ("optimal", 6): 12}))
-    with pytest.raises(StatisticsError, match="does not tell the variance of"):
+    with pytest.raises(StatisticsError, match="has no data on the variance of"):
         homes_power(table, "deviations", [20], [10], 2)
     with pytest.raises(ConfigError, match="at least 5 homes"):
         homes_power(table, "deviations", [2], [10], 2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.analysis.planning.power import Wanted, _interval
-from experiments.analysis.statistics.power import people_per_cell
+from experiments.analysis.statistics.effects import people_per_cell
 from experiments.errors import StatisticsError
 
 CELLS = [(name, n) for name in ("highlight", "none", "optimal") for n in (6, 12, 18, 24)]

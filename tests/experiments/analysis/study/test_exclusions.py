@@ -20,7 +20,7 @@ from experiments.analysis.study.table import study_table
 from experiments.cli.main import main
 from experiments.errors import ConfigError, RecordError
 from experiments.trials.design import read_design, read_exclusions
-from experiments.trials.exclusions import BY_NAME, UNFINISHED, Exclusions, Person, Rule
+from experiments.trials.exclusions import BY_NAME, UNFINISHED, ExcludedPerson, Exclusions, Rule
 from experiments.trials.table import write_tables
 
 SMALL = {(name, objects): 6 for name in ("none", "highlight", "optimal") for objects in (6, 12)}
@@ -100,7 +100,7 @@ def test_rules_that_do_not_fit_the_table_are_refused_by_name():
     for exclusions, message in (
         (Exclusions((Rule("completion_time", ">", "a", 600),)), "rule 1 .*did you mean completion_time_s"),
         (Exclusions((Rule("user", "==", "a", 600),)), "'follower' cannot be compared with 600"),
-        (Exclusions(people=(Person("nobody", "a"),)), "no person 'nobody' to leave out"),
+        (Exclusions(people=(ExcludedPerson("nobody", "a"),)), "no person 'nobody' to leave out"),
         (Exclusions((Rule("objects", ">", "a", 0),)), r"all 36 rows are left out: 36 by objects > 0"),
     ):
         with pytest.raises(RecordError, match=message):
@@ -134,7 +134,9 @@ def test_an_impossible_value_is_refused_by_its_row_unless_its_person_is_left_out
     rows = changed({0: {"ended": "time limit"}, 1: {"nd_feasible": 7.3}})
     with pytest.raises(RecordError, match=r"row 1 \(person seed 1\) has the nd_feasible 7.3"):
         table_of(rows)
-    found = leave_one_out(rows, read_measures(), "here", Exclusions(people=(Person(1, "a typing error"),)))
+    found = leave_one_out(
+        rows, read_measures(), "here", Exclusions(people=(ExcludedPerson(1, "a typing error"),))
+    )
     assert "nd_feasible 7.3" in found[1].refused
 
 
@@ -170,7 +172,7 @@ def test_results_without_a_rule_are_those_of_a_study_without_it():
     rows = changed(
         {0: {"ended": "time limit"}, 1: {"completion_time_s": 900.0}, 2: {"completion_time_s": 900.0}}
     )
-    exclusions = Exclusions((SLOW,), (Person(2, "a friend"), Person(3, "a friend")))
+    exclusions = Exclusions((SLOW,), (ExcludedPerson(2, "a friend"), ExcludedPerson(3, "a friend")))
     found = {one.rule: one for one in leave_one_out(rows, read_measures(), "here", exclusions)}
     assert {rule: (one.leaves_out, one.alone) for rule, one in found.items()} == {
         str(SLOW): (2, 1),
@@ -213,7 +215,7 @@ def test_equal_studies_give_equal_bytes_wherever_they_are(study, tmp_path):
 
 def test_the_study_file_is_never_replaced_by_its_preregistration(study, capsys):
     assert main(["study", "preregister", str(study), "--out", str(study), "--force"]) == 2
-    assert "is the study file itself" in capsys.readouterr().err
+    assert "is the study file" in capsys.readouterr().err
     assert study.read_text() == STUDY + RULES
 
 
@@ -258,12 +260,10 @@ def people_as_planned():
 def test_nothing_departs_from_a_study_that_was_run_as_planned_and_each_change_is_named(study, tmp_path):
     write_preregistration(study, tmp_path / "p.zip")
     frozen = read_preregistration(tmp_path / "p.zip")
-    unknown = [
-        "There is no run directory for each person; settings that are no columns of the table are not compared."
-    ]
+    unknown = ["Run directories are missing, so only settings that are columns of the table are compared."]
     rows = people_as_planned()
     assert departures(frozen, frozen.exclusions, rows, tmp_path, frozen.measures) == unknown
-    other = Exclusions(people=(Person(3, "a friend"),), unfinished="keep")
+    other = Exclusions(people=(ExcludedPerson(3, "a friend"),), unfinished="keep")
     rows[0] = {**rows[0], "house_seed": 99}
     fewer = msgspec.structs.replace(frozen.measures, likert={})
     found = "\n".join(departures(frozen, other, rows[:-1], tmp_path, fewer))
@@ -271,7 +271,7 @@ def test_nothing_departs_from_a_study_that_was_run_as_planned_and_each_change_is
         "rule completion_time_s > 600 was preregistered and is not applied",
         "rule ended != 'all delivered' was preregistered and is not applied",
         "person 3 was not preregistered (a friend)",
-        "The measures are others",
+        "The measures differ",
         "optimal, 6 objects has 5 trials, preregistered 6",
         "house_seed is not as preregistered in 1 trial, such as none, 6 objects: 99",
     ):
@@ -305,12 +305,12 @@ def rewritten(path, change):
     [
         (
             lambda files: files.update({"exclusions.json": b"{}"}),
-            "exclusions.json is not what its manifest says",
+            "exclusions.json differs from the manifest",
         ),
-        (lambda files: files.update({"more.txt": b""}), "more.txt is not what"),
-        (lambda files: files.pop("study.toml"), "study.toml is not what"),
+        (lambda files: files.update({"more.txt": b""}), "more.txt differs"),
+        (lambda files: files.pop("study.toml"), "study.toml differs"),
         (lambda files: files.pop("manifest.json"), "it has no 'manifest.json'"),
-        (lambda files: files.update({"manifest.json": b"[]"}), "is no preregistration"),
+        (lambda files: files.update({"manifest.json": b"[]"}), "is not a"),
         (
             lambda files: (files.clear(), files.update({"manifest.json": b"{}"})),
             "it has no 'exclusions.json'",

@@ -11,9 +11,8 @@ import pytest
 from study_people import SIZES, made_up_people, table_of
 
 from experiments.analysis.page import shown
-from experiments.analysis.planning.cost import StudyCost
-from experiments.analysis.planning.power import MIN_POOL, Wanted, _eta_squared, plan_power
-from experiments.analysis.statistics.power import people_per_cell
+from experiments.analysis.planning.power import MIN_POOL, StudyCost, Wanted, _eta_squared, plan_power
+from experiments.analysis.statistics.effects import people_per_cell
 from experiments.analysis.study import analysis as study_analysis
 from experiments.analysis.study.analysis import analyse
 from experiments.analysis.study.measures import read_measures
@@ -54,7 +53,7 @@ def test_a_model_that_memory_does_not_suffice_for_says_what_to_do(monkeypatch):
 
     monkeypatch.setattr(study_analysis, "mixed_model", exhausted)
     found = analyse(table_of(made_up_people(SMALL)), read_measures()).find("distance", "mixed model")
-    assert found.reason.startswith("there is not enough memory; analyse fewer trials")
+    assert found.reason.startswith("not enough memory; analyse fewer trials")
 
 
 def test_a_measure_has_one_column_wherever_it_is_named():
@@ -193,7 +192,7 @@ def test_answers_of_people_are_analysed():
 
 
 def test_answers_of_simulated_people_are_refused():
-    with pytest.raises(RecordError, match="nothing simulates answers"):
+    with pytest.raises(RecordError, match="answers are never simulated"):
         table_of(made_up_people(SMALL, likert_useful=4))
 
 
@@ -316,7 +315,7 @@ def test_power_says_what_it_cannot_know():
     table = table_of(made_up_people(dict.fromkeys(cells, 20)))
     with pytest.raises(StatisticsError, match="0 people with highlight and 12 objects"):
         plan_power([*cells, *((n, 12) for n, _ in cells)], table, Wanted("ipl"), StudyCost())
-    with pytest.raises(ConfigError, match="one level only"):
+    with pytest.raises(ConfigError, match="only one level"):
         plan_power(cells, table, Wanted("ipl", "objects"), StudyCost())
     with pytest.raises(ConfigError, match="no measure 'speed'"):
         plan_power(cells, table, Wanted("speed"), StudyCost())

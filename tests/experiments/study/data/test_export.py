@@ -103,7 +103,7 @@ def test_an_export_has_tables_runs_and_a_codebook(served, tmp_path):
     assert [path.name for path in (out / "runs").iterdir()] == ["p00001"]
     book = {row["name"]: row for row in rows_of(out / "documentation" / "codebook.csv")}
     assert book["likert_useful"]["values"].startswith("1 = strongly disagree; 2 = ")
-    assert "Objects in their receptacle" in book["delivered"]["description"]
+    assert "objects in their receptacle" in book["delivered"]["description"]
     assert all(row["description"] for row in book.values())
 
 

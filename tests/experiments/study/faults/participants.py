@@ -10,7 +10,7 @@ from websockets.exceptions import WebSocketException
 
 from benchmarks.support.play_browser import SimulatedBrowser
 from benchmarks.support.play_server import PATIENCE
-from experiments.record.journal import Entry, read_entries
+from experiments.record.journal import JournalEntry, read_entries
 from experiments.record.phases import TASK
 from experiments.visit.tokens import token_hash
 from tests.experiments.study.faults.site import NAMES, QUESTIONS, RIGHT
@@ -216,7 +216,7 @@ class Playing(Person):
 
     def check(self):
         """Each acknowledged input is in the journal, once, and none that was not sent."""
-        entries = [entry for entry in read_entries(self.journal()) if isinstance(entry, Entry)]
+        entries = [entry for entry in read_entries(self.journal()) if isinstance(entry, JournalEntry)]
         events = [json.loads(line) for entry in entries for line in entry.events]
         counted = [0]
         for event in events:

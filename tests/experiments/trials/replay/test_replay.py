@@ -277,7 +277,7 @@ def test_a_mismatch_is_one_line_and_exit_code_1(copy, capsys):
     assert main(["replay", str(copy)]) == 1
     last = capsys.readouterr().err.strip().splitlines()[-1]
     assert last.startswith("mjsim: ")
-    assert "first bad step 400 (t = 16.00 s): events.jsonl is cut short" in last
+    assert "first bad step 400 (t = 16.00 s): events.jsonl is truncated" in last
 
 
 # Why a replay may differ.
@@ -321,7 +321,7 @@ def test_a_run_in_a_house_that_was_moved(own_house, tmp_path, capsys):
     own_trial(own_house, tmp_path / "run", 1.0)
     moved = own_house.parent.rename(tmp_path / "elsewhere") / own_house.name
     assert main(["replay", str(tmp_path / "run")]) == 2
-    assert "if it lies elsewhere now, name its catalogue with --house" in capsys.readouterr().err
+    assert "if it was moved, name its catalogue with --house" in capsys.readouterr().err
     assert main(["replay", str(tmp_path / "run"), "--house", str(moved)]) == 0
     assert "26 steps verified" in capsys.readouterr().out
     block = moved.with_name("block.xml")

@@ -14,7 +14,7 @@ from study_site import PASSWORD, ROLES, phase_of, served
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from experiments.cli.logs import JsonLines
+from experiments.cli.server import JsonLines
 from experiments.errors import StoreError
 from experiments.study.data.collect import collect, write_collected
 from experiments.visit.server.admission import NEW_PEOPLE

@@ -262,8 +262,8 @@ def test_a_run_that_cannot_be_written_stays_in_the_journal_alone(visit, house, m
         raise OSError(28, "No space left on device")
 
     shutil.rmtree(visit / "task")
-    monkeypatch.setattr("experiments.record.export.save_arrays", full)
-    monkeypatch.setattr("experiments.record.export._save_elsewhere", lambda *_: pytest.fail("kept elsewhere"))
+    monkeypatch.setattr("experiments.record.writer.save_arrays", full)
+    monkeypatch.setattr("experiments.record.writer._save_elsewhere", lambda *_: pytest.fail("kept elsewhere"))
     with pytest.raises(OSError, match="No space left"):
         save_run(visit / "journals" / "task", visit / "task", house)
     assert not (visit / "task").exists() and (visit / "journals" / "task" / "journal.bin").is_file()

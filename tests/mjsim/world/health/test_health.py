@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_worlds import do, scene_of, world_of
 
-from experiments.record.health import summarise_health
+from experiments.record.metrics import summarise_health
 from mjsim.house.compiled.rays import first_hit, moving_geoms
 from mjsim.values.actions import IDLE, EventKind, Pick
 from mjsim.world.health.scan import is_path_clear, static_boxes

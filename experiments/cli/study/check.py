@@ -1,4 +1,4 @@
-"""`mjsim study check`: whether a study is ready for people."""
+"""`mjsim study check`: check that a study is ready."""
 
 import argparse
 import sys
@@ -6,10 +6,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command
-from experiments.cli.requirements import require_extra
 from experiments.cli.server import prepare_process
-from experiments.cli.study.database import people_study
+from experiments.cli.study.database import add_study_file, people_study
 from experiments.errors import ConfigError
 from experiments.session.signals import run_until_signal
 
@@ -20,31 +20,31 @@ if TYPE_CHECKING:
     from experiments.web.server.pool import WorkerPool
 
 DESCRIPTION = """\
-Check a study before people come. It is served in a folder that is thrown away, and made-up people go through every
-phase by HTTP: what is wrong or too early must be refused, what is right taken once, and every way out must end where
-it should. Minimum times are at most a second here, and trials last a second.
+Check that a study is ready for participants. The study is served from a temporary folder, and simulated participants go
+through every phase by HTTP. The server must refuse wrong or early answers, accept each right answer once, and end each
+visit as intended. In this check, minimum durations are at most a second, and trials last a second.
 
-Prints the expected length (reading by words, trials by simulated people), what the study costs, and which effects it
-can find. With --out, a Chromium that is installed takes a picture of each page, as on a desk and on a phone. Problems
-are listed with their line of the file; the exit code is 1 if there is one."""
+Print the expected duration (reading time from the number of words, trials from simulated participants), the cost, and
+the effect sizes that the study can detect. With --out, an installed Chromium takes a screenshot of each page in desktop
+and phone size. Problems are listed with their line in the file. The exit code is 1 if there are any."""
 
 
 def add_parser(commands: Any) -> None:
     parser = add_command(
-        commands, "check", run, summary="whether a study is ready for people", description=DESCRIPTION
+        commands, "check", run, summary="check that a study is ready", description=DESCRIPTION
     )
-    parser.add_argument("study", metavar="STUDY.toml", help="study file, or `paper`")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the pictures")
+    add_study_file(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the screenshots")
     parser.add_argument(
-        "--pool", type=Path, metavar="DIR", help="simulated people, for the power of `mjsim study power`"
+        "--pool",
+        type=Path,
+        metavar="DIR",
+        help="folder of simulated participants, from which to estimate the power",
     )
-    parser.add_argument(
-        "--measure", default="deviations", metavar="NAME", help="of --pool (default: deviations)"
-    )
+    parser.add_argument("--measure", default="deviations", metavar="NAME", help="measure for --pool")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check; 1 if there is a problem."""
     study = people_study(arguments)
     require_extra("study")
     from experiments.study.plan import plan_of
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.web.server.pool import WorkerPool
 
     if arguments.out is not None and arguments.out.exists() and not arguments.out.is_dir():
-        raise ConfigError(f"{arguments.out} is a file; name a folder for the pictures")
+        raise ConfigError(f"{arguments.out} is a file; name a folder for the screenshots")
     phases = phases_of(plan_of(study, platform=_recruiter(study)))
     prepare_process()
     pool = WorkerPool(study.cells[0].trial(0).house)
@@ -75,12 +75,11 @@ def run(arguments: argparse.Namespace) -> int:
     for line in (*walked.faults, *located(study, problems)):
         print(f"problem   {line}")
     found = len(walked.faults) + len(problems)
-    print("ready     every phase was gone through" if not found else f"not ready ({found} to put right)")
+    print("ready     all phases passed" if not found else f"not ready (problems: {found})")
     return 1 if found else 0
 
 
 def _recruiter(study: "Study") -> "Recruiter":
-    """The study's platform, or an open link where its codes are missing."""
     from experiments.study.recruitment import recruiter
     from experiments.visit.recruiter import OpenLink
 
@@ -112,7 +111,6 @@ async def _walk(
 
 
 def _progress(text: str) -> None:
-    """One line on a terminal that is written over again."""
     if sys.stderr.isatty():
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
@@ -121,7 +119,7 @@ def _print_length(study: "Study", seconds: dict[str, float], shortest: float, lo
     for name, expected in seconds.items():
         print(f"length    {name:14} {_time(expected)}")
     print(
-        f"length    {_time(shortest)} to {_time(longest)} by cell, with simulated people in trials; people are told "
+        f"length    {_time(shortest)} to {_time(longest)} by cell, with simulated people in trials; the study says "
         f"{study.settings.minutes} min"
     )
 
@@ -133,9 +131,9 @@ def _print_cost(study: "Study") -> None:
     print(f"cost      {study.people} people x {pay.reward:.2f} = {found.rewards:.2f} {pay.currency}")
     if found.bonuses:
         print(f"cost      bonuses of at most {found.bonuses:.2f}")
-    fee = "not known: set fee in [study.pay]" if found.fee is None else f"{found.fee:.2f}"
+    fee = "unknown: set fee in [study.pay]" if found.fee is None else f"{found.fee:.2f}"
     print(f"cost      fee of the platform {fee}")
-    print(f"cost      {found.total:.2f} {pay.currency} in all; {found.hourly:.2f} an hour for each person")
+    print(f"cost      {found.total:.2f} {pay.currency} in total; {found.hourly:.2f} per hour and person")
 
 
 def _print_power(study: "Study", arguments: argparse.Namespace) -> None:
@@ -143,15 +141,14 @@ def _print_power(study: "Study", arguments: argparse.Namespace) -> None:
 
     for effect, size in detectable(study).items():
         print(
-            f"power     {study.people} people show an effect of {effect} of partial eta squared {size:.3f} (80 %)"
+            f"power     {study.people} people detect an effect of {effect} of partial eta squared {size:.3f} (80 %)"
         )
     if arguments.pool is None:
         print(
-            "power     for a measure: mjsim study simulate, then mjsim study check --pool DIR (docs/analysis.md)"
+            "power     for a measure, run mjsim study simulate, then mjsim study check --pool DIR (docs/analysis.md)"
         )
         return
-    from experiments.analysis.planning.cost import StudyCost
-    from experiments.analysis.planning.power import Wanted, plan_power
+    from experiments.analysis.planning.power import StudyCost, Wanted, plan_power
     from experiments.analysis.study.measures import read_measures
     from experiments.analysis.study.table import read_study
 

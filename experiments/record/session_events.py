@@ -1,0 +1,227 @@
+"""Types of the events about a session: its start and end, phases, clock and display."""
+
+from typing import Annotated, Literal
+
+import msgspec
+
+Seconds = Annotated[float, msgspec.Meta(ge=0.0)]
+Count = Annotated[int, msgspec.Meta(ge=0)]
+
+
+def _tag(class_name: str) -> str:
+    return class_name.removesuffix("Event").lower()
+
+
+class LoggedEvent(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="event", tag=_tag, kw_only=True
+):
+    """A line of the log.
+
+    Attributes:
+        t: Simulated time, s.
+    """
+
+    t: Seconds
+
+
+class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
+    """First line: what was run. It also holds the settings of the trial, as in `metrics.json`.
+
+    Attributes:
+        format: Version of the log format.
+        versions: Versions of mjsim, its physics code, MuJoCo and NumPy, and the machine's architecture.
+        model: Fingerprint of the compiled house with its objects, without purely visual parts.
+        world: Options of the world: timestep, capacity, grip, fidelity.
+        fingerprint: Hash of the settings and of `inputs`.
+        inputs: Hashes or versions of what else the trial depends on: house, code, libraries.
+        episode_sha256: SHA-256 of `episode.json`.
+        order: Object names in the participant's random order.
+        objects: Number of misplaced objects.
+        assistance: Assistance condition.
+        house: House name, or path of its catalogue.
+        time_limit: Simulated time after which the trial ends, s.
+        rooms: Number of rooms; None in older records.
+        area_m2: Floor area of the rooms, m2; None in older records.
+    """
+
+    format: int
+    versions: dict[str, str]
+    model: str
+    world: dict[str, float | str]
+    fingerprint: str
+    inputs: dict[str, str]
+    episode_sha256: str
+    order: list[str]
+    objects: Count
+    assistance: str
+    house: str
+    time_limit: Seconds
+    rooms: Count | None = None
+    area_m2: float | None = None
+
+
+class ParticipantEvent(LoggedEvent, frozen=True):
+    """Second line: the participant.
+
+    Attributes:
+        user: Name of the participant model.
+        person: Parameters of the person, drawn values included, by name. Those of the hands are grouped under `motion`
+            (docs/participants.md).
+        behaviour: Parameters drawn for the participant model, by name; absent if the model has none.
+    """
+
+    user: str
+    person: dict[str, float | dict[str, float]]
+    behaviour: dict[str, float] | None = None
+
+
+class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
+    """A phase before the task started; the task clock stays at 0. Logs of tasks without earlier phases have no such
+    event.
+
+    Attributes:
+        phase: `story`, `flythrough` or `training`.
+    """
+
+    phase: Literal["story", "flythrough", "training"]
+
+
+class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
+    """A phase before the task ended.
+
+    Attributes:
+        phase: As in `phase_begun`.
+        duration_s: Time spent reading, watching, or training, s.
+        bins: In a simulated participant's fly-through: time at which each receptacle came into view, s.
+        reason: Why the training ended, as in `end`. Its record is in the run directory `training`.
+        attempts: Attempts at the questions about the story. Only in logs from before version 0.3.
+    """
+
+    phase: Literal["story", "flythrough", "training"]
+    duration_s: Seconds
+    bins: dict[str, Seconds] | None = None
+    reason: str | None = None
+    attempts: int | None = None
+
+
+class StartedEvent(LoggedEvent, frozen=True):
+    """The person started the clock. The task is hidden until then.
+
+    Attributes:
+        waited_s: How long the session had waited for the start, in seconds of wall time.
+        wall: Unix time, s.
+    """
+
+    waited_s: float
+    wall: float
+
+
+class PauseEvent(LoggedEvent, frozen=True):
+    """The clock was paused.
+
+    Attributes:
+        reason: `hidden` (the tab), `disconnected`, `silent` (no heartbeat from the page for 1 s), `restarted` (the
+            worker process died), `asked` or `taken over`.
+        wall: Unix time, s.
+    """
+
+    reason: Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
+    wall: float
+
+
+class ResumeEvent(LoggedEvent, frozen=True):
+    """The clock was resumed.
+
+    Attributes:
+        wall: Unix time, s.
+    """
+
+    wall: float
+
+
+class BlurEvent(LoggedEvent, frozen=True):
+    """The page lost or regained the keyboard focus.
+
+    Attributes:
+        away: Whether it lost the focus.
+        wall: Unix time, s.
+    """
+
+    away: bool
+    wall: float
+
+
+class OverrunEvent(LoggedEvent, frozen=True):
+    """A control step was late because the machine was busy or inputs did not arrive.
+
+    Attributes:
+        seconds: Delay, in seconds of wall time.
+        skipped: Whether the clock was set to the present because the process had been suspended.
+        missing: Whether the step ran without inputs that the page had promised. Logged only for the first such step in
+            a row.
+    """
+
+    seconds: float
+    skipped: bool
+    missing: bool = False
+
+
+class DisplayEvent(LoggedEvent, frozen=True):
+    """How well the person saw the session in the last 5 s, as measured by the page.
+
+    Attributes:
+        draw: Whether the browser drew the view or showed frames of the server.
+        renderer: Name of the renderer.
+        width: Width of the view, CSS px.
+        height: Height of the view, CSS px.
+        pixel_ratio: Screen pixels per CSS pixel.
+        frames_per_s: Frames shown per second.
+        frame_ms: Median time between two frames, ms.
+        frame_ms_95: 95th percentile of the time between two frames, ms.
+        latency_ms: Median time, in ms, from an input to the frame that shows it or, if the browser draws, to the
+            server's state that includes it; null if nothing was pressed.
+        dropped: Number of received frames that were not shown.
+        wall: Unix time, s.
+        field_of_view: Horizontal field of view, rad; null if the person cannot choose it.
+    """
+
+    draw: Literal["browser", "server"]
+    renderer: str
+    width: Count
+    height: Count
+    pixel_ratio: float
+    frames_per_s: float
+    frame_ms: float
+    frame_ms_95: float
+    latency_ms: float | None
+    dropped: Count
+    wall: float
+    field_of_view: float | None = None
+
+
+class DrawEvent(LoggedEvent, frozen=True):
+    """Rendering moved to the server because the browser cannot draw.
+
+    Attributes:
+        draw: The new renderer's side.
+        reason: Why the other side stopped: `slow` (below 20 frames per second), `context lost`, or the missing feature.
+        wall: Unix time, s.
+    """
+
+    draw: Literal["browser", "server"]
+    reason: str
+    wall: float
+
+
+class EndEvent(LoggedEvent, frozen=True):
+    """Last line.
+
+    Attributes:
+        reason: Why the trial ended.
+        error: Description of the error, if there was one.
+        signal: Name of the signal that interrupted the trial, if any.
+    """
+
+    reason: str
+    signal: str | None = None
+    error: str | None = None
