@@ -76,12 +76,7 @@ class Difference:
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """Read the trials of a batch by circumstances, in the order of its table.
-
-    Raises:
-        RecordError: The table is not usable.
-        ConfigError: The batch has only one condition.
-    """
+    """Read the trials of a batch with two or more conditions by circumstances, in the order of its table."""
     path = folder / f"{NAME}.parquet"
     rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
@@ -149,11 +144,7 @@ def unknown_metrics(
 
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
-    """Compare each two conditions in every metric, on the complete pairs.
-
-    Raises:
-        ConfigError: A metric is unknown or has an impossible value, or there are no pairs.
-    """
+    """Compare each two conditions in every metric, on the complete pairs."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:

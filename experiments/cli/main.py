@@ -136,7 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _stopped(stop: KeyboardInterrupt) -> int:
     number = signal_of(stop)
-    print(f"mjsim: stopped by {number.name}; what was finished is kept", file=sys.stderr)
+    print(f"mjsim: stopped by {number.name}. Finished work is kept", file=sys.stderr)
     return exit_code(number)
 
 

@@ -52,7 +52,7 @@ link resumes in the same state. Finished trials leave run directories like those
 DIR/VISIT/training, which `mjsim replay` verifies and films.
 
 The server accepts only connections from this machine unless --host is given. docs/deploy.md explains how to host it for
-others. Ctrl-C stops the server; the same command resumes."""
+others. Ctrl-C stops the server, and the same command resumes."""
 
 
 def add_parser(commands: Any) -> None:
@@ -180,22 +180,14 @@ def _minimum(text: str) -> dict[str, float]:
 
 
 def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Return the phases of a visit. The fly-through is left out without a film.
-
-    Raises:
-        ConfigError: There is no such phase.
-    """
+    """Return the phases of a visit. The fly-through is left out without a film."""
     return tuple(
         name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
     )
 
 
 def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
-    """Read the questions of --questions: tables [[question]] with `text`, `choices` and `answer`.
-
-    Raises:
-        ConfigError: The file is not usable, or an option refers to a phase that is not shown.
-    """
+    """Read the questions of --questions: tables [[question]] with `text`, `choices` and `answer`."""
     path: Path | None = arguments.questions
     named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
     if missing := [name for name in named if name not in shown_phases(arguments)]:

@@ -134,11 +134,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
-    """Yield the run directory of a command. It is temporary for a packed trial or an unfinished session.
-
-    Raises:
-        RecordError: The session has no recorded steps.
-    """
+    """Yield the run directory of a command. It is temporary for a packed trial or an unfinished session."""
     from experiments.house import House
     from experiments.record.archive import opened_run
     from experiments.record.run_directory import is_run

@@ -115,11 +115,7 @@ def opened_run(path: Path) -> Iterator[Path]:
 
 
 def unpack(archive: Path, name: str, folder: Path) -> None:
-    """Write a packed run to `folder/name`.
-
-    Raises:
-        RecordError: The run is missing, or a file does not match its checksum.
-    """
+    """Write a packed run to `folder/name`, and compare the files with their checksums."""
     directories = set[Path]()
     with _opened(archive) as database:
         members = f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}"  # nosec B608 - a constant

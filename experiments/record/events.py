@@ -142,11 +142,7 @@ _DECODER: msgspec.json.Decoder[LoggedEvent] = msgspec.json.Decoder(Union[(*TYPES
 
 
 def check_event(line: bytes) -> None:
-    """Check that a line of a log is an event with the fields of its kind.
-
-    Raises:
-        RecordError: The line is not a valid event.
-    """
+    """Raise a `RecordError` if a line of a log is not an event with the fields of its kind."""
     try:
         _DECODER.decode(line)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

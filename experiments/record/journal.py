@@ -47,7 +47,7 @@ class Checkpoint(msgspec.Struct, frozen=True):
 
 
 class JournalEntry(msgspec.Struct, frozen=True, tag="Entry"):
-    """What was recorded since the previous entry.
+    """A part of the recording, since the previous entry.
 
     Attributes:
         rows: Control steps, of type `columns.row_type`.
@@ -97,11 +97,7 @@ class Journal:
             raise
 
     def append(self, entry: Header | JournalEntry) -> None:
-        """Append an entry, which is durable once `sync` returns.
-
-        Raises:
-            OSError: The entry cannot be written (a full disk). The file is left unchanged.
-        """
+        """Append an entry, which is durable once `sync` returns. On an OSError the file is left unchanged."""
         end, content = self.size, _encode(entry)
         try:
             _write(self._file, _HEAD.pack(len(content), zlib.crc32(content)) + content)

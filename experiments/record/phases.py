@@ -12,11 +12,7 @@ SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Record
 
 
 def phases_of(text: str) -> tuple[str, ...]:
-    """Parse a list of phases such as `flythrough,task`.
-
-    Raises:
-        ConfigError: A phase is unknown or out of order, or the task is missing.
-    """
+    """Parse a list of phases in their order, with the task, such as `flythrough,task`."""
     names = tuple(part.strip() for part in text.split(","))
     unknown = [name for name in names if name not in PHASES]
     if unknown:

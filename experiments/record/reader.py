@@ -89,11 +89,7 @@ class Record:
 
     @cached_property
     def person(self) -> PersonParameters:
-        """The participant's parameters, drawn values included.
-
-        Raises:
-            ReplayError: The log does not describe the participant.
-        """
+        """The participant's parameters, drawn values included."""
         try:
             logged = next(event for event in self.events if event["event"] == records.PARTICIPANT)
             return PersonParameters.from_dict(logged["person"])
@@ -147,11 +143,7 @@ class Record:
         return [int(step) for step in self.recording["checkpoint_step"]]
 
     def checkpoint(self, step: int) -> WorldState:
-        """Return the checkpoint before a control step.
-
-        Raises:
-            StateError: The checkpoint is of another version.
-        """
+        """Return the checkpoint before a control step."""
         number = self.checkpoint_steps.index(step)
         physics, details = (self.recording[f"checkpoint_{part}"][number] for part in ("physics", "details"))
         return WorldState.from_json(physics, str(details))
@@ -197,11 +189,7 @@ def assemble(
 
 
 def read_journal(entries: Sequence[Header | JournalEntry]) -> Record:
-    """Build the record of a journal, which may be of an unfinished session.
-
-    Raises:
-        RecordError: The journal is empty.
-    """
+    """Build the record of a journal, which may be of an unfinished session but not empty."""
     if not entries or not isinstance(entries[0], Header):
         raise RecordError("the journal is empty")
     episode, log = Episode.from_json(entries[0].episode), EventLog()

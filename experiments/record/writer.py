@@ -128,11 +128,7 @@ class RecordWriter:
         return max(1, self._last_checkpoint + _period(world) - self.step)
 
     def commit(self, participant: Any = None) -> None:
-        """Append all new data and the state of the participant to the journal.
-
-        Raises:
-            OSError: The journal cannot be written.
-        """
+        """Append all new data and the state of the participant to the journal."""
         if self._journal is None:
             return
         states = [

@@ -31,11 +31,7 @@ MAX_NUMBERS = 1_000_000
 
 @dataclass(frozen=True)
 class Design:
-    """The trials of a batch, in order, and the exclusions of its file, if any.
-
-    Raises:
-        ConfigError: There are no trials, or the same trial occurs twice.
-    """
+    """The trials of a batch, in order and each only once, and the exclusions of its file, if any."""
 
     trials: tuple[TrialConfig, ...]
     exclusions: Exclusions | None = None
@@ -149,11 +145,7 @@ def read_design(path: Path) -> Design:
 
 
 def read_exclusions(path: Path) -> Exclusions:
-    """Read exclusions from a TOML file of rules and people, or from the table [exclusions] of a design.
-
-    Raises:
-        ConfigError: The file has no valid exclusions.
-    """
+    """Read exclusions from a TOML file of rules and people, or from the table [exclusions] of a design."""
     content = _content(path, "rules")
     if "cells" in content:
         found = read_design(path).exclusions

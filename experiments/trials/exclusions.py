@@ -104,11 +104,7 @@ class LeftOut:
 
 
 def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[int, LeftOut]:
-    """Return the excluded people of a table by row number.
-
-    Raises:
-        RecordError: A rule or a person does not fit the table.
-    """
+    """Return the excluded people of a table by row number. All rules and people must fit the table."""
     found: dict[int, dict[str, str]] = {}
     for number, rule in enumerate(exclusions.all_rules(), start=1):
         if rule is UNFINISHED and not any(rule.column in row for row in rows):

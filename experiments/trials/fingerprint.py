@@ -1,4 +1,4 @@
-"""Everything that a trial depends on besides its settings: files, source code and libraries, by hash or version.
+"""What a trial depends on besides its settings: files, source code and libraries, by hash or version.
 
 A resumed batch compares them with the present ones, and runs trials again if something has changed.
 """

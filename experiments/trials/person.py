@@ -35,11 +35,7 @@ def check_person(described: Distributions) -> None:
 
 
 def view_limits(text: str) -> tuple[float, float]:
-    """Parse `1.2,1.9`, the limits of the field of view, rad, that a person may choose.
-
-    Raises:
-        ConfigError: The text is not two angles in ascending order.
-    """
+    """Parse `1.2,1.9`, the limits of the field of view, rad, that a person may choose."""
     least, most, _ = RANGES["field_of_view"]
     try:
         low, high = map(float, text.split(","))

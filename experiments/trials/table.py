@@ -62,11 +62,7 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a Parquet file.
-
-    Raises:
-        RecordError: The file cannot be read, is damaged, or has a trial twice.
-    """
+    """Read the rows of a Parquet file, which has each trial once."""
     try:
         check_input(path)
         with path.open("rb") as file:
@@ -137,11 +133,7 @@ def trial_columns() -> Columns:
 
 
 def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
-    """Return type and description of the fields that a class itself defines.
-
-    Raises:
-        KeyError: The docstring of the class does not describe a field.
-    """
+    """Return type and description of the fields that a class itself defines. All must be in its docstring."""
     texts, hints = _attributes(kind), typing.get_type_hints(kind)
     names = (
         [field.name for field in dataclasses.fields(kind)]

@@ -170,11 +170,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
-        """Make a configuration from `settings`, or from a part of them.
-
-        Raises:
-            ConfigError: A name or a value is invalid.
-        """
+        """Make a configuration from `settings`, or from a part of them."""
         try:
             return msgspec.convert(settings, cls, dec_hook=lambda kind, given: kind.of(given))
         except msgspec.ValidationError as error:
@@ -270,11 +266,7 @@ CONFOUNDERS = tuple(
 
 
 def episode_settings(path: Path) -> dict[str, Any]:
-    """Return the arguments of `TrialConfig` that an episode file sets.
-
-    Raises:
-        EpisodeError: The file is not a valid episode.
-    """
+    """Return the arguments of `TrialConfig` that an episode file sets."""
     episode = Episode.load(path)
     return {
         "objects": len(episode.objects),

@@ -16,11 +16,7 @@ EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of v
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Check that there are two groups or more, with at least `least` values each, that vary within groups.
-
-    Raises:
-        StatisticsError: The groups cannot be compared.
-    """
+    """Check that there are two groups or more, with at least `least` values each, that vary within groups."""
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
@@ -137,11 +133,7 @@ class Cells:
 
 
 def cells_of(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
-    """Group values and factors, (n,) each, into cells. If the second factor has one level, it is ignored.
-
-    Raises:
-        StatisticsError: A cell is empty, or the first factor has one level.
-    """
+    """Group values and factors, (n,) each, into cells. If the second factor has one level, it is ignored."""
     names, others = np.unique(first), np.unique(second)
     if len(names) < 2:
         raise StatisticsError(f"there is only one level ({', '.join(map(str, names))})")

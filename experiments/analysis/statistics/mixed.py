@@ -129,11 +129,7 @@ def differences_by_house(
     conditions: Sequence[str],
     seed: int = 0,
 ) -> list[HouseDifference]:
-    """Compare all pairs of `conditions` by a percentile bootstrap over houses. Arrays have one entry per trial, (n,).
-
-    Raises:
-        StatisticsError: There are too few houses, or a cell has no trials.
-    """
+    """Compare all pairs of `conditions` by a percentile bootstrap over houses. Arrays have shape (n,)."""
     names, house = np.unique(houses, return_inverse=True)
     if len(names) < MIN_LEVELS:
         raise StatisticsError(f"resampling needs at least {MIN_LEVELS} houses; there are {len(names)}")

@@ -132,11 +132,7 @@ class StudyTable:
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the people of a study, a batch or `mjsim play` who finished.
-
-    Raises:
-        RecordError: Something is missing or invalid.
-    """
+    """Read the people of a study, a batch or `mjsim play` who finished."""
     return study_table(read_people(folder), measures, people_path(folder))
 
 
@@ -175,11 +171,7 @@ def study_table(
     path: Path,
     exclusions: Exclusions = Exclusions(),  # noqa: B008 - frozen
 ) -> StudyTable:
-    """Make the table of the people who are not excluded.
-
-    Raises:
-        RecordError: A value is invalid. `path` names the table in messages.
-    """
+    """Make the table of the people who are not excluded. `path` names the table in messages."""
     _check_design(people, path)
     check_answer_columns(present_columns(people), measures, path)
     absent = left_out(exclusions, people, path)

@@ -32,11 +32,7 @@ def add_served_study(parser: argparse.ArgumentParser) -> None:
 
 
 def people_study(arguments: argparse.Namespace) -> "Study":
-    """Read the study file of a command.
-
-    Raises:
-        ConfigError: The extra `people` is missing, or the file is not usable.
-    """
+    """Read the study file of a command."""
     require_extra("people")
     from experiments.study.file import read_people_study
     from experiments.trials.designs import study_path

@@ -14,11 +14,7 @@ FOLDER = Path(__file__).parent
 
 
 def study_path(name: str) -> Path:
-    """Return the file of a study: a path, or the name of a study in this package (`paper`).
-
-    Raises:
-        ConfigError: There is no such file.
-    """
+    """Return the file of a study, which exists: a path, or the name of a study in this package (`paper`)."""
     own, packaged = Path(name), FOLDER / f"{name}.toml"
     if not own.is_file() and not packaged.is_file():
         raise ConfigError(

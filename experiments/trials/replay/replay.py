@@ -68,7 +68,7 @@ class ReplayReport:
         failure: Error of the physics that ended run and replay, or None.
         differences: Versions and models that differ from those of the recording, without effect on the result.
         frames_sha256: Hash of the filmed frames, or None.
-        as_filmed: Whether these frames equal those of the run's video bit for bit; None if one of them has no film.
+        as_filmed: Whether these frames equal those of the run's video bit for bit, or None without both films.
     """
 
     first: int

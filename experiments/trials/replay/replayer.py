@@ -189,26 +189,22 @@ class LogSource(PlanSource):
         self._plans = list(plans)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """The visits that are not done; None if a plan was logged now."""
+        """The visits that are not done, or None if a plan was logged now."""
         return None if self._is_due else tuple(v for v in route.visits if _is_open(v, state))
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:  # noqa: ARG002 - both are logged
-        """The plan that was logged now.
-
-        Raises:
-            ReplayError: The log has no plan at the start, or the event does not describe a plan.
-        """
+        """The plan that was logged now. Every run logs one at the start."""
         if not self._is_due:
             raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
         return _route(self._plans.pop(0), state)
 
     @property
     def pending(self) -> bool:
-        """Whether a better plan for the same task was logged now."""
+        """True if a better plan for the same task was logged now."""
         return self._is_due and bool(self._plans[0].get("improved", False))
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """The better plan that was logged now, or None; raises as `plan` does."""
+        """The better plan that was logged now, or None."""
         return self.plan(state, route, shown=True) if self.pending else None
 
     @property

@@ -117,7 +117,7 @@ def test_a_small_study_is_rehearsed_continued_and_consistent(tmp_path, study, ca
     first.send_signal(signal.SIGTERM)
     _, said = first.communicate(timeout=PATIENCE)
     assert first.returncode == 128 + signal.SIGTERM
-    assert said.splitlines()[-1] == "mjsim: stopped by SIGTERM; what was finished is kept"
+    assert said.splitlines()[-1] == "mjsim: stopped by SIGTERM. Finished work is kept"
     assert "Traceback" not in said
     before = ended(out)
     assert main(words) == 0, (out / "rehearsal.json").read_text()
