@@ -31,7 +31,7 @@ def play_app(folder, pool, *words, sessions=20, made=lambda _: None):
 
     async def make():
         store = await Store.open(f"sqlite:///{folder / 'study.db'}", NAME, "0" * 64)
-        plan = plan_of_play(arguments, task)
+        plan = plan_of_play(arguments, task, play.shown_phases(arguments), play.questions_of(arguments))
         procedure = Procedure(plan, store, VisitFolders(folder), np.random.default_rng(0))
         await procedure.adopt()
         server = VisitServer(

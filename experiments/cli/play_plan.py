@@ -60,9 +60,8 @@ def plan_of_play(
     if questions:
         shown.insert(shown.index(STORY) + 1, COMPREHENSION)
     texts = _texts(arguments.language, questions)
-    again = (
-        task.episode is None
-    )  # a fixed episode is not repeated because the result page shows its shortest way
+    # A fixed episode is not repeated because the result page shows its shortest way.
+    again = task.episode is None
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
         """Give each visit its own order seed, so that the arrangement of hands varies."""

@@ -41,11 +41,7 @@ class Shard:
         return f"{self.number}-of-{self.count}."
 
     def of(self, design: Design) -> Design:
-        """Return the trials of this shard, in the design's order.
-
-        Raises:
-            ConfigError: There are fewer trials than shards.
-        """
+        """Return the trials of this shard, in the design's order."""
         total = len(design.trials)
         if total < self.count:
             raise ConfigError(

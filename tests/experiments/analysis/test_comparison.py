@@ -54,7 +54,7 @@ def test_pairs_that_are_missing_are_named_and_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"completion_time_s": 1e308}, r"completion_time_s has the value 1e\+308"),
+        ({"completion_time_s": 1e308}, r"completion_time_s has the impossible value 1e\+308"),
         ({"completion_time_s": "long"}, "no metric 'completion_time_s'"),
         ({"assistance": 3}, "assistance is not a name"),
     ],

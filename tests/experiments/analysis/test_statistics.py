@@ -321,7 +321,7 @@ def test_the_interval_by_house_leaves_out_what_all_conditions_of_a_house_share(s
     assert found.difference == pytest.approx(pairs.mean())
     half = 1.96 * pairs.std() / math.sqrt(60)
     assert np.array(found.interval) == pytest.approx(pairs.mean() + np.array([-half, half]), abs=0.12 * half)
-    with pytest.raises(StatisticsError, match="houses cannot be drawn again from 2; 5 are needed"):
+    with pytest.raises(StatisticsError, match="at least 5 houses; there are 2"):
         differences_by_house(values[:4], condition[:4], np.full(4, 6), houses[:4], ["a", "b"])
 
 

@@ -93,7 +93,7 @@ def test_the_overview_names_every_command():
         ),
         ([*PLAY, "--questions", "nothing.toml"], "cannot read the questions nothing.toml"),
         ([*PLAY, "--host", "no.such.host.invalid"], "choose another --port (0 for any) or --host"),
-        (["batch", DESIGN, "--user", "searcher", "--seeds", "1"], "leave out --seeds, --user"),
+        (["batch", DESIGN, "--user", "searcher", "--seeds", "1"], "sets --seeds, --user; leave them out"),
         (["batch", "--seeds", "1,1"], "--seeds has a value twice"),
         (["batch", "--seeds", "0", "--workers", "0"], "at least one worker, got 0"),
         (["batch", "--assistance", ","], "at least one value for --assistance"),

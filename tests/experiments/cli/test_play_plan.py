@@ -6,7 +6,7 @@ import sys
 import pytest
 from play_site import arguments_of
 
-from experiments.cli.play import task_of
+from experiments.cli.play import questions_of, shown_phases, task_of
 from experiments.cli.play_plan import plan_of_play
 from experiments.errors import ConfigError
 
@@ -15,7 +15,7 @@ GOOD = '[[question]]\ntext = "How many?"\nchoices = ["one", "two"]\nanswer = "tw
 
 def plan(*words):
     arguments = arguments_of(*words)
-    return plan_of_play(arguments, task_of(arguments))
+    return plan_of_play(arguments, task_of(arguments), shown_phases(arguments), questions_of(arguments))
 
 
 def test_questions_are_asked_in_order_after_the_story(tmp_path):

@@ -59,7 +59,7 @@ def test_cells_may_be_of_unlike_size_and_share_what_all_have(tmp_path):
         ("[[cells]]\npeople = 0", "Expected `int` >= 1"),
         ("[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 2\nseeds = '0:3'", "seeds for 3"),
         ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = '0:99999999999'", "more than 1000000"),
-        ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = [-1]", "negative"),
+        ("[[cells]]\nobjects = 6\nassistance = 'none'\nseeds = [-1]", "none below 0"),
         ("[[cells]]\nobjects = 60\nassistance = 'none'\nseeds = 1", "objects is 60; it must be 1 to 40"),
         (
             "[[cells]]\nobjects = 6\nassistance = 'none'\npeople = 1\nperson = 'x'",
@@ -107,7 +107,7 @@ def test_a_folder_does_not_hide_a_study_of_the_package_and_a_file_does(tmp_path,
     (tmp_path / "pool").write_text("")
     assert study_path("paper").name == "paper.toml"
     assert study_path("pool") == Path("pool")
-    with pytest.raises(ConfigError, match="no study 'papers'; `paper` is the published one"):
+    with pytest.raises(ConfigError, match="no study 'papers'; give the path of a design file, or `paper`"):
         study_path("papers")
 
 
@@ -192,6 +192,6 @@ def test_trials_of_a_person_are_in_homes_that_come_as_often_first_as_last(tmp_pa
     some = read_study(tmp_path / "design.toml", 1).trials
     assert {t.house for t in some} == {t.house for t in trials if t.person_seed == 0}
     with pytest.raises(
-        ConfigError, match="trials_per_person is 9; give each of them a house or a house seed"
+        ConfigError, match="trials_per_person is 9; give each trial its own house or house seed"
     ):
         design(tmp_path, cell.format("0:8", "trials_per_person = 9"))

@@ -77,11 +77,11 @@ def test_a_shard_depends_on_the_design_only_and_mixes_its_cells():
     "text", ["0/40", "41/40", "3/0", "0/0", "a/b", "3", "3/", "-1/4", "1/4/5", "1.5/4", "٣/٤", ""]
 )
 def test_what_is_not_a_shard_is_refused_with_a_hint(text, capsys):
-    with pytest.raises(ConfigError, match="counted from 1"):
+    with pytest.raises(ConfigError, match="is not a shard K/N"):
         Shard.parse(text)
     with pytest.raises(SystemExit) as refused:
         main(["batch", f"--shard={text}", "--out", "nowhere"])
-    assert refused.value.code == 2 and "counted from 1" in capsys.readouterr().err
+    assert refused.value.code == 2 and "is not a shard K/N" in capsys.readouterr().err
     assert not Path("nowhere").exists()
 
 

@@ -268,8 +268,8 @@ def test_nothing_departs_from_a_study_that_was_run_as_planned_and_each_change_is
     fewer = msgspec.structs.replace(frozen.measures, likert={})
     found = "\n".join(departures(frozen, other, rows[:-1], tmp_path, fewer))
     for part in (
-        "rule completion_time_s > 600 was preregistered and is not applied",
-        "rule ended != 'all delivered' was preregistered and is not applied",
+        "rule completion_time_s > 600 was preregistered but is not applied",
+        "rule ended != 'all delivered' was preregistered but is not applied",
         "person 3 was not preregistered (a friend)",
         "The measures differ",
         "optimal, 6 objects has 5 trials, preregistered 6",

@@ -44,7 +44,7 @@ def test_columns_that_nothing_analyses_are_named():
     rows = made_up_people({("none", 6): 3, ("optimal", 6): 3})
     rows[-1] |= {"excluded": True, "mood\n": 3}
     *_, note = table_of(rows).notes
-    assert note == "Nothing here analyses the table's further columns: 'excluded', 'mood\\n'."
+    assert note == "These columns of the table are not analysed: 'excluded', 'mood\\n'."
 
 
 def test_a_model_that_memory_does_not_suffice_for_says_what_to_do(monkeypatch):
@@ -225,13 +225,13 @@ def test_notes_name_what_confounds():
     [
         ({"assistance": None}, "the assistance None, not a name"),
         ({"objects": 0}, "0 objects, not a whole number"),
-        ({"nd_feasible": "much"}, "'much', which is no number"),
+        ({"nd_feasible": "much"}, "'much', which is not a number"),
         ({"nd_feasible": 7.3}, "nd_feasible 7.3, not a number from 0 to 1; correct"),
         ({"nd_strict_2n": -2}, r"row 0 \(person seed 0\) has the nd_strict_2n -2"),
         ({"ipl_locations": -0.1}, "ipl_locations -0.1"),
         ({"completion_time_s": 1e308}, "completion_time_s 1e\\+308"),
         ({"task_distance_m": -1.0}, "task_distance_m -1"),
-        ({"user": "human", "likert_ease": 4}, r"likert_ease.*nearest is likert_easy.*under \[likert\]"),
+        ({"user": "human", "likert_ease": 4}, r"likert_ease.*nearest is likert_easy.*to \[likert\]"),
         ({"user": "human", "Likert_easy": 4}, "Likert_easy"),
         ({"user": "human", "likert_useful": 6}, "the answer 6; answers are whole numbers"),
     ],
@@ -327,7 +327,7 @@ def test_power_says_what_it_cannot_know():
 def test_the_power_commands_help_names_the_smallest_pool(capsys):
     with pytest.raises(SystemExit):
         main(["study", "power", "--help"])
-    assert f"{MIN_POOL} in each or more" in " ".join(capsys.readouterr().out.split())
+    assert f"at least {MIN_POOL} per cell" in " ".join(capsys.readouterr().out.split())
 
 
 def test_the_power_command(tmp_path, capsys):
