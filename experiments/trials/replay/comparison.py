@@ -24,8 +24,8 @@ from experiments.record.phases import (
 from experiments.record.reader import Record
 from experiments.record.records import EVENTS, PHASE_ENDED, RECORDING, TRAJECTORY, Event, read_events
 from experiments.record.verify import Mismatch
-from experiments.session.familiarise import watch_flythrough
 from experiments.session.assistant import WORLD_EVENTS
+from experiments.session.familiarise import watch_flythrough
 from experiments.trials.replay.replayer import Replayer
 
 # Events that follow from the physics and the assistant. Plans and regrets are taken from the log without a new search;
