@@ -9,6 +9,7 @@ import pytest
 BOUNDS = {"experiments": (9, 29), "mjsim": (12, 36)}
 # package -> modules that may be directly in it, besides subpackages
 CONTAINED = {"experiments": {"errors", "house"}, "mjsim": {"__main__"}}
+MODULES = 550  # most modules in the four packages
 ACYCLIC = ("experiments", "hud", "mjsim", "planner")
 
 
@@ -53,6 +54,10 @@ def test_a_package_has_few_folders_with_few_imports_between_them(
 def test_a_module_is_in_a_folder(graph: grimp.ImportGraph, package: str) -> None:
     loose = {child for child in graph.find_children(package) if not is_package(graph, child)}
     assert {name.removeprefix(f"{package}.") for name in loose} == CONTAINED[package]
+
+
+def test_the_packages_have_few_modules(graph: grimp.ImportGraph) -> None:
+    assert 400 < len(graph.modules) <= MODULES
 
 
 @pytest.mark.parametrize("package", ACYCLIC)
