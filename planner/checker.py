@@ -74,10 +74,9 @@ def allowance(problem: RoutingProblem, plan: Plan) -> float:
 def shortest_tour(
     problem: RoutingProblem, limit: float, max_states: float = np.inf
 ) -> tuple[float, int] | None:
-    """Return the length of the shortest tour below a limit, m (infinite if there is none), and the number of visited
-    states.
+    """Return the length of the shortest tour below a limit, m, and the number of visited states.
 
-    The result is None if there are more than `max_states`.
+    The length is infinite if there is no such tour. The result is None after more than `max_states`.
     """
     d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]

@@ -119,9 +119,10 @@ class SolverSource(PlanSource):
         return self._search is not None and not self._search.found.empty()
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """Return another route only if it is shorter by more than rounding, from where the person is now.
+        """Return another route if it is shorter by more than rounding from where the person is now.
 
-        So the suggestion does not alternate between equal tours.
+        Otherwise return the present route with a better bound, or None. So the suggestion does not alternate between
+        equal tours.
         """
         search = self._search
         plans = search.drain() if search is not None else []

@@ -26,11 +26,10 @@ def participant_names() -> tuple[str, ...]:
 
 
 def participant(name: str) -> "ParticipantFactory":
-    """Return the factory of a participant by module name, with its parameter after a colon, or by
-    `package.module:attribute`.
+    """Return the factory of a participant by name, or by `package.module:attribute`.
 
-    A module with a parameter defines `with_parameter(text)`, which returns the factory. Raises ConfigError if there is
-    no such participant, it cannot be loaded or called, or it takes no parameter.
+    A parameter may follow a name after a colon if the module defines `with_parameter(text)`, which returns the factory.
+    Raises ConfigError if there is no such participant, it cannot be loaded or called, or it takes no parameter.
     """
     module, colon, parameter = name.partition(":")
     if module in participant_names():

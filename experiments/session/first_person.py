@@ -52,11 +52,10 @@ class FirstPersonRenderer:
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
-        """Render the view of the person with the HUD: RGB, uint8, (height, width, 3), larger if panels are next to the
-        picture.
+        """Render the view of the person with the HUD: RGB, uint8, (height, width, 3).
 
-        `data` is the state of the scene's model. Raises RenderError if a marker cannot be drawn, or the renderer is
-        closed.
+        The frame is larger if panels are next to the picture. `data` is the state of the scene's model. Raises
+        RenderError if a marker cannot be drawn, or the renderer is closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)

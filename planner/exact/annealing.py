@@ -24,10 +24,10 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 @kernel
 def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """Return up to four ways to leave objects before the next pick: a bin, a second bin, and the bin of what is still
-    held.
+    """Return up to four ways to leave objects before the next pick.
 
-    `held` and `other` are the bins of the objects in hand, of `m` bins. `m` stands for no bin, or an empty hand.
+    Each is a bin, a second bin, and the bin of the object still held. `held` and `other` are the bins of the objects in
+    hand, of `m` bins. `m` stands for no bin, or an empty hand.
     """
     never = (m, m, -1)
     if held == m:
