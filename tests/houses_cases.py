@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 import mujoco
 
-from mjsim.generator.furniture.look import Look
+from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import Piece, flattened
-from mjsim.generator.values import Asset, Door, FloorPlan, Palette, Rectangle, Room, Window
+from mjsim.generator.values import Asset, Door, HomePlan, Palette, Rectangle, Room, Window
 from mjsim.house.catalogue.house_ref import models_root
 
 PALETTE = Palette(
@@ -20,13 +20,13 @@ PALETTE = Palette(
 BINS = ("dish_bin", "toy_box", "bookshelf", "laundry_hamper", "office_box", "recycling_bin")
 
 
-def compiled(piece: Piece, look: Look) -> mujoco.MjModel:
+def compiled(piece: Piece, look: Appearance) -> mujoco.MjModel:
     """A piece at the origin, with the classes and materials of the apartment."""
     assets: dict[str, Asset] = {}
     bodies = ""
     for member, x, y, yaw in flattened(piece):
         bodies += f'<body pos="{x} {y} 0" euler="0 0 {yaw}">{member.geoms}</body>'
-        for asset in (*look.of(member.geoms), *(a for p in member.pictures for a in p.assets)):
+        for asset in (*look.assets_of(member.geoms), *(a for p in member.pictures for a in p.assets)):
             assets[asset.name] = asset
     files = {f"{a.name}.png": a.image for a in assets.values() if a.image is not None}
     folder = models_root() / "textures"
@@ -52,7 +52,7 @@ def _room(key: str, x0: float, y0: float, x1: float, y1: float) -> Room:
     return Room(key, re.sub(r"_\d", "", key), key, Rectangle(x0, y0, x1, y1))
 
 
-def flat() -> FloorPlan:
+def flat() -> HomePlan:
     """Six rooms on 90 m^2."""
     rooms = (
         _room("hall", 0, 4.12, 9.0, 5.6),
@@ -78,10 +78,10 @@ def flat() -> FloorPlan:
         Window("bedroom_2", "south", 5.0, 1.2, 0.95, 2.15),
         Window("bathroom", "south", 7.8, 0.7, 1.3, 2.15),
     )
-    return FloorPlan(rooms, (*doors, Door(("hall",), "west", 4.8, 0.95, 2.1)), windows)
+    return HomePlan(rooms, (*doors, Door(("hall",), "west", 4.8, 0.95, 2.1)), windows)
 
 
-def studio() -> FloorPlan:
+def studio() -> HomePlan:
     """One room and a bathroom."""
     rooms = (_room("studio", 0, 0, 5.6, 5.2), _room("bathroom", 5.72, 0, 7.7, 2.6))
     doors = (Door(("studio", "bathroom"), "east", 1.3, 0.9, 2.05), Door(("studio",), "south", 4.6, 0.95, 2.1))
@@ -90,4 +90,4 @@ def studio() -> FloorPlan:
         Window("studio", "west", 2.6, 1.4, 0.95, 2.15),
         Window("bathroom", "south", 6.7, 0.6, 1.3, 2.0),
     )
-    return FloorPlan(rooms, doors, windows)
+    return HomePlan(rooms, doors, windows)

@@ -14,15 +14,16 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.generator.files import write_files
+from mjsim.generator.files import house_files
 from mjsim.generator.furnish import placed
+from mjsim.generator.furniture.appearance import draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.look import draw_look
 from mjsim.generator.furniture.piece import Piece
 from mjsim.generator.palette import draw_palette
-from mjsim.generator.space import Place
-from mjsim.generator.values import FloorPlan, Furnishing, Placement, Rectangle, Room, Window
-from mjsim.house.catalogue.generated_names import stream
+from mjsim.generator.recipe import Recipe
+from mjsim.generator.space import PiecePose
+from mjsim.generator.values import Furnishing, HomePlan, Placement, Rectangle, Room, Window
+from mjsim.house.catalogue.generated_names import VERSION, stream
 from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.catalogue.model_files import read_model
 from mjsim.render import Renderer
@@ -51,14 +52,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def pictures(kind: str) -> Iterator[Image]:
     """Draw three pieces of a kind of furniture, (height, width, 3), RGB."""
     room = Room("living_room", "living_room", kind, Rectangle(0.0, 0.0, APART * PIECES, 9.0))
-    pieces: list[tuple[Piece, Place]] = []
+    pieces: list[tuple[Piece, PiecePose]] = []
     placements: list[Placement] = []
     seed = sum(map(ord, kind))  # the pieces of a kind have the materials of one home
-    look = draw_look(draw_palette(seed), stream(seed, "look"))
+    look = draw_appearance(draw_palette(seed), stream(seed, "look"))
     for i in range(PIECES):
         piece = KINDS[kind].make(stream(seed, "sheet", kind, str(i)), look)
         x = APART * (i + 0.5)
-        place = Place(x, 0.0 if piece.stands != "ceiling" else 1.0, 0, "south", x)
+        place = PiecePose(x, 0.0 if piece.stands != "ceiling" else 1.0, 0, "south", x)
         pieces.append((piece, place))
         placements += placed(room.key, piece, place, look)
     windows = [
@@ -66,8 +67,9 @@ def pictures(kind: str) -> Iterator[Image]:
         for piece, place in pieces
         if piece.stands == "recess"
     ]
-    plan = FloorPlan((room,), (), tuple(windows))
-    files = write_files(seed, kind, kind, plan, Furnishing(tuple(placements), ()), 1, models_root())
+    plan = HomePlan((room,), (), tuple(windows))
+    recipe = Recipe(VERSION, seed, plan)
+    files = house_files(recipe, Furnishing(tuple(placements), ()), models_root())
     with tempfile.TemporaryDirectory() as folder:
         for name, content in files.items():
             (Path(folder) / name).parent.mkdir(exist_ok=True)
@@ -81,7 +83,7 @@ def pictures(kind: str) -> Iterator[Image]:
             yield np.asarray(cv2.resize(picture, CELL, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _camera(piece: Piece, place: Place) -> CameraPose:
+def _camera(piece: Piece, place: PiecePose) -> CameraPose:
     """Look from above the right side of a piece."""
     w, d, h = piece.size
     low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling", "recess") else 0.0

@@ -19,10 +19,11 @@ from scipy.ndimage import distance_transform_edt, label
 
 from mjsim.formats.gltf.export import HOUSE, export_scene
 from mjsim.formats.gltf.store import SCENE
-from mjsim.generator.generated import generate, house_files
+from mjsim.generator.files import house_files
+from mjsim.generator.generated import generate
 from mjsim.generator.programme import NEEDS
 from mjsim.generator.recipe import RECIPE, read_recipe
-from mjsim.generator.values import WALL, Door, FloorPlan, Window
+from mjsim.generator.values import WALL, Door, HomePlan, Window
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE, models_root
 from mjsim.house.check import check_house_name
@@ -128,7 +129,7 @@ class _Piece:
 class _Home:
     """A compiled home with a grid of distances from its floor to the nearest obstacle."""
 
-    def __init__(self, house: CompiledHouse, plan: FloorPlan) -> None:
+    def __init__(self, house: CompiledHouse, plan: HomePlan) -> None:
         self._model, self._data, self._plan = house.model, house.data, plan
         self._pieces = list(self._all_pieces())
         self._field = ClearanceField.from_model(self._model, low=BAND[0], high=BAND[1], resolution=CELL)
@@ -241,7 +242,7 @@ class _Home:
         return [round(float(v) * 5) / 5 for v in self._model.mat_rgba[found, :3].ravel()]
 
 
-def _door_graph(plan: FloorPlan) -> str:
+def _door_graph(plan: HomePlan) -> str:
     """Return the doors between rooms by use. Plans that differ only in the names of bedrooms have equal graphs."""
     uses = {room.key: room.use for room in plan.rooms} | {"outside": "outside"}
     bedrooms = [key for key, use in uses.items() if use == "bedroom"]
@@ -257,7 +258,7 @@ def _within(value: float, bounds: tuple[float, float]) -> bool:
     return bounds[0] - 0.01 <= value <= bounds[1] + 0.01
 
 
-def _lacking(plan: FloorPlan, kinds: Counter[str]) -> Iterator[str]:
+def _lacking(plan: HomePlan, kinds: Counter[str]) -> Iterator[str]:
     bedrooms = sum(room.use in ("bedroom", "studio") for room in plan.rooms)
     if sum(kinds[kind] for kind in BEDS) < bedrooms:
         yield "beds"

@@ -131,10 +131,10 @@ def _add_house(kinds: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     require_extra()  # before trimesh, CoACD and OpenGL are imported
-    from mjsim.importing.object.house_extension import Entry, HouseExtension
+    from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension
     from mjsim.importing.object.mesh_import import add_mesh
 
-    entry = Entry.named(arguments.name or arguments.file.stem, arguments.category)
+    entry = CatalogueEntry.named(arguments.name or arguments.file.stem, arguments.category)
     options = ImportOptions(arguments.units, arguments.up, arguments.scale, arguments.mass, arguments.density)
     extension = HouseExtension(arguments.out, arguments.house)
     decisions = add_mesh(arguments.file, extension, entry, options, force=arguments.force)

@@ -1,4 +1,4 @@
-"""File formats of houses and scenes, each with its readers and writers. Readers return a `SourceScene`."""
+"""File formats of houses and scenes, with their readers and writers. All readers return a `SourceScene`."""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
-"""A house as a scene dataset of Habitat: stage, objects, scene instance, rooms, and episodes of rearrangement.
+"""Export of a house as a Habitat scene dataset: stage, objects, scene instance, rooms, and rearrangement episodes.
 
-Habitat has y up and the camera along -z; our x, y, z are its x, -z, y. Everything that stands still is the stage;
-receptacles and objects are templates with their own origins, so that our poses hold.
+Habitat has y up and the camera along -z, so our x, y, z are its x, -z, y. The stage is everything that cannot move.
+Receptacles and objects are templates with their own origins, so that our poses apply to them.
 """
 
 import gzip
@@ -20,10 +20,11 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from mjsim.formats.gltf.glb import linear
 from mjsim.formats.gltf.reader import RECEPTACLE, SEMANTICS
 from mjsim.formats.mjcf_reader import read_mjcf
 from mjsim.formats.scene.mesh_files import Y_TO_Z
-from mjsim.formats.scene.source_scene import HouseOptions, Piece
+from mjsim.formats.scene.source_scene import HouseOptions, ScenePiece
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.model_files import read_model
@@ -32,29 +33,23 @@ from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 
 _UPRIGHT = np.linalg.inv(Y_TO_Z)
-_CEILING = 2.6  # m, of regions
+_CEILING = 2.6  # height of regions, m
 _OBJECT, _SCENE = ".object_config.json", ".scene_instance.json"
-_AIR = 0.05  # m that paths keep from walls beyond the body's radius
+_AIR = 0.05  # distance of paths from walls, beyond the body's radius, m
 
 
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
-    """Write a house and episodes in it into an existing folder; returns the name of the scene."""
+    """Write a house and episodes in it into an existing folder. Return the name of the scene."""
     house = compiled_house(catalogue)
     name = _slug(catalogue.name if catalogue.ref.kind == "generated" else catalogue.label)
-    _save_model(
-        folder / "stages", name, catalogue.house_path, "stage_config", {"up": [0, 1, 0], "front": [0, 0, -1]}
-    )
+    axes = {"up": [0, 1, 0], "front": [0, 0, -1]}
+    _save_model(folder / "stages", name, catalogue.house_path, "stage_config", axes)
     volumes = {key: _volume(house, key) for key in catalogue.receptacles}
     for key, receptacle in catalogue.receptacles.items():
         own = {"key": key, "room": receptacle.room, "place": receptacle.place}
         marks = {RECEPTACLE: own, f"receptacle_aabb_{key}": volumes[key]}
-        _save_model(
-            folder / "objects",
-            _slug(key),
-            receptacle.path,
-            "object_config",
-            _template(receptacle.path, marks),
-        )
+        template = _template(receptacle.path, marks)
+        _save_model(folder / "objects", _slug(key), receptacle.path, "object_config", template)
     for key, item in catalogue.objects.items():
         _save_model(folder / "objects", _slug(key), item.path, "object_config", _template(item.path, {}))
     _save_json(folder / "scenes" / f"{name}{_SCENE}", _scene(house, catalogue, name))
@@ -77,53 +72,48 @@ def _save_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def _save_model(folder: Path, name: str, source: Path, kind: str, about: Mapping[str, Any]) -> None:
-    """What is seen of a model and what collides as two meshes, and the template that names them."""
+    """Write the drawn and the colliding meshes of a model, and the template that names them."""
     pieces = read_mjcf(source, HouseOptions()).pieces
     assets = {"render_asset": f"{name}.glb", "collision_asset": f"{name}_collision.glb"}
     folder.mkdir(exist_ok=True)
     (folder / assets["render_asset"]).write_bytes(_seen(pieces))
     (folder / assets["collision_asset"]).write_bytes(_solid(pieces))
-    _save_json(
-        folder / f"{name}.{kind}.json", {**assets, "is_collidable": True, "units_to_meters": 1.0, **about}
-    )
+    template = {**assets, "is_collidable": True, "units_to_meters": 1.0, **about}
+    _save_json(folder / f"{name}.{kind}.json", template)
 
 
-def _seen(pieces: Iterable[Piece]) -> bytes:
-    """A GLB file of what is seen: a mesh for each thing and look."""
-    looks: dict[tuple[int, tuple[float, ...]], PBRMaterial] = {}
-    groups: dict[tuple[str, int, tuple[float, ...]], list[Piece]] = {}
+def _seen(pieces: Iterable[ScenePiece]) -> bytes:
+    """A GLB file of the drawn geoms, with one mesh for each name and material."""
+    materials: dict[tuple[int, tuple[float, ...]], PBRMaterial] = {}
+    groups: dict[tuple[str, int, tuple[float, ...]], list[ScenePiece]] = {}
     for piece in pieces:
         if piece.seen:
             image = id(piece.surface.images[0]) if piece.surface.images else 0
             colour = tuple(piece.surface.colours.mean(axis=(0, 1)).round(3).tolist())
             groups.setdefault((piece.name, image, colour), []).append(piece)
-            if (image, colour) not in looks:
-                looks[image, colour] = _material(piece.surface.images, colour)
+            if (image, colour) not in materials:
+                materials[image, colour] = _material(piece.surface.images, colour)
     scene = trimesh.Scene()
     for number, ((name, image, colour), found) in enumerate(groups.items()):
         corners = np.concatenate([piece.surface.corners for piece in found]).reshape(-1, 3)
         uv = np.concatenate([piece.surface.uv for piece in found]).reshape(-1, 2)
         faces = np.arange(len(corners)).reshape(-1, 3)
-        visual = TextureVisuals(uv=uv, material=looks[image, colour])
-        mesh = trimesh.Trimesh(corners, faces, visual=visual, process=False)
-        scene.add_geometry(
-            mesh, node_name=f"{name} {number}", geom_name=f"{name} {number}", transform=_UPRIGHT
-        )
+        visual = TextureVisuals(uv=uv, material=materials[image, colour])
+        mesh, unique = trimesh.Trimesh(corners, faces, visual=visual, process=False), f"{name} {number}"
+        scene.add_geometry(mesh, node_name=unique, geom_name=unique, transform=_UPRIGHT)
     return bytes(scene.export(file_type="glb"))
 
 
 def _material(images: Sequence[Floats], colour: Sequence[float]) -> PBRMaterial:
-    rgb = np.array(colour)
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     picture = Image.fromarray(np.round(255 * images[0]).astype(np.uint8)) if images else None
-    factor = np.round(255 * np.append(linear, 1.0)).astype(np.uint8)
+    factor = np.round(255 * linear(np.append(colour, 1.0))).astype(np.uint8)
     return PBRMaterial(
         baseColorFactor=factor, baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=1.0
     )
 
 
-def _solid(pieces: Iterable[Piece]) -> bytes:
-    """A GLB file of what collides: a convex mesh for each geom."""
+def _solid(pieces: Iterable[ScenePiece]) -> bytes:
+    """A GLB file of the colliding geoms, with one convex mesh each."""
     scene = trimesh.Scene()
     for number, piece in enumerate(piece for piece in pieces if piece.solid):
         name = f"{piece.name} {number}"
@@ -132,7 +122,7 @@ def _solid(pieces: Iterable[Piece]) -> bytes:
 
 
 def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
-    """What a template of an object says besides its meshes: its frame is that of the model."""
+    """Fields of an object template apart from its meshes. Its frame is the model's."""
     mass = float(read_model(path).compile().body_mass.sum())
     return {
         "mass": round(mass, 4),
@@ -144,7 +134,7 @@ def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pose(position: Floats, rotation: Floats) -> Floats:
-    """A pose of ours as Habitat has it (4, 4)."""
+    """One of our poses as Habitat's transform (4, 4)."""
     own = np.eye(4)
     own[:3, :3], own[:3, 3] = rotation, position
     return np.asarray(_UPRIGHT @ own @ Y_TO_Z)
@@ -157,13 +147,13 @@ def _turned(quaternion: Sequence[float]) -> Floats:
 
 
 def _mount(house: CompiledHouse, key: str) -> tuple[Floats, Floats]:
-    """Where a receptacle's frame is: position, m, and rotation (3, 3)."""
+    """Position, m, and rotation (3, 3) of a receptacle's frame."""
     site = house.model.site(f"mount:{key}").id
     return house.data.site_xpos[site].copy(), house.data.site_xmat[site].reshape(3, 3).copy()
 
 
 def _volume(house: CompiledHouse, key: str) -> dict[str, Any]:
-    """The volume of a receptacle in its own frame, as Habitat annotates it: middle and half sides, m."""
+    """The volume of a receptacle in its own frame as Habitat annotates it: centre and half sizes, m."""
     geometry = house.receptacles[key]
     position, rotation = _mount(house, key)
     middle = _UPRIGHT[:3, :3] @ rotation.T @ (geometry.center - position)
@@ -182,15 +172,9 @@ def _scene(house: CompiledHouse, catalogue: Catalogue, name: str) -> dict[str, A
         pose = _pose(*_mount(house, key))
         turn = np.zeros(4)
         mujoco.mju_mat2Quat(turn, np.ascontiguousarray(pose[:3, :3]).ravel())
-        items.append(
-            {
-                "template_name": _slug(key),
-                "translation": _short(pose[:3, 3]),
-                "rotation": _short(turn),
-                "motion_type": "STATIC",
-                "translation_origin": "asset_local",
-            }
-        )
+        place = {"translation": _short(pose[:3, 3]), "rotation": _short(turn)}
+        fixed = {"motion_type": "STATIC", "translation_origin": "asset_local"}
+        items.append({"template_name": _slug(key), **place, **fixed})
     return {
         "stage_instance": {"template_name": name},
         "object_instances": items,
@@ -236,7 +220,7 @@ def _dataset() -> dict[str, Any]:
 
 
 def _navmesh() -> dict[str, Any]:
-    """Settings with which Habitat's navigation mesh is like ours."""
+    """Settings that make Habitat's navmesh similar to ours."""
     return {
         "cellSize": 0.05,
         "cellHeight": 0.05,
@@ -255,9 +239,8 @@ def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) ->
         model, receptacle = _slug(placed.model), episode.targets[placed.name]
         handle = f"{model}_:{counts.get(model, 0):04d}"
         counts[model] = counts.get(model, 0) + 1
-        objects.append(
-            [model + _OBJECT, _pose(np.array(placed.position), _turned(placed.quaternion)).tolist()]
-        )
+        pose = _pose(np.array(placed.position), _turned(placed.quaternion))
+        objects.append([model + _OBJECT, pose.tolist()])
         geometry = house.receptacles[receptacle]
         targets[handle] = _pose(geometry.center, geometry.rotation).tolist()
         goals.append([f"{_slug(receptacle)}_:0000", None])

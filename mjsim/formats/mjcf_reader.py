@@ -1,4 +1,4 @@
-"""MJCF scenes: geoms as they stand at the start; joints, actuators and whatever else moves or measures is left out."""
+"""Reader of MJCF scenes: geoms in their poses at the start. Joints, actuators and sensors are ignored."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from mjsim.formats.scene.mesh_files import primitive
 from mjsim.formats.scene.source_scene import (
     TEXTURE_SIDE,
     HouseOptions,
-    Missing,
+    MissingFiles,
     NamedRoom,
-    Piece,
+    ScenePiece,
     SourceScene,
     left_out,
 )
@@ -27,18 +27,18 @@ from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")
-_SEEN = (0, 1, 2)  # groups that viewers show
-_CLEAR = 0.9  # opacity; what collides and is clearer only marks where it collides
-_OPAQUE = 250  # of 255; pictures that are nowhere so opaque are shadows, and left out
+_SEEN = (0, 1, 2)  # geom groups that viewers show
+_CLEAR = 0.9  # opacity below which a colliding geom is a marker that is not drawn
+_OPAQUE = 250  # of 255; textures that are less opaque everywhere are shadows, and ignored
 _COVER = 0.02  # m
-_ENDLESS = 15.0  # m, half of the side that a plane without end is given
+_ENDLESS = 15.0  # half of the side given to an infinite plane, m
 _GEOM = mujoco.mjtGeom
 
 
 def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene; `AssetError` where it does not compile or names a mesh that is not there."""
+    """Read a scene. Raise `AssetError` if it does not compile or names a missing mesh."""
     spec = read_model(path)
-    missing = Missing(options.skip_missing)
+    missing = MissingFiles(options.skip_missing)
     _without_missing_meshes(spec, path, missing)
     pictures, absent = _take_pictures(spec)
     try:
@@ -49,15 +49,14 @@ def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
     pieces = tuple(_pieces(model, pictures))
     if not pieces:
         raise AssetError(f"{path} has no geom that can be read; give the scene of a house")
-    notes = [
-        *missing.notes(),
-        *([left_out(f"{len(absent)} missing pictures", ", ".join(absent[:4]))] if absent else []),
-    ]
+    notes = list(missing.notes())
+    if absent:
+        notes.append(left_out(f"{len(absent)} missing pictures", ", ".join(absent[:4])))
     return SourceScene(pieces, "MJCF scene", tuple(notes), _rooms(model))
 
 
 def _rooms(model: Any) -> tuple[NamedRoom, ...]:
-    """Rooms of a house of ours, which marks them by box sites; none of others."""
+    """Rooms of a house of ours, which marks them by box sites; none for other scenes."""
     if not any(model.site(site).name.startswith(PREFIX) for site in range(model.nsite)):
         return ()
     rooms = RoomMap.from_model(model)
@@ -65,21 +64,20 @@ def _rooms(model: Any) -> tuple[NamedRoom, ...]:
     for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True):
         low, high = centre - np.abs(axes) @ half, centre + np.abs(axes) @ half
         boxes.setdefault(key, []).append((*low.tolist(), *high.tolist()))
-    return tuple(
-        NamedRoom(key, key.replace("_", " ").capitalize(), tuple(found)) for key, found in boxes.items()
-    )
+    labels = {key: key.replace("_", " ").capitalize() for key in boxes}
+    return tuple(NamedRoom(key, labels[key], tuple(found)) for key, found in boxes.items())
 
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """The picture of a material."""
+    """The texture of a material."""
 
     image: Floats  # RGB from 0 to 1, (height, width, 3)
     repeat: Floats  # (2,)
-    uniform: bool  # whether it repeats by the metre on primitives
+    uniform: bool  # repeats by the metre on primitives
 
 
-def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: Missing) -> None:
+def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFiles) -> None:
     absent = {mesh.name: mesh.file for mesh in spec.meshes if mesh.file and not Path(mesh.file).is_file()}
     if not absent:
         return
@@ -98,8 +96,8 @@ def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: Missing) -
 
 
 def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
-    """Pictures by the names of materials, and files that are not there; the model is left without textures."""
-    files = {t.name: t.file for t in spec.textures if t.file}  # those for cubes are drawn on each side
+    """Remove all textures from a model. Return them by the names of materials, and the files that are missing."""
+    files = {t.name: t.file for t in spec.textures if t.file}  # cube textures are drawn on each side
     made = {t.name: t.rgb1 for t in spec.textures if not t.file}
     images: dict[str, Floats] = {}
     found, absent = {}, []
@@ -128,36 +126,31 @@ def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]
     return found, absent
 
 
-def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[Piece]:
+def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     collides = (model.geom_contype | model.geom_conaffinity) != 0
-    alpha = np.where(
-        model.geom_matid >= 0,
-        model.mat_rgba[model.geom_matid, 3] if model.nmat else 1.0,
-        model.geom_rgba[:, 3],
-    )
+    material_alpha = model.mat_rgba[model.geom_matid, 3] if model.nmat else 1.0
+    alpha = np.where(model.geom_matid >= 0, material_alpha, model.geom_rgba[:, 3])
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
-    # Bodies of many scenes have geoms to see and others to collide. Where nothing collides, what is seen is solid.
+    # Bodies of many scenes have some geoms to draw and others to collide. Without the latter, drawn geoms are solid.
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
-    looks = np.flatnonzero(shown & ~collides)
+    decor = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):
-        seen = bool(
-            shown[geom]
-            and not (collides[geom] and (alpha[geom] < _CLEAR or _covered(model, data, geom, looks)))
-        )
+        hidden = collides[geom] and (alpha[geom] < _CLEAR or _covered(model, data, geom, decor))
+        seen = bool(shown[geom] and not hidden)
         solid = bool(collides[geom] or (shown[geom] and not has_solid[geom]))
         surface = _surface(model, geom, pictures) if seen or solid else None
         if surface is not None:
             frame = np.eye(4)
             frame[:3, :3], frame[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
             loose = bool(model.body_weldid[bodies[geom]] != 0)
-            yield Piece(_name(model, geom), surface.moved(frame), seen, solid, loose)
+            yield ScenePiece(_name(model, geom), surface.moved(frame), seen, solid, loose)
 
 
 def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
-    """Whether a geom that is only seen covers one that collides: then that is not to be seen itself."""
+    """True if a geom that is only drawn covers a colliding one, which is then not drawn."""
     low, high = _extent(model, data, geom)
     for look in looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]].tolist():
         first, last = _extent(model, data, look)
@@ -167,7 +160,7 @@ def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
 
 
 def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
-    """Lower and upper corner of a box around a geom, m."""
+    """Lower and upper corner of a geom's bounding box, m."""
     rotation = data.geom_xmat[geom].reshape(3, 3)
     centre = data.geom_xpos[geom] + rotation @ model.geom_aabb[geom, :3]
     reach = np.abs(rotation) @ model.geom_aabb[geom, 3:]
@@ -177,16 +170,13 @@ def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
 def _name(model: Any, geom: int) -> str:
     root = int(model.body_rootid[model.geom_bodyid[geom]])
     mesh = int(model.geom_dataid[geom]) if model.geom_type[geom] == _GEOM.mjGEOM_MESH else -1
-    names = (
-        model.body(root).name if root else "",
-        model.geom(geom).name,
-        model.mesh(mesh).name if mesh >= 0 else "",
-    )
-    return next((name for name in names if name), f"geom {geom}")
+    body_name = model.body(root).name if root else ""
+    mesh_name = model.mesh(mesh).name if mesh >= 0 else ""
+    return body_name or model.geom(geom).name or mesh_name or f"geom {geom}"
 
 
 def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | None:
-    """A geom's surface in its own frame; None for what has none, such as a height field."""
+    """A geom's surface in its own frame; None if it has none, such as a height field."""
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
     picture = pictures.get(model.material(material).name) if material >= 0 else None
@@ -203,7 +193,7 @@ def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | 
     axis = np.abs(made.face_normals).argmax(axis=1)
     plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the axes along which a face lies
     places = surface.corners / sides
-    # A picture that does not repeat covers a side from edge to edge.
+    # A texture that does not repeat covers a side from edge to edge.
     uv = (np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) + 0.5) * picture.repeat
     return _painted(surface, uv, picture)
 
@@ -216,10 +206,8 @@ def _mesh(model: Any, mesh: int, colour: Floats, picture: _Picture | None) -> Su
     surface = primitive(trimesh.Trimesh(vertices, face, process=False), colour)
     if picture is None or model.mesh_texcoordadr[mesh] < 0:
         return surface
-    places = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :][
-        model.mesh_facetexcoord[start : start + faces]
-    ]
-    uv = places.astype(np.float64) * picture.repeat
+    places = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
+    uv = places[model.mesh_facetexcoord[start : start + faces]].astype(np.float64) * picture.repeat
     uv[..., 1] = 1.0 - uv[..., 1]  # MuJoCo counts from the top
     return _painted(surface, uv, picture)
 

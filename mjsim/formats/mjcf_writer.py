@@ -1,4 +1,4 @@
-"""Saving a composed house as plain MJCF that stock MuJoCo opens: one XML file and its assets beside it."""
+"""Export of a composed house as plain MJCF for stock MuJoCo: one XML file with its assets next to it."""
 
 import hashlib
 import xml.etree.ElementTree as ET
@@ -15,13 +15,13 @@ ASSETS = "assets"
 
 
 def export_house(scene: Scene, path: Path) -> None:
-    """Write the scene as a self-contained model, a file that ends in `.xml`, whose `qpos0` is the scene's.
+    """Write the scene as a self-contained model whose `qpos0` is the scene's state.
 
-    Meshes and textures are copied into the folder `assets` beside the file, named by their content, and referred to by
-    relative paths, so that the folder can be moved. The XML file is written last, atomically.
+    Meshes and textures are copied into the folder `assets` next to the file and named by their content. Paths are
+    relative, so the folder can be moved. The XML file is written last, atomically.
 
     Raises:
-        AssetError: The path does not end in `.xml`, or an asset file is gone.
+        AssetError: The path does not end in `.xml`, or an asset file is missing.
     """
     if path.suffix != ".xml":
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
@@ -41,7 +41,7 @@ def export_house(scene: Scene, path: Path) -> None:
 
 
 def _copy_asset(source: Path, folder: Path) -> str:
-    """Copy an asset file, named absolutely, and return its path relative to `folder`."""
+    """Copy an asset file. Return its path relative to `folder`."""
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -56,7 +56,7 @@ def _copy_asset(source: Path, folder: Path) -> str:
 
 
 def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
-    """Write the poses that `qpos0` comes from with all digits; MuJoCo writes six."""
+    """Write the poses that determine `qpos0` with all digits, because MuJoCo writes only six."""
     world = root.find("worldbody")
     for body in [] if world is None else _top_level_bodies(world):
         if body.find("joint") is not None or body.find("freejoint") is not None:
@@ -71,7 +71,7 @@ def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
 
 
 def _top_level_bodies(parent: ET.Element) -> list[ET.Element]:
-    """Bodies right below the world, through frames that do not move them."""
+    """Bodies directly below the world, including those in frames without a pose."""
     bodies = parent.findall("body")
     for frame in parent.findall("frame"):
         if not set(frame.attrib) & {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"}:

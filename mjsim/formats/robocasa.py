@@ -1,4 +1,4 @@
-"""Kitchen layouts of RoboCasa (YAML): walls, floors and fixtures as boxes; their meshes are not in the layouts."""
+"""Reader of RoboCasa's kitchen layouts (YAML): walls, floors and fixtures as boxes, since layouts have no meshes."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -11,13 +11,13 @@ import yaml
 from trimesh.transformations import rotation_matrix, translation_matrix
 
 from mjsim.formats.scene.mesh_files import primitive
-from mjsim.formats.scene.source_scene import HouseOptions, ImportDecision, Piece, SourceScene, left_out
+from mjsim.formats.scene.source_scene import HouseOptions, ImportDecision, ScenePiece, SourceScene, left_out
 from mjsim.formats.scene.surface import Floats
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
 SUFFIXES = (".yaml", ".yml")
-# Width, depth and height, m, where the layout leaves one to the mesh.
+# Width, depth and height, m, for fixtures whose layout leaves a side to the mesh.
 _SIZES = {
     "counter": (1.0, 0.65, 0.92),
     "stove": (0.76, 0.66, 0.92),
@@ -33,21 +33,25 @@ _SIZES = {
     "fridge_bottom_freezer": (0.78, 0.8, 1.75),
     "stool": (0.42, 0.42, 0.72),
     **dict.fromkeys(("stack", "box", "drawer"), (0.6, 0.6, 0.84)),
-    **dict.fromkeys(
-        (f"{kind}_cabinet" for kind in ("hinge", "single", "open", "panel", "housing")), (0.6, 0.4, 0.9)
-    ),
+    **dict.fromkeys(("hinge_cabinet", "single_cabinet", "open_cabinet"), (0.6, 0.4, 0.9)),
+    **dict.fromkeys(("panel_cabinet", "housing_cabinet"), (0.6, 0.4, 0.9)),
 }
 _COLOURS = {"counter": 0xD8D3C8, "wall": 0xEDE8DF, "floor": 0xB08D66, "steel": 0xA9AEB3, "wood": 0xC9B08C}
 _STEEL = ("stove", "oven", "microwave", "hood", "dishwasher", "fridge", "sink")
-_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")  # on walls
+_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")  # ignored, on walls
 _AXES = (("left", "right"), ("front", "back"), ("bottom", "top"))
-_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12  # m: below stacks; a worktop; of what is below it
-_SIDES = {"left": (0, -1), "right": (0, 1), "back": (1, 1), "front": (1, -1)}  # axis and way out of the room
-_WALL, _BACKING = 0.02, 0.1  # m, half of thicknesses that walls have
+_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12  # base of stacks, thickness of worktops, set-back below them, m
+_SIDES = {
+    "left": (0, -1),
+    "right": (0, 1),
+    "back": (1, 1),
+    "front": (1, -1),
+}  # axis and direction out of the room
+_WALL, _BACKING = 0.02, 0.1  # half thickness of walls, and of their backing, m
 
 
 def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a layout; `AssetError` where it is damaged, or has a fixture that is not known."""
+    """Read a layout. Raise `AssetError` if it is damaged or has an unknown fixture."""
     del options  # metres and z up
     try:
         layout = yaml.safe_load(read_text(path))
@@ -55,7 +59,7 @@ def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
         raise AssetError(brief(f"cannot read {path}: {error}; is it complete?")) from error
     if not isinstance(layout, dict) or "room" not in layout:
         raise AssetError(f"{path} is YAML without a room; give a kitchen layout of RoboCasa")
-    reader = _Reader()
+    reader = _LayoutReader()
     try:
         pieces = [piece for key, group in layout.items() for piece in reader.group(key, group)]
     except (AssetError, KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
@@ -64,19 +68,19 @@ def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
     return SourceScene(tuple(pieces), "RoboCasa layout", reader.notes())
 
 
-class _Reader:
+class _LayoutReader:
     def __init__(self) -> None:
-        self.name = ""  # of the fixture that is read
+        self.name = ""  # of the current fixture
         self._left_out: dict[str, int] = {}
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Notes about what is not read, and about what boxes stand for."""
+        """Notes about ignored fixtures and about boxes."""
         small = ", ".join(f"{n} {kind}" for kind, n in sorted(self._left_out.items()))
         boxes = ImportDecision("fixtures", "boxes", "the layout has sizes and places; meshes are RoboCasa's")
         return (boxes, left_out(small, "on walls and worktops")) if small else (boxes,)
 
-    def group(self, key: str, group: Mapping[str, Any]) -> Iterator[Piece]:
-        """Pieces of fixtures that stand together, in the frame of the kitchen."""
+    def group(self, key: str, group: Mapping[str, Any]) -> Iterator[ScenePiece]:
+        """Pieces of a group of fixtures, in the frame of the kitchen."""
         origin, place = ([*group.get(name, (0, 0)), 0] for name in ("group_origin", "group_pos"))
         turn = rotation_matrix(group.get("group_z_rot", 0.0), [0, 0, 1])
         frame = translation_matrix(place) @ turn @ translation_matrix(-np.array(origin, float))
@@ -89,7 +93,7 @@ class _Reader:
 
     def _fixture(
         self, fixture: dict[str, Any], known: dict[str, tuple[Floats, Floats]], frame: Floats, name: str
-    ) -> Iterator[Piece]:
+    ) -> Iterator[ScenePiece]:
         kind = fixture["type"]
         if kind in ("wall", "floor"):
             yield _box(name, kind, *_flat(fixture, kind), np.eye(4))
@@ -104,7 +108,7 @@ class _Reader:
         placed = "pos" in fixture or "align_to" in fixture
         centre = _centre(fixture, size, known)
         known[self.name] = centre, size
-        if not placed:  # until what it is built into is there
+        if not placed:  # it is drawn as part of the fixture that it is built into
             return
         if "z_rot" in fixture:
             spin = rotation_matrix(fixture["z_rot"], [0, 0, 1])
@@ -123,7 +127,7 @@ class _Reader:
 
 
 def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Width, depth and height, m."""
+    """Width, depth and height of a fixture, m."""
     size = list(_SIZES[kind])
     if kind == "housing_cabinet":
         inner, padding = known[fixture["interior_obj"]][1], fixture.get("padding") or [None] * 3
@@ -139,7 +143,9 @@ def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Float
 
 
 def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Its middle in the frame of its group, m: as given, or beside another fixture, flush with its faces."""
+    """Centre of a fixture in the frame of its group, m: as given, or next to another fixture and flush with
+    its faces.
+    """
     if "align_to" not in fixture:
         standing = (0.0, 0.0, size[2] / 2)
         given = fixture.get("pos") or [None] * 3
@@ -155,7 +161,7 @@ def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[
 
 
 def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
-    """Centre and size of a wall or a floor, m, whose place is that of its face towards the room."""
+    """Centre and size of a wall or a floor, m. The position in the layout is that of the face towards the room."""
     centre, half = np.array(fixture["pos"], float), np.array(fixture["size"], float)
     backing = bool(fixture.get("backing"))
     depth = half[2] + 2 * _WALL * backing
@@ -169,8 +175,8 @@ def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
     return centre, 2 * size
 
 
-def _counter(name: str, centre: Floats, size: Floats, frame: Floats) -> Iterator[Piece]:
-    """A worktop and what is below it, set back so that the fronts of cabinets are seen; one solid."""
+def _counter(name: str, centre: Floats, size: Floats, frame: Floats) -> Iterator[ScenePiece]:
+    """A worktop and the cabinet below, set back so that fronts are visible; together one solid."""
     yield _box(name, "counter", centre, size, frame, seen=False)
     top = np.array([0.0, 0.0, (size[2] - _TOP) / 2])
     yield _box(name, "counter", centre + top, np.array([*size[:2], _TOP]), frame, solid=False)
@@ -187,8 +193,8 @@ def _box(
     *,
     seen: bool = True,
     solid: bool = True,
-) -> Piece:
+) -> ScenePiece:
     key = kind if kind in _COLOURS else "steel" if kind.startswith(_STEEL) else "wood"
     colour = np.array([_COLOURS[key] >> shift & 255 for shift in (16, 8, 0)]) / 255
     mesh = trimesh.creation.box(size).apply_translation(centre).apply_transform(frame)
-    return Piece(name, primitive(mesh, colour), seen=seen, solid=solid)
+    return ScenePiece(name, primitive(mesh, colour), seen=seen, solid=solid)

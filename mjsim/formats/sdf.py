@@ -1,4 +1,4 @@
-"""SDF worlds (Gazebo): models with their links, poses, shapes and meshes; joints stand still."""
+"""Reader of SDF worlds (Gazebo): models with their links, poses, shapes and meshes. Joints do not move."""
 
 import os
 import re
@@ -15,8 +15,8 @@ from mjsim.formats.scene.mesh_files import PLAIN, primitive, read_parts
 from mjsim.formats.scene.source_scene import (
     HouseOptions,
     ImportDecision,
-    Missing,
-    Piece,
+    MissingFiles,
+    ScenePiece,
     SourceScene,
     left_out,
     numbers,
@@ -27,23 +27,23 @@ from mjsim.values.errors import AssetError
 
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
-_BUILT_IN = ("sun", "ground_plane")  # models of Gazebo
-_THIN = 0.002  # m, of planes
-_DEPTH = 20  # models within models
-_PLANE = 30.0  # m, greatest side of a plane
+_BUILT_IN = ("sun", "ground_plane")  # models that come with Gazebo
+_THIN = 0.002  # thickness of planes, m
+_DEPTH = 20  # greatest nesting of models
+_PLANE = 30.0  # greatest side of a plane, m
 
 
 def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a world or a model; `AssetError` where it is damaged, or names something that is not there."""
+    """Read a world or a model. Raise `AssetError` if it is damaged, or names a missing file."""
     root = _root(path)
-    reader = _Reader(path, options)
+    reader = _WorldReader(path, options)
     top = root.find("world")
     pieces = list(reader.models(root if top is None else top, np.eye(4), path.parent, 0, static=False))
     if not pieces:
         why = "give the world file of a house"
         if files := reader.missing.files:
             why = (
-                f"{len(files)} that it names are not there, such as {files[0]}: give their folder by --models"
+                f"{len(files)} of its files are missing, such as {files[0]}: pass their folder with --models"
             )
         raise AssetError(f"{path} has no model with a shape or a mesh; {why}")
     return SourceScene(tuple(pieces), "SDF world", (*reader.missing.notes(), *reader.unknown_kinds()))
@@ -51,22 +51,22 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where a link is."""
+    """Pose and owner of a link."""
 
-    name: str  # of the outermost model
+    name: str  # name of the outermost model
     frame: Floats  # (4, 4)
     folder: Path
     loose: bool
 
 
-class _Reader:
+class _WorldReader:
     def __init__(self, path: Path, options: HouseOptions) -> None:
         self._path = path
         near = [folder / name for folder in (path.parent, path.parent.parent) for name in ("", "models")]
         self._folders = [*options.models, *near]
         for variable in _VARIABLES:
             self._folders += [Path(part) for part in os.environ.get(variable, "").split(":") if part]
-        self.missing = Missing(options.skip_missing)
+        self.missing = MissingFiles(options.skip_missing)
         self._unknown: dict[str, int] = {}
         self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
 
@@ -78,28 +78,25 @@ class _Reader:
 
     def models(
         self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""
-    ) -> Iterator[Piece]:
-        """Pieces of all models in a world or a model; `name` is that of the outermost one."""
+    ) -> Iterator[ScenePiece]:
+        """Pieces of all models in a world or a model. `name` is that of the outermost model."""
         if depth > _DEPTH:
-            raise AssetError(
-                f"{self._path} includes models within models {_DEPTH} deep; does one include itself?"
-            )
+            raise AssetError(f"{self._path} nests models more than {_DEPTH} deep; does one include itself?")
         for element in parent.findall("include"):
             yield from self._included(element, frame, depth, static, name)
         for model in parent.findall("model"):
-            yield from self._model(
-                model, frame @ _pose(model, self._path, parent), folder, depth, static, name
-            )
+            placed = frame @ _pose(model, self._path, parent)
+            yield from self._model(model, placed, folder, depth, static, name)
 
     def _included(
         self, element: ET.Element, frame: Floats, depth: int, static: bool, name: str
-    ) -> Iterator[Piece]:
+    ) -> Iterator[ScenePiece]:
         uri = (element.findtext("uri") or "").strip()
         built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
-        if built_in == "ground_plane":  # it says where the floor is; the house gets one of its own
+        if built_in == "ground_plane":  # marks the height of the floor; the house gets a floor of its own
             ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
             surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
-            yield Piece(built_in, surface, seen=False, solid=False)
+            yield ScenePiece(built_in, surface, seen=False, solid=False)
         if built_in in _BUILT_IN:
             return
         found = self._find(uri, None)
@@ -117,15 +114,15 @@ class _Reader:
 
     def _model(
         self, model: ET.Element, frame: Floats, folder: Path, depth: int, static: bool, name: str
-    ) -> Iterator[Piece]:
+    ) -> Iterator[ScenePiece]:
         name = name or model.get("name", "model")
         static = static or _is_true(model.findtext("static"))
         for link in model.findall("link"):
             at = _Place(name, frame @ _pose(link, self._path, model), folder, not static)
             visuals = [s for v in link.findall("visual") for s in self._shape(v, at)]
             solids = [s for c in link.findall("collision") for s in self._shape(c, at)]
-            yield from (Piece(name, s, seen=True, solid=not solids, loose=at.loose) for s in visuals)
-            yield from (Piece(name, s, seen=not visuals, solid=True, loose=at.loose) for s in solids)
+            yield from (ScenePiece(name, s, seen=True, solid=not solids, loose=at.loose) for s in visuals)
+            yield from (ScenePiece(name, s, seen=not visuals, solid=True, loose=at.loose) for s in solids)
         yield from self.models(model, frame, folder, depth + 1, static=static, name=name)
 
     def _shape(self, element: ET.Element, at: _Place) -> Iterator[Surface]:
@@ -160,7 +157,7 @@ class _Reader:
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
-        """File or folder of a URI; None where it is missing and left out."""
+        """File or folder of a URI; None if it is missing and left out."""
         scheme, _, rest = uri.rpartition("://")
         if scheme.startswith("http"):  # Gazebo Fuel: the model may have been downloaded
             rest = rest.rstrip("/").rpartition("/")[2]
@@ -179,7 +176,7 @@ class _Reader:
 
 def _root(path: Path) -> ET.Element:
     try:
-        # Gazebo takes comments before the declaration.
+        # Gazebo accepts comments before the declaration.
         root = ET.fromstring(re.sub(r"<\?xml[^>]*\?>", "", read_text(path), count=1))
     except (OSError, UnicodeDecodeError, ET.ParseError) as error:
         raise AssetError(f"cannot read {path} as SDF: {error}; is it complete?") from error
@@ -197,7 +194,7 @@ def _model_file(folder: Path) -> Path:
         except (OSError, UnicodeDecodeError, ET.ParseError):
             named = []
         named.sort(key=lambda sdf: [int(n) for n in re.findall(r"\d+", sdf.get("version", ""))], reverse=True)
-        for sdf in named:  # the newest that is there
+        for sdf in named:  # the newest first
             if (file := folder / (sdf.text or "").strip()).is_file():
                 return file
     if (folder / "model.sdf").is_file():
@@ -206,13 +203,13 @@ def _model_file(folder: Path) -> Path:
 
 
 def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, depth: int = 0) -> Floats:
-    """Transform (4, 4) of an element's <pose>, x y z roll pitch yaw, to the frame of the model or link it is in.
+    """Transform (4, 4) of an element's <pose>, x y z roll pitch yaw, to the frame of its model or link.
 
     Args:
         element: A model, link, joint, ....
         path: The file, for errors.
-        model: Where what `relative_to` names is looked for.
-        depth: How many such names led here.
+        model: The element in which the target of `relative_to` is looked up.
+        depth: Number of `relative_to` followed so far.
     """
     pose = element.find("pose")
     attributes = {} if pose is None else pose.attrib
@@ -236,7 +233,7 @@ def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, dept
 
 
 def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
-    """A box, cylinder, ..., around the origin; None for what is not known."""
+    """A box, cylinder, ..., around the origin; None for an unknown shape."""
 
     def number(name: str, count: int = 1) -> Floats:
         return numbers((shape.findtext(name) or "").split(), count, path)

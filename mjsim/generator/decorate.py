@@ -1,22 +1,23 @@
-"""Hangs pictures, curtains and lamps, lays rugs, and puts radiators under windows."""
+"""Decoration: pictures, curtains, lamps, rugs, and radiators under windows."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.look import Look
 from mjsim.generator.furniture.piece import Piece, Spot, flattened, moved
-from mjsim.generator.space import BLINDS, WALL_GAP, Place, Space
-from mjsim.generator.values import BACK, SIDES, FloorPlan, Side, Window
+from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
+from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
-LOW = 1.15  # m: pictures hang over what is lower
-BESIDE_TILES = 0.3  # m between the tiles of a kitchen and a picture
-LAMPS_APART = 0.8  # m
-LARGE = 15.0  # m^2: the middle of a larger room looks bare without a large rug
-LONG = 2.0  # m: a stretch of wall that looks bare with nothing on it
-MOST_HUNG = 4  # on the walls of a room: every picture is a texture of its own
+LOW = 1.15  # height, m, up to which furniture has pictures above it
+BESIDE_TILES = 0.3  # distance from the tiles of a kitchen to a picture, m
+LAMPS_APART = 0.8  # least distance between lamps, m
+LARGE = 15.0  # area, m^2, from which a room looks bare without a large rug
+LONG = 2.0  # length, m, from which a stretch of wall looks bare with nothing on it
+MOST_HUNG = 4  # objects on the walls of a room; each picture has a texture of its own
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -40,42 +41,48 @@ _RUGS: dict[str, tuple[str, ...]] = {
 
 
 def decorate(
-    spaces: Sequence[Space], uses: Mapping[str, str], plan: FloorPlan, look: Look, seed: int
+    spaces: Sequence[Space], uses: Mapping[str, str], plan: HomePlan, look: Appearance, seed: int
 ) -> None:
-    """Add what is not furniture to all rooms; it takes no place from anybody but a radiator."""
+    """Add decoration to all rooms. Only radiators take up floor space."""
     for door in plan.doors:
         if door.is_front:
             space = next(s for s in spaces if s.room.key == door.rooms[0])
             mat = KINDS["door_mat"].make(stream(seed, "door_mat"), look)
             x, y = space.room.floor.along(door.side, door.center, door.center, 0.15, 0.15).center
-            space.stood.append((mat, Place(x, y, BACK[door.side], door.side, door.center)))
+            space.stood.append((mat, PiecePose(x, y, BACK[door.side], door.side, door.center)))
     for space in spaces:
         key, use = space.room.key, uses[space.room.key]
         for window in plan.windows_of(key):
-            _dress(space, window, use, look, stream(seed, "window", key, window.side, f"{window.center:.2f}"))
-        _lamps(space, look, stream(seed, "lamp", key))
-        _rug(space, use, look, stream(seed, "rug", key))
-        _walls(space, use, look, stream(seed, "wall", key))
+            _dress_window(
+                space, window, use, look, stream(seed, "window", key, window.side, f"{window.center:.2f}")
+            )
+        _hang_lamps(space, look, stream(seed, "lamp", key))
+        _lay_rug(space, use, look, stream(seed, "rug", key))
+        _hang_on_walls(space, use, look, stream(seed, "wall", key))
 
 
-def _at_wall(space: Space, side: Side, along: float) -> Place:
+def _overlap(a: Sequence[float], b: Sequence[float]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _at_wall(space: Space, side: Side, along: float) -> PiecePose:
     x, y = space.room.floor.along(side, along, along, 0.0, 0.0).center
-    return Place(x, y, BACK[side], side, along)
+    return PiecePose(x, y, BACK[side], side, along)
 
 
 def _tallest(space: Space, side: Side, start: float, end: float, deep: float) -> float:
-    """Height of the highest thing that stands along a stretch of a wall, m."""
+    """Height, m, of the tallest piece within `deep` of a stretch of a wall."""
     zone = space.room.floor.along(side, start, end, 0.0, deep)
     tops = [
         top
         for x0, y0, x1, y1, top in space.solids
-        if x0 < zone.x1 and zone.x0 < x1 and y0 < zone.y1 and zone.y0 < y1
+        if _overlap((x0, y0, x1, y1), (zone.x0, zone.y0, zone.x1, zone.y1))
     ]
     return max(tops, default=0.0)
 
 
-def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Generator) -> None:
-    """A radiator, and curtains or a blind."""
+def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng: np.random.Generator) -> None:
+    """Add a radiator, and curtains or a blind."""
     side, half = window.side, window.width / 2
     fit = (window.width, window.sill, window.top)
     low, high = space.room.floor.wall(side)
@@ -99,16 +106,12 @@ def _dress(space: Space, window: Window, use: str, look: Look, rng: np.random.Ge
         curtains = KINDS["curtains"].make(rng, look, smaller=int(beside > 0 or rng.random() < 0.25), fit=fit)
         space.stood.append((curtains, _at_wall(space, side, window.center)))
     elif rng.random() < 0.8:
-        space.stood.append(
-            (
-                KINDS[("blind", "roller_blind")[int(rng.integers(2))]].make(rng, look, fit=fit),
-                _at_wall(space, side, window.center),
-            )
-        )
+        blind = KINDS[("blind", "roller_blind")[int(rng.integers(2))]].make(rng, look, fit=fit)
+        space.stood.append((blind, _at_wall(space, side, window.center)))
 
 
-def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
-    """One lamp under the ceiling, two in a long room; none where one hangs over a table."""
+def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
+    """Hang a ceiling lamp, or two in a long room, away from lamps over tables."""
     floor = space.room.floor
     hanging = [
         moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
@@ -127,11 +130,11 @@ def _lamps(space: Space, look: Look, rng: np.random.Generator) -> None:
         else:
             y = floor.y0 + share * floor.depth
         if all(max(abs(x - u), abs(y - v)) > LAMPS_APART for u, v in hanging):
-            space.stood.append((lamp, Place(x, y, 0 if floor.width >= floor.depth else 1, None)))
+            space.stood.append((lamp, PiecePose(x, y, 0 if floor.width >= floor.depth else 1, None)))
 
 
-def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
-    """A rug on the largest free floor, or a mat before the bath."""
+def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
+    """Lay a rug on the largest free floor, or a mat in front of the bath."""
     lies = any(p.kind == "rug" for piece, _ in space.stood for p, *_ in flattened(piece))
     if use not in _RUGS or lies or (rng.random() > 0.85 and space.room.floor.area < LARGE):
         return
@@ -145,44 +148,41 @@ def _rug(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
         rug = KINDS[kind].make(rng, look, smaller=smaller, fit=fit)
         if kind == "bath_mat":
             baths = [(p, at) for p, at in space.stood if p.kind in ("bathtub", "shower")]
-            places = [Place(*_before(p, at), at.turns, None) for p, at in baths]
+            places = [PiecePose(*_before(p, at), at.turns, None) for p, at in baths]
         else:
-            places = _rug_places(space, rug)
+            places = _rug_poses(space, rug)
         for place in places:
             spot = _spot(rug, place)
-            if not any(
-                spot[0] < o[2] and o[0] < spot[2] and spot[1] < o[3] and o[1] < spot[3] for o in taken
-            ):
+            if not any(_overlap(spot, other) for other in taken):
                 space.stood.append((rug, place))
                 return
 
 
-def _spot(piece: Piece, place: Place) -> Spot:
+def _spot(piece: Piece, place: PiecePose) -> Spot:
     return moved((-piece.size[0] / 2, 0, piece.size[0] / 2, piece.size[1]), place.x, place.y, place.yaw)
 
 
-def _before(piece: Piece, place: Place) -> tuple[float, float]:
+def _before(piece: Piece, place: PiecePose) -> tuple[float, float]:
     spot = moved((0, piece.size[1] + 0.04, 0, piece.size[1] + 0.04), place.x, place.y, place.yaw)
     return spot[0], spot[1]
 
 
-def _rug_places(space: Space, rug: Piece) -> list[Place]:
-    """Where a rug fits into the room, the nearest to the middle first."""
+def _rug_poses(space: Space, rug: Piece) -> list[PiecePose]:
+    """Poses at which a rug fits into the room, those nearest to the middle first."""
     floor, found = space.room.floor, []
     for turns in (0, 1):
         w, d = (rug.size[0], rug.size[1]) if turns == 0 else (rug.size[1], rug.size[0])
-        xs = np.arange(floor.x0 + w / 2 + 0.12, floor.x1 - w / 2 - 0.12, 0.1)
-        ys = np.arange(floor.y0 + d / 2 + 0.12, floor.y1 - d / 2 - 0.12, 0.1)
-        for x in xs.tolist():
-            for y in ys.tolist():
-                away = abs(x - floor.center[0]) + abs(y - floor.center[1])
-                at = Place(x, y - d / 2, 0, None) if turns == 0 else Place(x + w / 2, y, 1, None)
-                found.append((round(away, 3), at.x, at.y, turns, at))
+        xs = np.arange(floor.x0 + w / 2 + 0.12, floor.x1 - w / 2 - 0.12, 0.1).tolist()
+        ys = np.arange(floor.y0 + d / 2 + 0.12, floor.y1 - d / 2 - 0.12, 0.1).tolist()
+        for x, y in itertools.product(xs, ys):
+            away = abs(x - floor.center[0]) + abs(y - floor.center[1])
+            at = PiecePose(x, y - d / 2, 0, None) if turns == 0 else PiecePose(x + w / 2, y, 1, None)
+            found.append((round(away, 3), at.x, at.y, turns, at))
     return [at for *_, at in sorted(found, key=lambda f: f[:4])]
 
 
-def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None:
-    """Something on each wall that has a free stretch, over low furniture where there is some."""
+def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
+    """Hang something on each wall with a free stretch, above low furniture if there is any."""
     kinds = _WALLS.get(use, ("picture", "picture", "wall_shelf", "picture"))
     if use in ("bedroom", "living_room"):
         kinds = ("picture", "wall_lamp", "picture", "wall_mirror")
@@ -192,9 +192,7 @@ def _walls(space: Space, use: str, look: Look, rng: np.random.Generator) -> None
         for side in (SIDES[i] for i in rng.permutation(4))
         for stretch in _stretches(space, side, *space.room.floor.wall(side))
     ]
-    found.sort(
-        key=lambda stretch: stretch[2] - stretch[1] < LONG
-    )  # long walls first: none of them stays bare
+    found.sort(key=lambda stretch: stretch[2] - stretch[1] < LONG)  # long ones first, so that none stays bare
     for side, start, end in found:
         if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
             continue
@@ -214,13 +212,13 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
     blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
     deep = space.room.floor.along(side, low, high, 0.0, 0.4)
     tiled = [
-        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles over worktops
+        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles above worktops
         for piece, at in space.stood
         for part in piece.parts
         if "kitchen" in piece.kind
     ]
     for x0, y0, x1, y1, top in (*space.solids, *tiled):
-        if top > LOW and x0 < deep.x1 and deep.x0 < x1 and y0 < deep.y1 and deep.y0 < y1:
+        if top > LOW and _overlap((x0, y0, x1, y1), (deep.x0, deep.y0, deep.x1, deep.y1)):
             apart = BESIDE_TILES if top == LOW + 1 else 0.05
             low_end, high_end = (x0, x1) if side in ("south", "north") else (y0, y1)
             blocked.append((low_end - apart, high_end + apart))
@@ -235,7 +233,7 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
 
 
 def _over(space: Space, side: Side, first: float, last: float) -> float:
-    """The middle of what stands at a wall, within limits, or the middle between them, m."""
+    """Position along a wall for a picture, m: above the middle of a piece, else midway between the limits."""
     for piece, place in space.stood:
         if place.side == side and piece.parts and first <= place.along <= last and piece.size[0] > 0.7:
             return place.along

@@ -1,4 +1,4 @@
-"""The files of a generated house: `house.xml`, `catalogue.toml` and the textures that were drawn for it."""
+"""The files of a generated house: MJCF, catalogue, recipe, and textures that were drawn for it."""
 
 import json
 import math
@@ -9,18 +9,21 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from mjsim.generator.palette import surfaces
+from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
-from mjsim.generator.values import Asset, FloorPlan, Furnishing
+from mjsim.generator.values import Asset, Furnishing
 
-STYLE = "houses/apartment"  # whose classes, materials, categories and objects generated houses use
+STYLE = "houses/apartment"  # its classes, materials, categories and objects are those of generated houses
 _ALWAYS = {
     "white",
     "ceiling",
     "shadow_box",
     "shadow_round",
     "shadow_edge",
-}  # of classes, and of drawn shadows
-_SHADOWS = 15.0  # m: a shorter range of shadows is finer, and speckles what is round
+}  # materials of classes and drawn shadows
+_SHADOWS = 15.0  # range of shadows, m; shorter ones are sharper but speckle round objects
+POINTS_PER_M2 = 0.32  # points for objects that fit into a furnished home, with a margin
+POINTS = (8, 40)  # least and most
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -45,38 +48,34 @@ _HEAD = """\
 """  # noqa: E501
 
 
-def write_files(
-    seed: int, name: str, label: str, plan: FloorPlan, furnishing: Furnishing, points: int, models: Path
-) -> Mapping[str, bytes]:
-    """Path in the house's folder -> content; the same bytes for the same arguments.
+def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping[str, bytes]:
+    """The files of a house by path, including its recipe; the same bytes in every process.
 
     Args:
-        seed: Of the house.
-        name: Of the MJCF model.
-        label: As people read it.
-        plan: Its rooms.
-        furnishing: What stands in them.
-        points: How many points for objects the house is meant to have.
+        recipe: The house.
+        furnishing: Its furniture.
         models: Folder of the models that come with the package.
     """
+    plan = recipe.plan
     world = "\n".join([*shell(plan), *_furniture(furnishing)])
     own = {asset.name: asset for placed in furnishing.placements for asset in placed.assets}
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     style = ET.parse(models / STYLE / "defaults.xml").getroot()
     house = _HEAD.format(
-        name=name,
+        name=f"generated_{recipe.seed}_{len(plan.rooms)}",
         x=round((x0 + x1) / 2, 3),
         y=round((y0 + y1) / 2, 3),
         extent=round(max(x1 - x0, y1 - y0) * 0.62, 3),
         clip=round(_SHADOWS / (max(x1 - x0, y1 - y0) * 0.62), 3),
         default=ET.tostring(style[0], encoding="unicode").strip(),
-        assets="\n".join(used_materials(world, surfaces(seed, plan), own.values(), models)),
+        assets="\n".join(used_materials(world, surfaces(recipe.seed, plan), own.values(), models)),
         world=world,
     )
     files = {
         "house.xml": house.encode(),
-        "catalogue.toml": _catalogue(label, plan, furnishing, points, models).encode(),
+        "catalogue.toml": _catalogue(recipe, furnishing, models).encode(),
+        RECIPE: recipe.encoded(),
     }
     for asset in own.values():
         if asset.image is not None:
@@ -102,30 +101,30 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
 
 
 def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
-    """The materials that are used, with their textures; those of the apartment only where nothing has their name."""
-    known: dict[tuple[str, str], ET.Element] = {}
-    for text in own:
-        _add(known, ET.fromstring(text))
+    """MJCF of the materials that a world uses, with their textures.
+
+    Materials of the apartment are used only for names that neither `own` nor `brought` define.
+    """
+    elements = [ET.fromstring(text) for text in own]
     for asset in brought:
         element = ET.fromstring(asset.xml)
         if asset.image is not None:
             element.set("file", f"{asset.name}.png")
-        _add(known, element)
+        elements.append(element)
+    known = {(element.tag, element.get("name", "")): element for element in elements}
     for element in ET.parse(models / STYLE / "materials.xml").getroot().iter():
         if element.tag in ("texture", "material"):
             known.setdefault((element.tag, element.get("name", "")), element)
     used = _ALWAYS | set(re.findall(r'material="([^"]+)"', world))
     materials = [known["material", name] for name in sorted(used) if ("material", name) in known]
     textures = sorted({texture for m in materials if (texture := m.get("texture"))})
-    elements = [known["texture", name] for name in textures if ("texture", name) in known]
-    return [ET.tostring(element, encoding="unicode").strip() for element in (*elements, *materials)]
+    images = [known["texture", name] for name in textures if ("texture", name) in known]
+    return [ET.tostring(element, encoding="unicode").strip() for element in (*images, *materials)]
 
 
-def _add(known: dict[tuple[str, str], ET.Element], element: ET.Element) -> None:
-    known[element.tag, element.get("name", "")] = element
-
-
-def _catalogue(label: str, plan: FloorPlan, furnishing: Furnishing, points: int, models: Path) -> str:
+def _catalogue(recipe: Recipe, furnishing: Furnishing, models: Path) -> str:
+    plan = recipe.plan
+    points = max(POINTS[0], min(POINTS[1], math.floor(POINTS_PER_M2 * plan.area)))
     source = tomllib.loads((models / STYLE / "catalogue.toml").read_text(encoding="utf-8"))
     mounts = {mount.receptacle: mount for mount in furnishing.mounts}
     categories = {k: c for k, c in source["categories"].items() if c["receptacle"] in mounts}
@@ -136,7 +135,7 @@ def _catalogue(label: str, plan: FloorPlan, furnishing: Furnishing, points: int,
         if key in mounts
     }
     tables = {
-        "house": {"label": label, "model": "house.xml", "points": points},
+        "house": {"label": f"House {recipe.seed}", "model": "house.xml", "points": points},
         "rooms": {room.key: room.label for room in plan.rooms},
         **{f"categories.{key}": entry for key, entry in categories.items()},
         **{f"receptacles.{key}": entry for key, entry in receptacles.items()},

@@ -1,4 +1,4 @@
-"""Puts furniture and bins into a floor plan, by rules: what a home must have first, then what rooms usually have."""
+"""Furniture and bins in a home plan, by rules: first required furniture, then default furniture."""
 
 import itertools
 import math
@@ -7,344 +7,290 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from mjsim.generator.decorate import decorate
+from mjsim.generator.default_furniture import (
+    BIN_ROOMS,
+    BIN_SIZES,
+    COOKING,
+    DEFAULTS,
+    DINING,
+    FALLBACKS,
+    FURNISHED_SHARES,
+    MAX_OF_KIND,
+    MAX_PLANTS,
+    PLANTS,
+    REQUIRED,
+    ROUNDS,
+    SHOWN_NAMES,
+    WORKING,
+)  # fmt: skip
+from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.look import Look, draw_look
-from mjsim.generator.furniture.piece import Mount as Holder
-from mjsim.generator.furniture.piece import Piece, flattened, moved
-from mjsim.generator.space import UNUSED, Place, Space
-from mjsim.generator.usual import LITTLE, MOST_PLANTS, MUSTS, OFTEN, PLANTS, ROUNDS, SHARES, USUAL
-from mjsim.generator.values import FloorPlan, Furnishing, Mount, Palette, Placement, Rectangle, Side
+from mjsim.generator.furniture.piece import Mount, Piece, flattened, moved
+from mjsim.generator.space import UNUSED, PiecePose, Space
+from mjsim.generator.values import BinPlacement, Furnishing, HomePlan, Palette, Placement, Rectangle, Side
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
-SIZES = 4  # a piece is made so often, each time smaller, for a lack of space
-BARE = 0.285  # of the floor: a home with less gets more
-LEAST, MOST = 0.26, 0.44  # of the floor: no home has less or more
-IN_VAIN = 4  # so many tries, and a room is left as it is
-ASIDE = ("wash_corner", "kitchenette")  # a screen hides a door beside it, and nobody wants a cooker there
+SIZES = 4  # how often a piece is made smaller to fit
+BARE = 0.285  # furnished share of the floor below which a home gets more furniture
+LEAST, MOST = 0.26, 0.44  # limits of the furnished share of the floor
+MAX_FAILURES = 4  # furniture that does not fit before a room is left as it is
+AWAY_FROM_DOORS = (
+    "wash_corner",
+    "kitchenette",
+)  # one has a screen that would hide a door, the other a cooker
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
-BINS = {  # receptacle -> width, depth, height, m, and the uses of rooms that it belongs to, the best first
-    "recycling_bin": (
-        0.48,
-        0.42,
-        0.5,
-        ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
-    ),
-    "laundry_hamper": (0.51, 0.51, 0.55, ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio")),
-    "toy_box": (
-        0.62,
-        0.47,
-        0.4,
-        ("child", "bedroom", "living_room", "studio", "hall", "office", "dining_room"),
-    ),
-    "bookshelf": (
-        0.9,
-        0.34,
-        0.75,
-        ("living_room", "studio", "office", "dining_room", "hall", "bedroom", "child"),
-    ),
-}
-COOKING = ("kitchen", "living_room", "studio", "dining_room")
-DINING = ("dining_room", "kitchen", "living_room", "studio")
-WORKING = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
 
 
-class Home:
+class FurnishedHome:
     """A home that is being furnished."""
 
-    def __init__(self, plan: FloorPlan, bins: Sequence[str], look: Look, seed: int, attempt: int) -> None:
-        self.plan, self.bins, self.look, self.attempt = plan, tuple(bins), look, attempt
-        self.seed = seed
+    def __init__(
+        self, plan: HomePlan, bins: Sequence[str], look: Appearance, seed: int, attempt: int
+    ) -> None:
+        self.plan, self.bins, self.look, self.seed, self.attempt = plan, tuple(bins), look, seed, attempt
         self.spaces = [
             Space.of(plan, room, stream(seed, "place", room.key, str(attempt))) for room in plan.rooms
         ]
         self.uses = {space.room.key: self._use(space) for space in self.spaces}
-        self.mounts: list[Mount] = []
+        self.mounts: list[BinPlacement] = []
         self.seats = 0
 
     def _use(self, space: Space) -> str:
-        """A room's use; a further bedroom may be a child's."""
         room = space.room
-        if (
-            room.use == "bedroom"
-            and room.key != "bedroom"
-            and stream(self.seed, "child", room.key).random() < 0.6
-        ):
-            return "child"
-        return room.use
+        is_further_bedroom = room.use == "bedroom" and room.key != "bedroom"
+        is_child = is_further_bedroom and stream(self.seed, "child", room.key).random() < 0.6
+        return "child" if is_child else room.use
 
     def rooms(self, uses: Iterable[str]) -> list[Space]:
-        """Rooms of the first use that there is, then those of the next."""
+        """The rooms with one of some uses, in the order of the uses."""
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
         self, space: Space, kind: str, *, largest: int = 0, smallest: int = SIZES - 1, number: int = 0
     ) -> bool:
-        """Put a piece of a kind into a room, smaller and smaller until it fits."""
+        """Put a piece of a kind into a room, as large as it fits. Return False if it does not fit."""
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
         for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
                 fit = (space.depth(sides[0]), 0.0, 0.0) if kind == "lounge" else None
                 piece = KINDS[kind].make(rng, self.look, smaller=smaller, fit=fit)
-                place = space.put(
-                    piece, sides, avoid=space.corners if kind in ASIDE and self.attempt < 3 else ()
-                )
-                if place is not None:
-                    self._note(space, piece, place)
+                avoid = space.corners if kind in AWAY_FROM_DOORS and self.attempt < 3 else ()
+                if (pose := space.put(piece, sides, avoid)) is not None:
+                    self._record(space, piece, pose)
                     return True
         return False
 
-    def _note(self, space: Space, piece: Piece, place: Place) -> None:
+    def _record(self, space: Space, piece: Piece, pose: PiecePose) -> None:
         self.seats += piece.seats
-        for holder in piece.mounts:
-            if holder.receptacle in self.bins and all(m.receptacle != holder.receptacle for m in self.mounts):
-                x, y, *_ = moved((*holder.position[:2], *holder.position[:2]), place.x, place.y, place.yaw)
-                turns = (place.turns + round((holder.yaw - math.pi) / (math.pi / 2))) % 4
-                where = _words(space, piece, holder.receptacle)
-                self.mounts.append(
-                    Mount(holder.receptacle, space.room.key, where, (x, y, holder.position[2]), turns)
-                )
+        for mount in piece.mounts:
+            key = mount.receptacle
+            if key in self.bins and all(placed.receptacle != key for placed in self.mounts):
+                x, y, *_ = moved((*mount.position[:2], *mount.position[:2]), pose.x, pose.y, pose.yaw)
+                turns = (pose.turns + round((mount.yaw - math.pi) / (math.pi / 2))) % 4
+                place, position = _describe_place(space, piece, key), (x, y, mount.position[2])
+                self.mounts.append(BinPlacement(key, space.room.key, place, position, turns))
 
     def put_bin(self, receptacle: str) -> bool:
-        """Put a bin that stands on the floor into the first room that has a place."""
-        if receptacle not in BINS:
+        """Put a bin that stands on the floor into the first room in which it fits."""
+        if receptacle not in BIN_SIZES:
             return any(mount.receptacle == receptacle for mount in self.mounts)
-        w, d, h, uses = BINS[receptacle]
+        w, d, h = BIN_SIZES[receptacle]
         rng = stream(self.seed, "bin", receptacle, str(self.attempt))
         builder = Builder(receptacle, rng, self.look)
         builder.shadow(w, (0, d))
-        holder = Holder(receptacle, (0.0, d / 2, 0.0))
-        piece = builder.piece((w, d, h), use=0.75, mounts=(holder,))
-        for space, beside_doors in itertools.product((*self.rooms(uses), *self.spaces), (False, True)):
-            place = space.put(piece, avoid=() if beside_doors else space.corners)
-            if place is not None:
-                self._note(space, piece, place)
+        piece = builder.piece((w, d, h), use=0.75, mounts=(Mount(receptacle, (0.0, d / 2, 0.0)),))
+        rooms = (*self.rooms(BIN_ROOMS[receptacle]), *self.spaces)
+        for space, beside_doors in itertools.product(rooms, (False, True)):
+            pose = space.put(piece, avoid=() if beside_doors else space.corners)
+            if pose is not None:
+                self._record(space, piece, pose)
                 return True
         return False
 
-    def must(self) -> None:
-        """What every home has; `HouseError` where something finds no place."""
+    def add_required_furniture(self) -> None:
+        """Add what every home has. Raise `HouseError` if something does not fit."""
         if not self.rooms(("bathroom", "shower_room")):
-            self._first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
+            self._put_first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
         cooking = next((space.room.use for space in self.rooms(COOKING)), "")
-        if not any(self._kitchen(space) for space in self.rooms((cooking,))):
-            self._first(("kitchenette",), (cooking,), "a kitchen")
-            self._first(("fridge",), (cooking, "utility"), "a fridge")
+        if not any(self._put_kitchen(space) for space in self.rooms((cooking,))):
+            self._put_first(("kitchenette",), (cooking,), "a kitchen")
+            self._put_first(("fridge",), (cooking, "utility"), "a fridge")
         for space in self.spaces:
-            musts = MUSTS.get(self.uses[space.room.key], ())
-            for i in space.rng.permutation(len(musts)) if self.attempt > 1 else range(len(musts)):
-                self._any(space, musts[i])
+            required = REQUIRED.get(self.uses[space.room.key], ())
+            for i in space.rng.permutation(len(required)) if self.attempt > 1 else range(len(required)):
+                self._put_any(space, required[i])
             if self.attempt < 3 and self.uses[space.room.key] in ("bedroom", "child", "studio"):
-                _ = (
-                    self.put(space, "wardrobe")
-                    if space.rng.random() < 0.6
-                    else self.put(space, "mirror_wardrobe")
-                )
-        self._first(("dining", "bar_table"), DINING, "a table")
-        late = self.attempt % 2
-        if not late:
-            self._lounge()
-        self._bins()
-        if late:
-            self._lounge()
-        self._seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
+                self.put(space, "wardrobe" if space.rng.random() < 0.6 else "mirror_wardrobe")
+        self._put_first(("dining", "bar_table"), DINING, "a table")
+        steps = [self._put_lounges, self._put_bins]
+        for step in steps[::-1] if self.attempt % 2 else steps:
+            step()
+        self._put_seats(sum(space.room.use in ("bedroom", "studio") for space in self.spaces) + 1)
 
-    def _bins(self) -> None:
+    def _put_bins(self) -> None:
         if "office_box" in self.bins:
-            self._first(("desk",), WORKING, "a desk")
+            self._put_first(("desk",), WORKING, "a desk")
         for receptacle in self.bins:
             if not self.put_bin(receptacle):
                 raise HouseError(f"no place for the bin {receptacle!r} in seed {self.seed}")
 
-    def _seats(self, wanted: int) -> None:
-        """More seats where there are too few."""
-        for number, space in enumerate(
-            2 * self.rooms(("living_room", "studio", "dining_room", "kitchen", "bedroom"))
-        ):
+    def _put_seats(self, wanted: int) -> None:
+        rooms = self.rooms(("living_room", "studio", "dining_room", "kitchen", "bedroom"))
+        for number, space in enumerate(2 * rooms):
             if self.seats < wanted:
                 self.put(space, "armchair", number=number)
         if self.seats < wanted:
-            raise HouseError(f"only {self.seats} of {wanted} seats found a place in seed {self.seed}")
+            raise HouseError(f"only {self.seats} of {wanted} seats fit in seed {self.seed}")
 
-    def _first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
-        """The first of some kinds that has a place, in the first such room of some uses."""
+    def _put_first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
+        """Put the first of some kinds that fits into the first room in which one fits."""
         for space in self.rooms(uses):
             if any(self.put(space, kind) for kind in kinds):
                 return
         raise HouseError(f"no place for {what} in seed {self.seed}")
 
-    def _kitchen(self, space: Space) -> bool:
-        """The longest run of kitchen units that has a place, straight or around a corner."""
+    def _put_kitchen(self, space: Space) -> bool:
+        """Put the longest kitchen that fits, straight or around a corner."""
         narrow = min(space.room.floor.width, space.room.floor.depth) < 2.3
         order = ["corner_kitchen", "straight_kitchen"][int(narrow or space.rng.random() < 0.4) :]
-        return any(
-            self.put(space, kind, largest=size, smallest=size) for size in range(SIZES + 2) for kind in order
-        )
+        choices = itertools.product(range(SIZES + 2), order)
+        return any(self.put(space, kind, largest=size, smallest=size) for size, kind in choices)
 
-    def _any(self, space: Space, kinds: Sequence[str]) -> None:
-        """One of some kinds, the first as often as not."""
-        order = (
-            [kinds[i] for i in space.rng.permutation(len(kinds))] if kinds[0] != kinds[-1] else list(kinds)
-        )
+    def _put_any(self, space: Space, kinds: Sequence[str]) -> None:
+        """Put one of some kinds, in random order."""
+        order = list(kinds)
+        if kinds[0] != kinds[-1]:
+            order = [kinds[i] for i in space.rng.permutation(len(kinds))]
         if not any(self.put(space, kind) for kind in order):
             raise HouseError(f"no place for {' or '.join(kinds)} in {space.room.key} of seed {self.seed}")
 
-    def _lounge(self) -> None:
-        """Seats before a television, or at least a sofa."""
+    def _put_lounges(self) -> None:
         for space in self.rooms(("living_room", "studio")):
-            small = space.room.floor.area < 9
-            if not (not small and self.put(space, "lounge", smallest=2)) and not self.put(space, "sofa"):
+            if space.room.floor.area >= 9 and self.put(space, "lounge", smallest=2):
+                continue
+            if not self.put(space, "sofa"):
                 self.put(space, "armchair")
 
-    def usual(self) -> None:
-        """What rooms usually have, until enough of the floor is furnished, and more where a home is still bare."""
+    def add_default_furniture(self) -> None:
+        """Furnish rooms until enough of their floor is covered, and add more if the home is still bare."""
         for space in self.spaces:
-            self._usual(space)
+            self._put_defaults(space)
         for space in self.spaces:
             if sum(s.area for s in self.spaces) < BARE * self.plan.area:
-                self._usual(space, again=1)
-            if all(piece.kind in BINS for piece, _ in space.stood):
-                _ = any(self.put(space, kind) for kind in LITTLE)
+                self._put_defaults(space, again=1)
+            if all(piece.kind in BIN_SIZES for piece, _ in space.stood):
+                _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """`HouseError` where a room is empty, or where too little or too much of the floor is furnished."""
+        """Raise `HouseError` if a room is empty, or too little or too much of the floor is furnished."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
         for space in self.spaces:
-            if not any(piece.parts and piece.kind not in BINS for piece, _ in space.stood):
-                raise HouseError(f"nothing finds a place in {space.room.key} of seed {self.seed}")
+            if not any(piece.parts and piece.kind not in BIN_SIZES for piece, _ in space.stood):
+                raise HouseError(f"nothing fits into {space.room.key} of seed {self.seed}")
 
-    def _usual(self, space: Space, again: int = 0) -> None:
+    def _put_defaults(self, space: Space, again: int = 0) -> None:
         use = self.uses[space.room.key]
         rng = stream(self.seed, "usual", space.room.key, *again * ["again"])
-        share = float(rng.uniform(*SHARES.get(use, (0.3, 0.38)))) + 0.1 * again
+        share = float(rng.uniform(*FURNISHED_SHARES.get(use, (0.3, 0.38)))) + 0.1 * again
         if again and use == "living_room" and space.share < share:
             self.put(space, "dining", number=100)
-        in_vain = 0
-        first, *others = USUAL.get(use, (((), 0.0),))
+        failures = 0
+        first, *others = DEFAULTS.get(use, (((), 0.0),))
         wishes = [first, *(others[i] for _ in range(ROUNDS) for i in rng.permutation(len(others)))]
         for number, (kinds, chance) in enumerate(wishes, 100 * again):
-            order = [kinds[i] for i in rng.permutation(len(kinds))][:IN_VAIN]
-            if (
-                rng.random() < chance
-                and (space.share < share or number == 0)
-                and in_vain < IN_VAIN * (1 + again)
-            ):
-                in_vain += not self._one_more(space, order, number, again)
+            order = [kinds[i] for i in rng.permutation(len(kinds))][:MAX_FAILURES]
+            is_wanted = rng.random() < chance and (space.share < share or number == 0)
+            if is_wanted and failures < MAX_FAILURES * (1 + again):
+                failures += not self._put_one_more(space, order, number, again)
 
-    def _one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
-        """The first of some kinds that has a place and is not yet there often enough; `more` than usual may be."""
+    def _put_one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
+        """Put the first of some kinds that fits and of which the room may have `more` than it has."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
-        if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MOST_PLANTS:
+        if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MAX_PLANTS:
             return False
         for kind in kinds:
-            often = OFTEN.get(kind, 1) + (kind not in UNUSED) * more
-            if there.count(kind) < often and self.put(space, kind, smallest=1, number=number):
+            most = MAX_OF_KIND.get(kind, 1) + (kind not in UNUSED) * more
+            if there.count(kind) < most and self.put(space, kind, smallest=1, number=number):
                 return True
         return False
 
     def furnishing(self) -> Furnishing:
-        """Everything that stands, hangs and lies."""
         placements = [
             placement
             for space in self.spaces
-            for piece, place in space.stood
-            for placement in placed(space.room.key, piece, place, self.look)
+            for piece, pose in space.stood
+            for placement in placed(space.room.key, piece, pose, self.look)
         ]
         return Furnishing(tuple(placements), tuple(self.mounts))
 
 
-def furnish(plan: FloorPlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
-    """Furniture, decoration and bins for a plan: the same for the same arguments, in any process.
+def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
+    """Place furniture, decoration and bins in a plan, the same for the same arguments in any process.
 
     Args:
         plan: Rooms, doors and windows.
         bins: Receptacles of the apartment's catalogue.
         palette: The colours of the home.
-        seed: Every room and purpose has its own stream of chance under it.
+        seed: Seed of the random streams, of which each room and purpose has its own.
 
     Raises:
-        HouseError: Something that a home must have finds no place.
+        HouseError: Something that a home must have does not fit. Another plan may do.
     """
-    return furnished(plan, bins, palette, seed).furnishing()
+    return furnish_home(plan, bins, palette, seed).furnishing()
 
 
-def furnished(plan: FloorPlan, bins: Sequence[str], palette: Palette, seed: int) -> Home:
-    """The home of `furnish`, with what stands in each room."""
-    look = draw_look(palette, stream(seed, "look"))
-    attempt = 0
-    while True:
-        home = Home(plan, bins, look, seed, attempt)
+def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
+    """Furnish a home as `furnish` does, and return it with the spaces of its rooms."""
+    look = draw_appearance(palette, stream(seed, "look"))
+    for attempt in range(ATTEMPTS):
+        home = FurnishedHome(plan, bins, look, seed, attempt)
         try:
-            home.must()
+            home.add_required_furniture()
+            break
         except HouseError:
-            attempt += 1
-            if attempt == ATTEMPTS:
+            if attempt == ATTEMPTS - 1:
                 raise
-        else:
-            home.usual()
-            decorate(home.spaces, home.uses, plan, look, seed)
-            home.check()
-            return home
+    home.add_default_furniture()
+    decorate(home.spaces, home.uses, plan, look, seed)
+    home.check()
+    return home
 
 
-def placed(room: str, piece: Piece, place: Place, look: Look) -> list[Placement]:
-    """A piece, or the members of a group, as the house is written."""
+def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[Placement]:
+    """The placements of a piece, or of the members of a group."""
     found = []
-    for member, x, y, yaw in flattened(piece, place.x, place.y, place.yaw):
+    for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
         turns = round(yaw / (math.pi / 2))
         turn = yaw - turns * math.pi / 2
-        spots = [moved(part.spot, x, y, yaw) for part in member.parts] if not member.members else []
-        rectangle = None
-        if spots:
-            corners = np.array(spots)
-            rectangle = Rectangle(*corners[:, :2].min(axis=0).tolist(), *corners[:, 2:].max(axis=0).tolist())
-        own = tuple(asset for picture in member.pictures for asset in picture.assets)
-        assets = (*look.of(member.geoms), *own)
-        found.append(
-            Placement(
-                member.kind,
-                room,
-                member.geoms,
-                (round(x, 4), round(y, 4), 0.0),
-                turns % 4,
-                rectangle,
-                assets,
-                0.0 if abs(turn) < 1e-9 else turn,
-            )
-        )
+        footprint = None
+        if member.parts and not member.members:
+            spots = np.array([moved(part.spot, x, y, yaw) for part in member.parts])
+            footprint = Rectangle(*spots[:, :2].min(axis=0).tolist(), *spots[:, 2:].max(axis=0).tolist())
+        own = [asset for picture in member.pictures for asset in picture.assets]
+        assets, position = (*look.assets_of(member.geoms), *own), (round(x, 4), round(y, 4), 0.0)
+        turn = 0.0 if abs(turn) < 1e-9 else turn
+        found.append(Placement(member.kind, room, member.geoms, position, turns % 4, footprint, assets, turn))
     return found
 
 
-def _words(space: Space, piece: Piece, receptacle: str) -> str:
-    """Where a bin is, as people read it."""
+def _describe_place(space: Space, piece: Piece, receptacle: str) -> str:
     if receptacle == "dish_bin":
         return "on the counter, beside the sink"
     if piece.kind == "desk":
         return "on the desk"
     spot = space.solids[-1]
     nearest = None
-    for other, place in space.stood[:-1]:
-        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), place.x, place.y, place.yaw)
-        gap = math.hypot(
-            max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
-        )
-        if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BINS:
+    for other, pose in space.stood[:-1]:
+        box = moved((-other.size[0] / 2, 0, other.size[0] / 2, other.size[1]), pose.x, pose.y, pose.yaw)
+        dx, dy = max(box[0] - spot[2], spot[0] - box[2], 0), max(box[1] - spot[3], spot[1] - box[3], 0)
+        gap = math.hypot(dx, dy)
+        if gap < 0.8 and (nearest is None or gap < nearest[0]) and other.kind not in BIN_SIZES:
             nearest = gap, other.kind
     if nearest is None:
         return "on the floor, against the wall"
-    return f"on the floor, by the {_NAMES.get(nearest[1], nearest[1].replace('_', ' '))}"
-
-
-_NAMES = {
-    "lounge": "sofa",
-    "dining": "dining table",
-    "straight_kitchen": "kitchen counter",
-    "corner_kitchen": "kitchen counter",
-    "kitchenette": "kitchen counter",
-    "double_bed": "bed",
-    "single_bed": "bed",
-}
+    return f"on the floor, by the {SHOWN_NAMES.get(nearest[1], nearest[1].replace('_', ' '))}"

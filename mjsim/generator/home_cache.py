@@ -1,4 +1,4 @@
-"""Generated homes as folders in the user's cache, each made once."""
+"""Generated homes as folders in the user's cache."""
 
 import dataclasses
 import functools
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-from mjsim.generator.files import STYLE
+from mjsim.generator.files import STYLE, house_files
 from mjsim.generator.recipe import Recipe, read_recipe
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.files import MAX_EXTENDS, base_of
@@ -17,20 +17,17 @@ from mjsim.support.files import digest_of, work_folder
 from mjsim.support.kernels import cache_base
 from mjsim.values.errors import HouseError
 
-# Modules outside the generator that a home follows from.
-_BESIDES = ("house/catalogue/generated_names.py", "support/random_streams.py")
-
 
 def load_catalogue(house: str = "apartment") -> Catalogue:
-    """Read and check the catalogue of a house, which is generated first if necessary.
+    """Read and check the catalogue of a house, generating the house first if necessary.
 
     Args:
-        house: Name of a folder under `models/houses`, the path of a `catalogue.toml` or its folder, the seed of
-            a generated house (`generated:7`, `generated:7?rooms=5`), or the path of its recipe.
+        house: Name of a folder under `models/houses`, path of a `catalogue.toml` or its folder, seed of a generated
+            house (`generated:7`, `generated:7?rooms=5`), or path of its recipe.
 
     Raises:
         AssetError: As by `Catalogue.read`.
-        HouseError: The house cannot be generated as asked.
+        HouseError: The house cannot be generated.
 
     Example:
         >>> len(load_catalogue("generated:11?rooms=2").rooms)
@@ -40,7 +37,7 @@ def load_catalogue(house: str = "apartment") -> Catalogue:
 
 
 def ensured(house: HouseRef, _depth: int = 0) -> HouseRef:
-    """Generate a home, or the one that a house extends, unless its files are there. Return the reference with them.
+    """Generate a home, or the home that a house extends, unless it is cached. Return the reference with its files.
 
     Raises:
         HouseError: The recipe is malformed or of another version, or the home cannot be generated or written.
@@ -52,20 +49,15 @@ def ensured(house: HouseRef, _depth: int = 0) -> HouseRef:
 
 
 def _generated_catalogue(house: HouseRef, models: Path) -> Path:
-    """The `catalogue.toml` of a home, generated if the cache does not have it."""
     made_of = read_recipe(Path(house.name)) if house.kind == "recipe" else parse_name(house.name)
     identity = made_of.encoded() if isinstance(made_of, Recipe) else house.name.encode()
     key = hashlib.sha256(identity + _digest(models).encode()).hexdigest()[:24]
     folder = cache_base() / "houses" / key
     if not (folder / CATALOGUE).is_file():
-        from mjsim.generator.generated import (  # OR-Tools takes a while to load
-            furnished,
-            generate,
-            house_files,
-        )
+        from mjsim.generator.generated import furnish_plan, generate  # OR-Tools takes a while to load
 
         if isinstance(made_of, Recipe):
-            recipe, furnishing = made_of, furnished(made_of.seed, made_of.plan)
+            recipe, furnishing = made_of, furnish_plan(made_of.seed, made_of.plan)
         else:
             recipe, furnishing = generate(made_of.seed, made_of.rooms)
         _write(folder, house_files(recipe, furnishing, models))
@@ -73,7 +65,7 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write all files at once. If another process was quicker, its folder stays."""
+    """Write all files atomically. If another process was quicker, its folder stays."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with work_folder(folder.parent) as work:
@@ -94,8 +86,8 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 @functools.cache
 def _digest(models: Path) -> str:
-    """Digest of everything that a home follows from, except its name."""
-    package = Path(__file__).parents[1]
+    """Digest of everything that homes depend on, except their names."""
+    random_streams = Path(__file__).parents[1] / "house" / "catalogue" / "generated_names.py"
     style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
-    code = digest_of(Path(__file__).parent, *(package / name for name in _BESIDES), *style)
+    code = digest_of(Path(__file__).parent, random_streams, *style)
     return code + version("ortools") + version("numpy")

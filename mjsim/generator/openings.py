@@ -1,4 +1,4 @@
-"""Doors, open leaves, the front door and windows of the rooms of a plan."""
+"""Doors with their open leaves, and windows, for the rooms of a plan."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from mjsim.generator.values import (
     SIDES,
     WALL,
     Door,
-    FloorPlan,
+    HomePlan,
     Leaf,
     Rectangle,
     Room,
@@ -21,17 +21,18 @@ from mjsim.generator.values import (
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
-CLEAR, CLEAR_FRONT = 0.92, 0.95  # m, width of doors
-WIDE_CLEAR = (1.4, 1.6, 1.8)  # m, of passages
-TOP, WIDE_TOP = 2.05, 2.2  # m
-JAMB = 0.12  # m of wall between an opening and a corner
-LEAF_DEPTH = 0.06  # m
-LEAST_GLASS = 1 / 10  # of the floor, in rooms that need daylight
-WINDOW_TOP = 2.2  # m
-BESIDE_SHOWER = 1.85  # m, least wall of a bathroom that has a window and room for a shower beside it
-NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1  # m
-SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # chances
-EXTRA_WAYS = (  # rooms between which there may be another way, which makes a loop
+# Lengths in m.
+CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear width of doors, and of the front door
+WIDE_CLEAR = (1.4, 1.6, 1.8)  # clear width of passages
+TOP, WIDE_TOP = 2.05, 2.2  # height of doors, and of passages
+JAMB = 0.12  # wall between an opening and a corner
+LEAF_DEPTH = 0.06
+LEAST_GLASS = 1 / 10  # window area by floor area, in rooms that need daylight
+WINDOW_TOP = 2.2
+BESIDE_SHOWER = 1.85  # least length of a bathroom wall with a window and a shower beside it
+NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1
+SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # probabilities
+EXTRA_WAYS = (  # rooms that a further door may connect, which makes a loop
     ("kitchen", "living_room"),
     ("dining_room", "living_room"),
     ("dining_room", "kitchen"),
@@ -43,8 +44,8 @@ EXTRA_WAYS = (  # rooms between which there may be another way, which makes a lo
 )
 
 
-def open_up(seed: int, programme: Programme, rooms: Sequence[Room], attempt: int = 0) -> FloorPlan:
-    """The rooms with doors and windows; `HouseError` where the front door or a window finds no wall."""
+def add_openings(seed: int, programme: Programme, rooms: Sequence[Room], attempt: int = 0) -> HomePlan:
+    """Add doors and windows to rooms. Raise `HouseError` if a required one does not fit."""
     rng = stream(seed, "openings", str(attempt))
     ways = [*programme.ways, *_extra_ways(programme, rooms, rng)]
     by_key = {room.key: room for room in rooms}
@@ -54,14 +55,14 @@ def open_up(seed: int, programme: Programme, rooms: Sequence[Room], attempt: int
         if door is not None:
             doors.append(door)
         elif way in programme.ways:
-            raise HouseError(f"a door finds no place between {way.a} and {way.b}")
-    plan = FloorPlan(tuple(rooms), tuple(doors), ())
+            raise HouseError(f"no place for a door between {way.a} and {way.b}")
+    plan = HomePlan(tuple(rooms), tuple(doors), ())
     plan = replace(plan, windows=tuple(w for room in rooms for w in _windows(plan, room, rng)))
     return replace(plan, doors=tuple(_with_leaves(plan, rng)))
 
 
 def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
-    """The side of `a` that meets `b`, and from where to where both floors reach."""
+    """The side of `a` that faces `b`, and the start and end of the wall that they share; None without one."""
     for side in SIDES:
         across = a.floor.along(side, *a.floor.wall(side), -2 * WALL, 0.0)
         if b.floor.overlaps(across) and not b.floor.overlaps(a.floor):
@@ -71,10 +72,10 @@ def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
     return None
 
 
-def portions(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[float, float, bool]]:
-    """A wall of a room as stretches (start, end, whether outside), from corner to corner of its cell.
+def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[float, float, bool]]:
+    """Divide a wall of a room into stretches (start, end, is_outside), from corner to corner of the room's cell.
 
-    A cell is a floor with half of the inner walls around it; the cells of a home leave no gaps.
+    A cell is a floor with half of the inner walls around it. The cells of a home leave no gaps.
     """
     start, end = (value + sign * WALL / 2 for value, sign in zip(room.floor.wall(side), (-1, 1), strict=True))
     cuts = []
@@ -106,7 +107,7 @@ def _extra_ways(programme: Programme, rooms: Sequence[Room], rng: np.random.Gene
 
 
 def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Generator) -> Door | None:
-    """A door that takes no other one's place, and comes near none where that can be."""
+    """A door that overlaps no other door and, if possible, is not close to one; None if there is none."""
     wall = shared_wall(a, b)
     if wall is None:
         return None
@@ -125,17 +126,17 @@ def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Gene
 
 
 def _front_door(room: Room, rooms: Sequence[Room], rng: np.random.Generator) -> Door:
-    """In an outer wall of the hub."""
+    """A front door in an outer wall of the hub."""
     reach = CLEAR_FRONT / 2 + JAMB + WALL / 2
     places = [
         (side, at)
         for side in SIDES
-        for low, high, is_outside in portions(room, side, rooms)
+        for low, high, is_outside in wall_stretches(room, side, rooms)
         if is_outside and high - low >= 2 * reach - 1e-6
         for at in (low + reach, (low + high) / 2, high - reach)
     ]
     if not places:
-        raise HouseError(f"the front door finds no place in {room.key}")
+        raise HouseError(f"no place for the front door in {room.key}")
     side, at = places[int(rng.integers(len(places)))]
     return Door((room.key,), side, round(at, 3), CLEAR_FRONT, TOP)
 
@@ -143,11 +144,9 @@ def _front_door(room: Room, rooms: Sequence[Room], rng: np.random.Generator) -> 
 def _apart(choices: Sequence[Door], rooms: Sequence[Room], doors: Sequence[Door]) -> Door | None:
     for depth in (0.7, 0.05):
         for choice in choices:
+            pairs = ((room, door) for room in rooms for door in doors if room.key in door.rooms)
             if not any(
-                _before(room, choice, depth).overlaps(_before(room, door, depth))
-                for room in rooms
-                for door in doors
-                if room.key in door.rooms
+                _before(room, choice, depth).overlaps(_before(room, door, depth)) for room, door in pairs
             ):
                 return choice
     return None
@@ -155,18 +154,17 @@ def _apart(choices: Sequence[Door], rooms: Sequence[Room], doors: Sequence[Door]
 
 def _before(room: Room, door: Door, depth: float) -> Rectangle:
     half = door.width / 2 + JAMB / 2
-    return room.floor.along(
-        door.side_in(room.key), door.center - half, door.center + half, -OUTER_WALL, depth
-    )
+    side = door.side_in(room.key)
+    return room.floor.along(side, door.center - half, door.center + half, -OUTER_WALL, depth)
 
 
-def _windows(plan: FloorPlan, room: Room, rng: np.random.Generator) -> list[Window]:
-    """Windows in its outer walls; enough glass where the room needs daylight, as far as there is wall."""
+def _windows(plan: HomePlan, room: Room, rng: np.random.Generator) -> list[Window]:
+    """Windows in the outer walls of a room, if possible with enough glass for daylight where the room needs it."""
     needs_light = NEEDS[room.key].daylight
     outer = [
         (side, low + WALL / 2, high - WALL / 2)
         for side in SIDES
-        for low, high, is_outside in portions(room, side, plan.rooms)
+        for low, high, is_outside in wall_stretches(room, side, plan.rooms)
         if is_outside
     ]
     outer.sort(key=lambda wall: wall[1] - wall[2])
@@ -187,12 +185,12 @@ def _windows(plan: FloorPlan, room: Room, rng: np.random.Generator) -> list[Wind
             if width < 0.55 or (not needs_light and free_high - free_low < BESIDE_SHOWER):
                 continue
             if not needs_light:
-                shift = round(shift)  # at one end, so that a shower finds a corner
+                shift = round(shift)  # at one end, which leaves a corner for a shower
             at = free_low + 0.2 + width / 2 + shift * (room_for - width)
             windows.append(Window(room.key, side, round(at, 3), round(width, 3), sill, WINDOW_TOP))
             break
     if needs_light and not windows:
-        raise HouseError(f"no window finds a place in {room.key}")
+        raise HouseError(f"no place for a window in {room.key}")
     return windows
 
 
@@ -205,8 +203,8 @@ def _sill(room: Room, rng: np.random.Generator) -> float:
     return low if room.use == "living_room" else USUAL_SILL
 
 
-def _free(plan: FloorPlan, room: Room, side: Side, low: float, high: float) -> Iterator[tuple[float, float]]:
-    """The stretches of a wall between its doors."""
+def _free(plan: HomePlan, room: Room, side: Side, low: float, high: float) -> Iterator[tuple[float, float]]:
+    """Stretches of a wall between its doors."""
     at = low
     doors = [door for door in plan.doors_of(room.key) if door.side_in(room.key) == side]
     for door in sorted(doors, key=lambda door: door.center):
@@ -216,8 +214,8 @@ def _free(plan: FloorPlan, room: Room, side: Side, low: float, high: float) -> I
     yield at, high
 
 
-def _with_leaves(plan: FloorPlan, rng: np.random.Generator) -> Iterator[Door]:
-    """The doors with leaves that stand open flat against a wall, where one is free of doors and windows."""
+def _with_leaves(plan: HomePlan, rng: np.random.Generator) -> Iterator[Door]:
+    """The doors, with a leaf if it can stand open against a wall, clear of doors and windows."""
     taken: list[Rectangle] = []
     for door in plan.doors:
         if door.is_front or door.height == WIDE_TOP:
@@ -234,7 +232,7 @@ def _with_leaves(plan: FloorPlan, rng: np.random.Generator) -> Iterator[Door]:
 
 
 def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
-    """Where a leaf of a room's door may stand: along the same wall, or along the next one at a corner."""
+    """Possible leaves of a door in one room: on either side of the door, and along the next wall at a corner."""
     floor, side, half = room.floor, door.side_in(room.key), door.width / 2
     low, high = floor.wall(side)
     left, right = door.center - half, door.center + half
@@ -250,17 +248,14 @@ def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
 
 
 def _from_corner(floor: Rectangle, side: Side, corner: Side, width: float) -> Rectangle:
-    """Along `side`, beginning at the wall `corner`."""
+    """The rectangle of a leaf along `side`, starting at the corner with the wall `corner`."""
     low, high = floor.wall(side)
-    at = (
-        (low + 0.03, low + 0.03 + width)
-        if corner in ("south", "west")
-        else (high - 0.03 - width, high - 0.03)
-    )
-    return floor.along(side, *at, 0.0, LEAF_DEPTH)
+    start = low + 0.03 if corner in ("south", "west") else high - 0.03 - width
+    end = low + 0.03 + width if corner in ("south", "west") else high - 0.03
+    return floor.along(side, start, end, 0.0, LEAF_DEPTH)
 
 
-def _fits(plan: FloorPlan, leaf: Leaf, own: Door, taken: Sequence[Rectangle]) -> bool:
+def _fits(plan: HomePlan, leaf: Leaf, own: Door, taken: Sequence[Rectangle]) -> bool:
     room = plan.room(leaf.room)
     inside, floor = room.floor, leaf.floor
     if floor.x0 < inside.x0 - 1e-6 or floor.y0 < inside.y0 - 1e-6:

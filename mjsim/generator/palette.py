@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from mjsim.generator.values import FloorPlan, Palette, Rgb, Room
+from mjsim.generator.values import HomePlan, Palette, Rgb, Room
 from mjsim.house.catalogue.generated_names import stream
 
 WET = ("bathroom", "shower_room", "utility")
-_WOODS: tuple[tuple[Rgb, ...], ...] = (  # of one home
+_WOODS: tuple[tuple[Rgb, ...], ...] = (  # each row for one home
     ((0.80, 0.58, 0.36), (0.93, 0.80, 0.60), (0.66, 0.46, 0.28)),
     ((0.50, 0.33, 0.22), (0.80, 0.58, 0.36), (0.38, 0.25, 0.17)),
     ((0.93, 0.80, 0.60), (0.93, 0.92, 0.89), (0.80, 0.58, 0.36)),
@@ -24,12 +24,14 @@ _PLANKS: tuple[Rgb, ...] = (
     (0.72, 0.66, 0.60),
     (0.76, 0.56, 0.38),
 )
-_GROUNDS: Mapping[str, Rgb] = {"damask": (0.95, 0.95, 0.95), "polka_dots": (0.98, 0.9, 0.72)}  # of wallpapers
-_HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # that walls and cloth are seen in
+_GROUNDS: Mapping[str, Rgb] = {
+    "damask": (0.95, 0.95, 0.95),
+    "polka_dots": (0.98, 0.9, 0.72),
+}  # mean colours of wallpapers
+_HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # of walls and cloth
 
 
 def draw_palette(seed: int) -> Palette:
-    """The colours of a seed's furniture."""
     rng = stream(seed, "palette")
     hue = _hue(rng)
     woods = _WOODS[int(rng.integers(len(_WOODS)))]
@@ -51,8 +53,8 @@ def draw_palette(seed: int) -> Palette:
     )
 
 
-def surfaces(seed: int, plan: FloorPlan) -> list[str]:
-    """MJCF materials `wall_<room>`, `wall_<room>_plain`, `floor_<room>`, of the front door, and `facade`."""
+def surfaces(seed: int, plan: HomePlan) -> list[str]:
+    """MJCF materials of a plan: facade, front door, and each room's floor and walls, with and without pattern."""
     rng = stream(seed, "surfaces")
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]
@@ -69,12 +71,11 @@ def surfaces(seed: int, plan: FloorPlan) -> list[str]:
 
 
 def rgba(colour: Rgb) -> str:
-    """An MJCF colour."""
+    """A colour in MJCF."""
     return " ".join(f"{value:.3f}" for value in colour) + " 1"
 
 
 def _wall(room: Room, hue: float, rng: np.random.Generator) -> Iterator[str]:
-    """Its walls, with a pattern where they have one, and without."""
     text = paper = ""
     colour = _colour(rng, hue + rng.uniform(-0.06, 0.06), (0.03, 0.22), (0.86, 0.97))
     if room.use in WET:

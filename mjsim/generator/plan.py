@@ -1,7 +1,7 @@
-"""Floor plans: rectangles on a grid that cover a rectangular or L-shaped outline, by a constraint solver.
+"""Room layouts by a constraint solver: rectangles on a grid that cover a rectangular or L-shaped outline.
 
-No objective: the first plan near the wanted areas will do, and variety comes from the programme. Time is counted in the
-solver's deterministic units, with one worker and a fixed seed, so that each process finds the same plan.
+There is no objective: any layout near the wanted areas is accepted, and variety comes from the programme. Solving time
+is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
 """
 
 import math
@@ -19,15 +19,18 @@ from mjsim.values.errors import HouseError
 
 GRID = 0.2  # m
 TRIES = 500  # programmes
-EFFORT = 0.025  # deterministic seconds of the solver for one programme: most that have a plan have it sooner
-SLACK, LARGE_SLACK = 0.25, 0.45  # share by which an area may differ from the wanted one; from nine rooms on
-LARGE = 9  # rooms
-VOID = 1.2  # m, least sides of the corner that an L-shaped outline lacks
+EFFORT = 0.025  # deterministic seconds for one programme; most layouts are found sooner
+SLACK, LARGE_SLACK = (
+    0.25,
+    0.45,
+)  # share by which an area may differ from the wanted one, in small and large homes
+LARGE = 9  # rooms from which a home is large
+VOID = 1.2  # least side of the corner that an L-shaped outline lacks, m
 
 
 @dataclass(frozen=True)
 class _Box:
-    """The solver's variables of a room, in cells of the grid."""
+    """The solver's variables of a rectangle, in cells of the grid."""
 
     low: tuple[Any, Any]
     high: tuple[Any, Any]
@@ -35,19 +38,18 @@ class _Box:
 
 
 def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tuple[Room, ...]]:
-    """The programme of a seed and its rooms on the floor; another `attempt` gives another plan.
+    """Draw the programme and the rooms of a seed. Each `attempt` gives another layout.
 
     Raises:
-        HouseError: No plan was found, or the number of rooms is out of range.
+        HouseError: No layout was found, or the number of rooms is out of range.
     """
     for number in range(TRIES):
         rng = stream(seed, "plan", str(rooms), str(attempt), str(number))
         programme = draw_programme(rooms, rng)
         if found := _solve(programme, rng):
-            return programme, tuple(
-                Room(key, use_of(key), NEEDS[key].label, floor) for key, floor in found.items()
-            )
-    raise HouseError(f"no floor plan of {rooms} rooms was found for seed {seed}; take another seed")
+            made = [Room(key, use_of(key), NEEDS[key].label, floor) for key, floor in found.items()]
+            return programme, tuple(made)
+    raise HouseError(f"no floor plan of {rooms} rooms was found for seed {seed}; use another seed")
 
 
 def _solve(programme: Programme, rng: np.random.Generator) -> Mapping[str, Rectangle] | None:
@@ -61,12 +63,10 @@ def _solve(programme: Programme, rng: np.random.Generator) -> Mapping[str, Recta
         width, depth = depth, width
     model = cp_model.CpModel()
     slack = SLACK if len(programme.areas) < LARGE else LARGE_SLACK
-    boxes = {
-        key: _add_room(
-            model, key, (area * (1 - slack), area * (1 + slack)), (width, depth), key == programme.hub
-        )
-        for key, area in programme.areas.items()
-    }
+    boxes = {}
+    for key, area in programme.areas.items():
+        limits = area * (1 - slack), area * (1 + slack)
+        boxes[key] = _add_room(model, key, limits, (width, depth), key == programme.hub)
     covered = list(boxes.values())
     if is_angular:
         covered.append(_add_void(model, rng, (width, depth)))
@@ -115,7 +115,7 @@ def _add_room(
     w, h = box.size
     gross = model.new_int_var(0, outline[0] * outline[1], "")
     model.add_multiplication_equality(gross, (w, h))
-    # Of the floor between the walls, in hundredths of a cell.
+    # Area of the floor between the walls, in hundredths of a cell.
     floor = 100 * gross - round(100 * WALL / GRID) * (w + h) + round(100 * (WALL / GRID) ** 2)
     cell = 100 / GRID**2
     model.add(floor >= math.ceil(cell * max(needs.area[0], area[0])))
@@ -132,7 +132,7 @@ def _add_room(
 
 
 def _add_void(model: Any, rng: np.random.Generator, outline: tuple[int, int]) -> _Box:
-    """The corner that an L-shaped outline lacks."""
+    """Add the corner that an L-shaped outline lacks."""
     box = _add_box(model, round(VOID / GRID), outline)
     for axis, at_end in enumerate(rng.random(2) < 0.5):
         if at_end:

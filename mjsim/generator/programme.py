@@ -1,4 +1,4 @@
-"""Which rooms a home has, how large they may be, and which of them lie side by side."""
+"""The programme of a home: its rooms, their wanted areas, and which of them doors connect."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from mjsim.values.errors import HouseError
 
 @dataclass(frozen=True)
 class RoomNeeds:
-    """What a room of some use needs; docs/generated-houses.md names the sources."""
+    """Requirements of a kind of room. The sources are in docs/generated-houses.md."""
 
     label: str
-    area: tuple[float, float]  # m2, least and most
-    side: float  # m, least
+    area: tuple[float, float]  # least and most, m^2
+    side: float  # shortest side, m
     aspect: float  # greatest ratio of the sides
-    daylight: bool  # whether it has an outer wall for a window
+    daylight: bool  # needs an outer wall with a window
 
 
 NEEDS: Mapping[str, RoomNeeds] = {
@@ -58,7 +58,8 @@ _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
     ),
 }
 _CORE = ("hall", "living_room", "kitchen", "bedroom", "bathroom")
-_MORE = {  # what larger homes have besides, and how usual it is
+# Further rooms of larger homes, and their weights in the draw.
+_MORE = {
     "bedroom_2": 3.0,
     "office": 2.0,
     "shower_room": 1.5,
@@ -67,13 +68,13 @@ _MORE = {  # what larger homes have besides, and how usual it is
     "utility": 1.2,
 }
 _LIVELY = ("living_room", "studio", "hall")
-HALL_PER_DOOR = (1.2, 1.9)  # m2
-DOOR, WIDE = 1.3, 2.0  # m of wall that two rooms share at least, for a door or an open passage
+HALL_PER_DOOR = (1.2, 1.9)  # m^2
+DOOR, WIDE = 1.3, 2.0  # length of shared wall needed for a door and for an open passage, m
 
 
 @dataclass(frozen=True)
 class Way:
-    """Two rooms with a way between them."""
+    """A door or passage that connects two rooms."""
 
     a: str
     b: str
@@ -81,30 +82,30 @@ class Way:
 
     @property
     def wall(self) -> float:
-        """How much wall they share at least, m."""
+        """Least length of the wall that the rooms share, m."""
         return WIDE if self.is_wide else DOOR
 
 
 @dataclass(frozen=True)
 class Programme:
-    """What a floor plan is drawn for."""
+    """Requirements of a floor plan."""
 
-    areas: Mapping[str, float]  # room key -> wanted area, m2
-    ways: tuple[Way, ...]  # these connect all rooms
+    areas: Mapping[str, float]  # wanted area by room key, m^2
+    ways: tuple[Way, ...]  # connect all rooms
     hub: str  # the room with the front door
 
 
 def use_of(key: str) -> str:
-    """What a room is for: its key without a number."""
+    """The use of a room: its key without a number."""
     return key.rstrip("0123456789").rstrip("_")
 
 
 def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
-    """Choose rooms, areas and ways; `HouseError` where the number of rooms is out of range."""
+    """Draw rooms, areas and ways. Raise `HouseError` if the number of rooms is out of range."""
     if not ROOMS[0] <= rooms <= ROOMS[1]:
         raise HouseError(f"a home of {rooms} rooms cannot be generated; ask for {ROOMS[0]} to {ROOMS[1]}")
     keys = _keys(rooms, rng)
-    # Neighbours in one home: all are rather large, or rather small.
+    # The rooms of a home tend to be large together, or small together.
     size = rng.uniform(0.1, 0.7) if rooms < 9 else rng.uniform(0.1, 0.4)
     areas = {}
     for key in keys:
@@ -112,7 +113,7 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
         areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
     hub = next(key for key in ("hall", *_LIVELY) if key in keys)
     ways = _ways(keys, hub, rng)
-    if hub == "hall":  # it is as long as its doors need
+    if hub == "hall":  # a hall is as large as its doors need
         doors = sum("hall" in (way.a, way.b) for way in ways)
         areas[hub] = float(np.clip(rng.uniform(*HALL_PER_DOOR) * doors, *NEEDS[hub].area))
     return Programme(areas, tuple(ways), hub)

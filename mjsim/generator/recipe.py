@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from mjsim.generator.values import FloorPlan
+from mjsim.generator.values import HomePlan
 from mjsim.house.catalogue.generated_names import PREFIX, GeneratedName, check_version
 from mjsim.support.files import read_bytes
 from mjsim.values.errors import HouseError
@@ -13,30 +13,24 @@ RECIPE = "recipe.json"
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A house as it is stored. The floor plan is part of it, since another solver may find another one.
-
-    Attributes:
-        version: Of the generator.
-        seed: Of the house.
-        plan: Its rooms, doors and windows.
-    """
+    """A stored house. The floor plan is part of it because another solver may find another plan for the seed."""
 
     version: int
     seed: int
-    plan: FloorPlan
+    plan: HomePlan
 
     @property
     def name(self) -> str:
-        """As which it is recorded."""
+        """Name under which the house is recorded."""
         return str(GeneratedName(self.seed, len(self.plan.rooms)))
 
     def encoded(self) -> bytes:
-        """JSON, the same bytes for the same recipe."""
+        """The recipe as JSON, the same bytes for equal recipes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Read a recipe; `HouseError` where it is none, or one of another version."""
+    """Read a recipe. Raise `HouseError` if it is not valid or of another version."""
     try:
         text = read_bytes(path)
         version = msgspec.json.decode(text, type=dict).get("version")
@@ -44,14 +38,12 @@ def read_recipe(path: Path) -> Recipe:
             check_version(version, str(path))
         return msgspec.json.decode(text, type=Recipe)
     except (OSError, msgspec.DecodeError) as error:
-        raise HouseError(
-            f"{path} is no recipe of a house: {error}; give one of mjsim house generate"
-        ) from error
+        raise HouseError(f"cannot read recipe {path}: {error}; make one with mjsim house generate") from error
 
 
-def floor_plan_of(model: Path) -> FloorPlan:
-    """The floor plan of a house by its MJCF file; `HouseError` where no recipe lies beside it."""
+def floor_plan_of(model: Path) -> HomePlan:
+    """Read the plan of a house from the recipe next to its MJCF file. Raise `HouseError` if there is none."""
     path = model.parent / RECIPE
     if not path.is_file():
-        raise HouseError(f"{model} has no floor plan beside it; only generated houses have one ({PREFIX}7)")
+        raise HouseError(f"{model} has no {RECIPE} next to it; only generated houses ({PREFIX}7) have one")
     return read_recipe(path).plan

@@ -1,18 +1,29 @@
-"""Floors, walls, ceilings, doors and windows of a floor plan as MJCF, in the classes of the apartment.
+"""MJCF of floors, walls, ceilings, doors and windows of a plan, in the classes of the apartment.
 
-Each room lines its side of a shared wall, so that both sides have their own colour; outer walls lie outside the rooms.
+Each room has its own half of a shared wall, in its own colour. Outer walls are outside the rooms.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mjsim.generator.openings import LEAF_DEPTH, NARROW_SILL, portions
+from mjsim.generator.openings import LEAF_DEPTH, NARROW_SILL, wall_stretches
 from mjsim.generator.palette import WET
-from mjsim.generator.values import HEIGHT, OUTER_WALL, SIDES, WALL, Door, FloorPlan, Leaf, Room, Side, Window
+from mjsim.generator.values import (
+    CEILING_HEIGHT,
+    OUTER_WALL,
+    SIDES,
+    WALL,
+    Door,
+    HomePlan,
+    Leaf,
+    Room,
+    Side,
+    Window,
+)
 
 HALF = WALL / 2
-TILED = NARROW_SILL  # m, the height of tiles on walls
+TILED = NARROW_SILL  # height of tiles on walls, m
 _NORMAL = {"south": "y", "north": "y", "east": "x", "west": "x"}
 _SHADOW_TURN = {"south": 0.0, "north": math.pi, "west": -math.pi / 2, "east": math.pi / 2}
 
@@ -25,27 +36,27 @@ class _Hole:
     top: float
 
 
-def shell(plan: FloorPlan) -> Iterator[str]:
-    """MJCF elements of the world body: a body and a site for each room, and what is seen outside."""
+def shell(plan: HomePlan) -> Iterator[str]:
+    """Yield MJCF elements of the world body: a body and a site for each room, and the view outside."""
     for room in plan.rooms:
         cell = room.floor.grown(HALF)
         (x, y), w, d = cell.center, cell.width / 2, cell.depth / 2
-        inside = "\n".join(_Walls(plan, room).elements())
+        inside = "\n".join(_RoomShell(plan, room).elements())
         yield (
             f'<body name="{room.key}/structure">\n{inside}\n'
             f'<geom name="{room.key}/floor" class="floor" material="floor_{room.key}" '
             f'pos="{_n(x)} {_n(y)} -0.05" size="{_n(w)} {_n(d)} 0.05"/>\n'
             f'<geom name="{room.key}/ceiling" class="ceiling" '
-            f'pos="{_n(x)} {_n(y)} {_n(HEIGHT + 0.05)}" size="{_n(w)} {_n(d)} 0.05"/>\n</body>'
+            f'pos="{_n(x)} {_n(y)} {_n(CEILING_HEIGHT + 0.05)}" size="{_n(w)} {_n(d)} 0.05"/>\n</body>'
         )
         yield f'<site name="room:{room.key}" class="room" pos="{_n(x)} {_n(y)} 1" size="{_n(w)} {_n(d)} 1"/>'
     yield from _outside(plan)
 
 
-class _Walls:
-    """The walls of one room, with what is in them."""
+class _RoomShell:
+    """The walls of one room with their doors and windows."""
 
-    def __init__(self, plan: FloorPlan, room: Room) -> None:
+    def __init__(self, plan: HomePlan, room: Room) -> None:
         self._plan, self._room = plan, room
         self._cells = [other.floor.grown(HALF) for other in plan.rooms]
         self._count = 0
@@ -54,14 +65,14 @@ class _Walls:
         for side in SIDES:
             holes = sorted(self._holes(side), key=lambda hole: hole.start)
             low, high = self._room.floor.wall(side)
-            for up, material in self._bands(
-                holes
-            ):  # the inner half, of one piece as far as its pattern goes on
+            for up, material in self._bands(holes):  # the inner half
                 yield from self._wall(side, (low - HALF, high + HALF), up, (0.0, HALF), material, holes)
-            for start, end, is_outside in portions(self._room, side, self._plan.rooms):
+            for start, end, is_outside in wall_stretches(self._room, side, self._plan.rooms):
                 if is_outside:
                     along = start - self._extension(side, start, -1), end + self._extension(side, end, 1)
-                    yield from self._wall(side, along, (0.0, HEIGHT), (HALF, OUTER_WALL), "facade", holes)
+                    yield from self._wall(
+                        side, along, (0.0, CEILING_HEIGHT), (HALF, OUTER_WALL), "facade", holes
+                    )
             yield from self._foot(side, holes)
         for window in self._plan.windows_of(self._room.key):
             yield from self._window(window)
@@ -79,17 +90,20 @@ class _Walls:
                 yield _Hole(w.center - w.width / 2, w.center + w.width / 2, w.sill, w.top)
 
     def _bands(self, holes: list[_Hole]) -> Iterator[tuple[tuple[float, float], str]]:
-        """From where to where each material goes up. Boxes begin their patterns in their own middles: tiles end below
-        windows, and wallpaper is where a wall has no opening, so that no seam is seen."""
+        """Heights (from, to) and material of each band of the walls.
+
+        A box's pattern begins in the middle of the box. To hide seams, tiles end below windows, and wallpaper is only
+        on walls without openings.
+        """
         paper = f"wall_{self._room.key}"
         if self._room.use in WET:
             yield (0.0, TILED), paper
-            yield (TILED, HEIGHT), f"{paper}_plain"
+            yield (TILED, CEILING_HEIGHT), f"{paper}_plain"
         else:
-            yield (0.0, HEIGHT), f"{paper}_plain" if holes else paper
+            yield (0.0, CEILING_HEIGHT), f"{paper}_plain" if holes else paper
 
     def _extension(self, side: Side, end: float, sign: int) -> float:
-        """How far an outer wall goes on at an end where the house has a corner."""
+        """Length by which an outer wall extends beyond an end, at a corner of the house, m."""
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]
@@ -117,7 +131,7 @@ class _Walls:
         self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
         material: str, holes: list[_Hole],
     ) -> Iterator[str]:  # fmt: skip
-        """What is left of a slab around holes."""
+        """The parts of a slab around holes."""
         at, end = along
         for hole in holes:
             if hole.end < at or hole.start > end or hole.bottom >= up[1] or hole.top <= up[0]:
@@ -134,7 +148,7 @@ class _Walls:
             yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
-        """Skirting, and the soft shadow where the wall meets the floor."""
+        """Skirting, and the soft shadow at the foot of the wall."""
         at, last = self._room.floor.wall(side)
         for hole in [*(hole for hole in holes if hole.bottom == 0), _Hole(last, last, 0, 0)]:
             start = at + 0.05 if at > self._room.floor.wall(side)[0] else at
@@ -162,12 +176,12 @@ class _Walls:
             bars.append(((window.center - 0.025, window.center + 0.025), (sill, top)))
         for along, up in bars:
             yield self._slab(side, along, up, (0.08, 0.15), "frame", "trim")
-        yield self._slab(
-            side, (left - 0.03, right + 0.03), (sill - 0.03, sill + 0.004), (-0.04, 0.15), "frame", "trim"
-        )  # its top lies above that of the wall below, or the two would flicker
+        # The sill ends a little above the wall below, so that the two do not flicker.
+        board = (left - 0.03, right + 0.03), (sill - 0.03, sill + 0.004)
+        yield self._slab(side, *board, (-0.04, 0.15), "frame", "trim")
 
     def _frame(self, door: Door) -> Iterator[str]:
-        """The half of a door's frame that this room sees."""
+        """The half of a door's frame on this room's side."""
         side, half = door.side_in(self._room.key), door.width / 2
         left, right, top, out = door.center - half, door.center + half, door.height, (-0.018, HALF)
         yield self._slab(side, (left - 0.06, left + 0.012), (0.0, top + 0.06), out, "frame", "trim")
@@ -197,8 +211,8 @@ class _Walls:
             yield self._slab(leaf.side, along, up, (-LEAF_DEPTH - 0.006, -LEAF_DEPTH), "door_panel", "trim")
 
 
-def _outside(plan: FloorPlan) -> Iterator[str]:
-    """What is seen through the windows: four panels that meet at the corners, where the picture goes on."""
+def _outside(plan: HomePlan) -> Iterator[str]:
+    """Four panels with the view outside, which meet at the corners."""
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3
@@ -215,5 +229,5 @@ def _outside(plan: FloorPlan) -> Iterator[str]:
 
 
 def _n(value: float) -> str:
-    """A number as short as it can be, to a tenth of a millimetre."""
+    """Format a number as short as possible, to a tenth of a millimetre."""
     return f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")

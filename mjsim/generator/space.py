@@ -1,4 +1,4 @@
-"""A room that is being furnished: where a piece can stand so that doors, windows and ways stay free."""
+"""A room that is being furnished: poses of pieces at which doors, windows and ways stay free."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -10,76 +10,75 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.generator.furniture.piece import Piece, Spot, moved
-from mjsim.generator.values import BACK, SIDES, FloorPlan, Room, Side
+from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
-BODY = 0.36  # m, radius of what has to come through: ways are twice as wide
-WIDTHS = (
-    0.25,
-    0.265,
-    0.28,
-    0.29,
-    0.3,
-)  # m, the same of people with the planner's clearance: no floor is shut off from
-# somebody whom others get past
-POCKET = 0.005  # m^2 of floor that do not count
-STEP = 0.1  # m, between the places that are tried along a wall
-BESIDE = 0.6  # m beside a door where no bin stands if there is another place
-DOORWAY = 1.0  # m in front of a door that stay free
-SNUG, APART = 0.09, 0.62  # m: gaps are at most, or at least, so wide, for nobody to be caught in them
-BEFORE_LEAF = 0.45  # m in front of a door leaf that stand free: it looks as if it could be closed
-WALL_GAP = 0.01  # m, behind furniture
-BEFORE_WINDOW = 0.6  # m, depth in which nothing is higher than the sill
-CURTAIN = 0.3  # m beside a window, the same
-LEAVES = 0.1  # m, the same where no curtains hang: leaves of plants reach over their parts
-BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms without curtains
-AROUND = 0.76  # m around what stands free
-NEAR = BODY + 0.15  # m from the middle of a body to a piece that somebody uses
+# Lengths in m.
+BODY = 0.36  # radius of the body for which ways must be wide enough
+# Radii of people of different size, with the planner's clearance. Each of them gets to all floor that it fits on.
+PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
+POCKET = 0.005  # largest area of unreachable floor that is ignored, m^2
+STEP = 0.1  # distance between the poses tried along a wall
+BESIDE = 0.6  # width beside a door that bins avoid if they can
+DOORWAY = 1.0  # depth of the floor in front of a door that stays free
+SNUG, APART = 0.09, 0.62  # gaps are at most, or at least, this wide, so that no person gets stuck in one
+BEFORE_LEAF = (
+    0.45  # depth of the free floor in front of a door leaf, so that it looks as if it could be closed
+)
+WALL_GAP = 0.01  # gap behind furniture
+BEFORE_WINDOW = 0.6  # depth in which nothing is higher than the sill
+CURTAIN = 0.3  # width beside a window in which nothing is higher than the sill
+LEAVES = 0.1  # the same without curtains, because leaves of plants reach beyond their parts
+BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms with blinds instead of curtains
+AROUND = 0.76  # free width around a free-standing piece
+NEAR = BODY + 0.15  # greatest distance from the middle of a body to a piece in use
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
-TRIES = 14  # places of a piece that are tried for free ways
-_CELL, _FINE = 0.05, 0.0125  # m, of the grids on which ways, and floor that is shut off, are looked for
+TRIES = 14  # poses of a piece whose ways are checked
+_CELL, _FINE = 0.05, 0.0125  # cells of the grids for ways, and for unreachable floor
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a piece stands in the house."""
+class PiecePose:
+    """Pose of a piece in the house."""
 
     x: float  # of the piece's origin, m
     y: float
     turns: int  # quarter turns
     side: Side | None  # the wall behind it
-    along: float = 0.0  # of its middle along this wall, m
+    along: float = 0.0  # position of its middle along this wall, m
 
     @property
     def yaw(self) -> float:
-        """Its rotation."""
         return self.turns * math.pi / 2
 
 
 @dataclass
 class Space:
-    """A room with what stands in it so far. Rectangles are x0, y0, x1, y1; solids have their height as the fifth."""
+    """A room with its pieces so far.
+
+    Rectangles are x0, y0, x1, y1; those of `solids` and `windows` have a height as their fifth number; all in m.
+    """
 
     room: Room
     rng: np.random.Generator
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    hit: list[Spot] = field(default_factory=list)  # what people bump into: less than the solids, under leaves
-    keep: list[Spot] = field(default_factory=list)  # no piece may stand there
-    use: list[Spot] = field(default_factory=list)  # as `keep`; somebody must be able to go there
-    near: list[Spot] = field(default_factory=list)  # solids that somebody must be able to come near to
+    hit: list[Spot] = field(default_factory=list)  # what people bump into: below leaves, less than the solids
+    keep: list[Spot] = field(default_factory=list)  # floor that stays free
+    use: list[Spot] = field(default_factory=list)  # floor that stays free and reachable
+    near: list[Spot] = field(default_factory=list)  # solids that people must get near to
     corners: list[Spot] = field(
         default_factory=list
-    )  # beside doors: who stands in one would reach around its frame
-    doors: list[tuple[float, float]] = field(default_factory=list)  # points within them
+    )  # beside doors, where a person would reach around the frame
+    doors: list[tuple[float, float]] = field(default_factory=list)  # a point in front of each door
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, from, to, lowest point
-    stood: list[tuple[Piece, Place]] = field(default_factory=list)
-    area: float = 0.0  # m^2 that furniture covers
+    stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
+    area: float = 0.0  # floor covered by furniture, m^2
 
     @classmethod
-    def of(cls, plan: FloorPlan, room: Room, rng: np.random.Generator) -> "Space":
-        """An empty room."""
+    def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
+        """The empty room."""
         space, floor = cls(room, rng), room.floor
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
@@ -108,30 +107,18 @@ class Space:
 
     @property
     def share(self) -> float:
-        """Share of the floor that is furnished."""
         return self.area / self.room.floor.area
 
     def depth(self, side: Side) -> float:
-        """From a wall to the one across, m."""
+        """Distance from a wall to the one opposite, m."""
         return self.room.floor.depth if side in ("south", "north") else self.room.floor.width
 
     def put(
-        self,
-        piece: Piece,
-        sides: Sequence[Side] = SIDES,
-        near: tuple[float, float] | None = None,
-        avoid: Sequence[Spot] = (),
-    ) -> Place | None:
-        """Put a piece at the best place; None where there is none.
-
-        Args:
-            piece: What shall stand.
-            sides: Walls that it may stand at.
-            near: A point, m, that it shall be near to.
-            avoid: Where it shall not stand.
-        """
+        self, piece: Piece, sides: Sequence[Side] = SIDES, avoid: Sequence[Spot] = ()
+    ) -> PiecePose | None:
+        """Put a piece at the best pose on one of some sides and off `avoid`. Return None if there is none."""
         free = piece.stands == "free"
-        places = self._free_places() if free else self._wall_places(piece, sides)
+        places = self._free_poses() if free else self._wall_poses(piece, sides)
         if not len(places):
             return None
         boxes, hits, uses = (
@@ -141,7 +128,7 @@ class Space:
         tops = np.array([part.top for part in piece.parts])
         ok = self._fits(boxes, tops, uses, free) & ~_overlap(boxes, np.array(avoid).reshape(-1, 4))
         fits = np.flatnonzero(ok)
-        scores = self._scores(boxes[fits], places[fits], near, free)
+        scores = self._scores(boxes[fits], free)
         best: list[int] = fits[np.argsort(-scores, kind="stable")[:TRIES]].tolist()
         for k in best:
             spots, hit, zones = ([_spot(box) for box in of[k].tolist()] for of in (boxes, hits, uses))
@@ -149,15 +136,20 @@ class Space:
             if self.connected(hit, zones, used):
                 self.near += used
                 x, y, turns, along = places[k].tolist()
-                place = Place(x, y, int(turns), None if free else SIDES[int(turns)], along)
+                place = PiecePose(x, y, int(turns), None if free else SIDES[int(turns)], along)
                 self.stand(piece, place, spots, zones, hit)
                 return place
         return None
 
     def stand(
-        self, piece: Piece, place: Place, spots: Iterable[Spot], zones: Iterable[Spot], hit: Iterable[Spot]
+        self,
+        piece: Piece,
+        place: PiecePose,
+        spots: Iterable[Spot],
+        zones: Iterable[Spot],
+        hit: Iterable[Spot],
     ) -> None:
-        """Note a piece that stands."""
+        """Record a piece that stands."""
         for spot, low, part in zip(spots, hit, piece.parts, strict=True):
             self.solids.append((*spot, part.top))
             self.hit.append(low)
@@ -165,8 +157,8 @@ class Space:
         self.use.extend(zones)
         self.stood.append((piece, place))
 
-    def _wall_places(self, piece: Piece, sides: Sequence[Side]) -> Floats:
-        """All places along walls: x, y, m, quarter turns, and where along the wall, m, shape (n, 4)."""
+    def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
+        """All poses along walls, shape (n, 4): x, y, m, quarter turns, and the position along the wall, m."""
         floor, half = self.room.floor, piece.size[0] / 2
         found = [np.empty((0, 4))]
         for side in sides:
@@ -186,15 +178,15 @@ class Space:
             found.append(rows)
         return np.concatenate(found)
 
-    def _free_places(self) -> Floats:
-        """All places on a grid, in two directions, as `_wall_places`; x and y are of the middle of the back edge."""
+    def _free_poses(self) -> Floats:
+        """All poses on a grid, in two directions, as from `_wall_poses`."""
         floor = self.room.floor
         xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
         grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
         return grid.reshape(-1, 4)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
-        """Which places (n) are free, by the boxes (n, k, 4) of the parts and the places of use (n, u, 4)."""
+        """Mask (n,) of the poses that are free, from boxes (n, k, 4) of the parts and places of use (n, u, 4)."""
         floor = self.room.floor
         slack = AROUND if free else -1e-6
         low, high = np.array([floor.x0, floor.y0]) + slack, np.array([floor.x1, floor.y1]) - slack
@@ -208,49 +200,38 @@ class Space:
             ok &= ~_overlap(boxes[:, tops > sill], np.array([zone]))
         return ok
 
-    def _scores(self, boxes: Floats, places: Floats, near: tuple[float, float] | None, free: bool) -> Floats:
-        """How good places are: snug or apart from what stands, near what they belong to, and some chance."""
+    def _scores(self, boxes: Floats, free: bool) -> Floats:
+        """Scores (n,) of poses: for gaps that are snug or wide, for a central place if free-standing, and at random."""
         floor = self.room.floor
-        score = 1.2 * self.rng.random(len(places))
-        if len(places) == 0:
+        score = 1.2 * self.rng.random(len(boxes))
+        if len(boxes) == 0:
             return score
-        walls = np.stack(
-            [
-                boxes[..., 0] - floor.x0,
-                boxes[..., 1] - floor.y0,
-                floor.x1 - boxes[..., 2],
-                floor.y1 - boxes[..., 3],
-            ],
-            -1,
-        )
+        low, high = np.array([floor.x0, floor.y0]), np.array([floor.x1, floor.y1])
+        walls = np.concatenate([boxes[..., :2] - low, high - boxes[..., 2:]], axis=-1)
         others = np.array(self.solids).reshape(-1, 5)[:, :4]
         away = np.maximum(others[:, :2] - boxes[:, :, None, 2:], boxes[:, :, None, :2] - others[:, 2:])
         gaps = np.concatenate([walls, np.hypot(*np.moveaxis(np.maximum(away, 0), -1, 0))], axis=-1)
         score -= 1.5 * ((gaps > SNUG) & (gaps < APART)).sum(axis=(1, 2))
-        if not free:
+        if free:
+            middle = (boxes[..., :2].min(axis=1) + boxes[..., 2:].max(axis=1)) / 2
+            score -= 0.5 * np.abs(middle - floor.center).sum(axis=1)
+        else:
             score += 0.7 * np.minimum((gaps <= SNUG).sum(axis=(1, 2)) - boxes.shape[1], 2)
-        if near is not None:
-            score -= 0.9 * np.hypot(*(places[:, :2] - near).T)
-        elif free:
-            middle = np.abs((boxes[..., :2].min(axis=1) + boxes[..., 2:].max(axis=1)) / 2 - floor.center).sum(
-                axis=1
-            )
-            score -= 0.5 * middle
         return np.asarray(score)
 
     def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
-        """Whether a body comes from each door to each place of use, near to what is used, and to all free floor.
+        """True if a body gets from each door to all places of use, used pieces and free floor.
 
         Args:
-            spots: Where something is to stand as well.
-            zones: Places of its use.
-            near: What of it is used.
+            spots: Rectangles of a further piece.
+            zones: Its places of use.
+            near: Those of its rectangles that a person must get near to.
         """
         floor, spots = self.room.floor, [*self.hit, *spots]
         _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
-        # Not around corners: there it would be farther away.
+        # Grown along one axis at a time, since a point off a corner would be farther away than NEAR.
         targets += [(_grown(spot, NEAR, 0), _grown(spot, 0, NEAR)) for spot in (*self.near, *near)]
         common: set[int] | None = None
         for boxes in targets:
@@ -263,14 +244,14 @@ class Space:
             if not common:
                 return False
         distance = self._distance(spots, _FINE)
-        for radius in (*WIDTHS, BODY):
+        for radius in (*PERSON_RADII, BODY):
             _, _, stats, _ = _islands(distance, radius)
             if (stats[1:, cv2.CC_STAT_AREA] > POCKET / _FINE**2).sum() > 1:
                 return False
         return True
 
     def _distance(self, spots: Iterable[Spot], cell: float) -> Any:
-        """How far cells are from the walls and from what stands in `spots`, m."""
+        """Distance, m, of each cell to the walls and to `spots`."""
         floor = self.room.floor
         nx, ny = math.ceil(floor.width / cell), math.ceil(floor.depth / cell)
         free = np.zeros((nx + 2, ny + 2), np.uint8)
@@ -287,7 +268,7 @@ def _islands(distance: Floats, radius: float) -> Any:
 
 
 def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
-    """Rectangles of a piece at each of n places, shape (n, k, 4)."""
+    """Rectangles of a piece at each of n poses, shape (n, k, 4)."""
     turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
     return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
 
@@ -302,7 +283,7 @@ def _spot(box: Sequence[float]) -> Spot:
 
 
 def _overlap(boxes: Floats, others: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Which of n places have a box (n, k, 4) within `margin` of one of the others (m, 4)."""
+    """Mask (n,) of the poses with a box (n, k, 4) within `margin` of one of the others (m, 4)."""
     if boxes.shape[1] == 0 or len(others) == 0:
         return np.zeros(len(boxes), bool)
     slack = 1e-6 - margin

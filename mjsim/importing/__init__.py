@@ -1,6 +1,6 @@
-"""Import of objects from mesh files, of houses from scenes of other simulators, and of episodes.
+"""Import of objects from mesh files, houses from other simulators, and episodes (docs/import.md).
 
-For users of `mjsim import` (docs/import.md); needs the extra `import`.
+Needs the extra `import`.
 """
 
 from importlib.util import find_spec
@@ -11,7 +11,7 @@ EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "P
 
 
 def require_extra() -> None:
-    """Check that the libraries of the extra are installed (else `AssetError`); trimesh loads some of them late."""
+    """Raise `AssetError` unless all libraries of the extra are installed. Some would fail only late, inside trimesh."""
     if missing := [name for name in EXTRA if find_spec(name) is None]:
         raise AssetError(
             f"importing needs {', '.join(missing)}: pip install 'mjsim[import]' adds what is missing"

@@ -1,7 +1,7 @@
-"""Reading of rearrangement episodes of others: which objects are out of place, and how far.
+"""Reader of rearrangement episodes of other benchmarks: misplaced objects, and their distance from their goals.
 
-RoomR (AI2-THOR rearrangement) has the poses at the start and at the goal; Housekeep has the receptacle on which each
-object lies and those on which it may.
+RoomR (AI2-THOR rearrangement) has poses at the start and at the goal. Housekeep has each object's receptacle and the
+receptacles where it belongs.
 """
 
 import gzip
@@ -10,7 +10,7 @@ import math
 import pickle  # nosec B403: read by an unpickler that allows no class
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -21,8 +21,10 @@ import numpy as np
 from mjsim.support.files import MAX_INPUT, read_bytes
 from mjsim.values.errors import EpisodeError, brief
 
-MOVED = 0.05  # m; RoomR's objects differ by less between two simulations of the same pose
-HOUSE = 60.0  # m; objects that fell out of the scene are farther away
+MOVED = (
+    0.05  # distance from which an object counts as moved, m; RoomR's poses vary by less between simulations
+)
+HOUSE = 60.0  # largest plausible distance, m; objects that fell out of the scene are farther away
 IN_PLACE, MISPLACED, OPENED = "in place", "misplaced", "opened"
 
 
@@ -34,8 +36,8 @@ class EpisodeObject:
     episode: str
     name: str
     kind: str
-    state: str  # `in place`, `misplaced` or `opened` (a drawer or a door that is open otherwise than wanted)
-    distance: float | None = None  # m over the floor to where it belongs; None if not misplaced or not known
+    state: str  # `in place`, `misplaced`, or `opened` for a drawer or door
+    distance: float | None = None  # horizontal distance to the goal, m; None if not misplaced or unknown
 
 
 class _Point(msgspec.Struct):
@@ -75,13 +77,12 @@ class _HousekeepFile(msgspec.Struct):
 
 
 class _NoClass(pickle._Unpickler):
-    """An unpickler for plain containers, numbers and strings.
+    """Unpickler that accepts only plain containers, numbers and strings.
 
-    It is the one in Python: that in C takes memory for as many values as the file claims to have.
+    It is the Python one, because the C one allocates memory for as many values as the file claims to have.
     """
 
     def find_class(self, module: str, name: str) -> NoReturn:
-        """Refuse every class and function."""
         raise EpisodeError(f"names {module}.{name}, and only plain lists, tables, numbers and text are read")
 
 
@@ -89,17 +90,13 @@ def read_episodes(path: Path) -> list[EpisodeObject]:
     """Read a file of RoomR (`.pkl`, `.pkl.gz`) or Housekeep (`.json`, `.json.gz`).
 
     Raises:
-        EpisodeError: The file cannot be read, is no such file, or holds a class; nothing of it is run.
+        EpisodeError: The file cannot be read, is not valid, or contains a class. No code from the file is run.
     """
     name = path.name.lower().removesuffix(".gz")
-    readers: dict[str, Callable[[bytes], list[EpisodeObject]]] = {
-        ".pkl": _read_roomr,
-        ".json": _read_housekeep,
-    }
-    reader = readers.get(Path(name).suffix)
+    reader = {".pkl": _read_roomr, ".json": _read_housekeep}.get(Path(name).suffix)
     if reader is None:
         raise EpisodeError(
-            f"{path} is of no kind that can be read; give .pkl.gz of RoomR or .json.gz of Housekeep"
+            f"cannot read {path}: unknown kind of file; use .pkl.gz of RoomR or .json.gz of Housekeep"
         )
     try:
         found = reader(_unzipped(path))
@@ -108,7 +105,7 @@ def read_episodes(path: Path) -> list[EpisodeObject]:
     except (EpisodeError, msgspec.ValidationError, msgspec.DecodeError) as error:
         raise EpisodeError(brief(f"{path}: {error}")) from error
     if not found:
-        raise EpisodeError(f"{path} holds no object; give a file with episodes")
+        raise EpisodeError(f"{path} has no objects; use a file with episodes")
     return found
 
 
@@ -131,9 +128,9 @@ def _unpickled(data: bytes) -> Any:
         return _NoClass(io.BytesIO(data)).load()
     except EpisodeError:
         raise
-    except Exception as error:  # a damaged or hostile pickle raises nearly anything
+    except Exception as error:  # damaged or hostile pickles raise errors of any type
         raise EpisodeError(
-            f"is no pickle of plain values ({type(error).__name__}); is it complete?"
+            f"not a pickle of plain values ({type(error).__name__}); is it complete?"
         ) from error
 
 
@@ -171,10 +168,7 @@ def _housekeep_objects(episode: _Housekeep) -> Iterator[EpisodeObject]:
     shape = len(episode.recs_pos), len(episode.objs_keys)
     try:
         start, end = (np.array(m, float).reshape(shape) for m in (episode.start_matrix, episode.end_matrix))
-        objects, receptacles = (
-            np.array(episode.objs_pos).reshape(-1, 3),
-            np.array(episode.recs_pos).reshape(-1, 3),
-        )
+        objects, receptacles = (np.array(p).reshape(-1, 3) for p in (episode.objs_pos, episode.recs_pos))
         columns = zip(episode.objs_keys, episode.objs_cats, objects, start.T, end.T, strict=True)
         for name, kind, position, where, right in columns:
             if not where.any() or where @ right:
@@ -194,5 +188,5 @@ def _distance(metres: float) -> float | None:
 
 
 def kind_of(name: str) -> str:
-    """A kind as words: `ButterKnife` and `butter_knife` give `butter knife`."""
+    """A kind in words: `ButterKnife` and `butter_knife` give `butter knife`."""
     return " ".join(re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)).lower()

@@ -22,7 +22,7 @@ from hud.state import BinEntry
 from hud.text import Typeface
 from hud.texts import HudTexts
 from hud.theme import ITEM
-from mjsim.generator.furnish import _NAMES
+from mjsim.generator.default_furniture import SHOWN_NAMES
 from mjsim.generator.furniture.catalogue import KINDS as FURNITURE
 from mjsim.generator.programme import NEEDS
 from mjsim.house.catalogue.catalogue import Catalogue
@@ -113,7 +113,7 @@ def test_an_unknown_language_is_refused_with_those_that_there_are():
 
 def generated_labels():
     """All labels and places that the generator of homes writes, but those of the apartment."""
-    furniture = {_NAMES.get(kind, kind.replace("_", " ")) for kind in FURNITURE}
+    furniture = {SHOWN_NAMES.get(kind, kind.replace("_", " ")) for kind in FURNITURE}
     rooms = {needs.label for needs in NEEDS.values()}
     return (
         rooms

@@ -1,1 +1,1 @@
-"""Houses as files that other programs draw: GLB (binary glTF 2.0), WebP and JSON."""
+"""Houses and scenes as glTF, with WebP textures and JSON."""

@@ -1,4 +1,4 @@
-"""Scene files on disk: each made once, whole or not at all, and compressed beforehand."""
+"""Cache of compressed scene files on disk."""
 
 import fcntl
 import gzip
@@ -20,22 +20,22 @@ from mjsim.support.files import WORK, replacing, source_digest, work_folder
 from mjsim.support.kernels import UNUSED
 
 _LEVEL = 9
-_COMPRESSED = (".webp",)  # endings of files that are so already
+_COMPRESSED = (".webp",)  # suffixes of files that are already compressed
 
 
 def scene_hash(catalogue: Catalogue) -> str:
-    """20 hex digits over all that the files of a scene follow from: the house, and what makes them."""
+    """Hash (20 hex digits) of all that scene files depend on: the house and the code that writes them."""
     parts = (catalogue.content, source_digest("mjsim"), mujoco.__version__, cv2.__version__)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
 
 def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
-    """The folder with the files of a house, in `folder`, named by their hash; they are made unless they are there.
+    """Write the files of a house into a folder named by their hash, unless it exists. Return that folder.
 
-    What can be compressed is stored as `NAME.gz` alone. A process that needs files which another one is making waits.
+    Compressible files are stored only as `NAME.gz`. If another process is writing the same files, wait for it.
 
     Raises:
-        AssetError: As `export_scene`.
+        AssetError: As by `export_scene`.
         OSError: The files cannot be written.
     """
     target = folder / scene_hash(catalogue)
@@ -45,15 +45,15 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
             if not target.is_dir():
                 _delete_unused(folder)
                 _make(catalogue, folder, target)
-    os.utime(target)  # in use
+    os.utime(target)  # marks it as used
     return target
 
 
 def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
-    """The file in the folder `scene` with the walking kernel's floor for a trunk of this radius, m; made if need be.
+    """Write the walking kernel's floor for a trunk of this radius, m, unless it exists. Return its file name.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     name = f"floor-{body_radius!r}.json"
     path = scene / f"{name}{GZIP}"
@@ -82,7 +82,7 @@ def _compressed(content: bytes) -> bytes:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """One process at a time makes scenes in a folder."""
+    """Let one process at a time write scenes into a folder."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)

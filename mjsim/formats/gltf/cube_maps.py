@@ -1,4 +1,4 @@
-"""Cube textures, which glTF does not know: triangles are cut where the cube's faces meet and laid out on one image."""
+"""Cube textures, which glTF lacks: triangles are cut along the cube's edges and mapped to one image of its faces."""
 
 import itertools
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from mjsim.formats.gltf.shapes import Floats, Indices, Shape
 
-FACES = 6  # +x, -x, +y, -y, +z, -z below each other in an image
-_MAX_SHIFT = 0.015  # of the image in the middle of an edge, as a share of a face
-_MAX_CUTS = 4  # of each edge in halves
-_EDGE = 1e-6  # share of a direction's length within which it lies on an edge of the cube
-# By face: axes and signs of the directions in which a face's columns and rows run, as OpenGL has them.
+FACES = 6  # +x, -x, +y, -y, +z, -z, stacked in an image in this order
+_MAX_SHIFT = 0.015  # greatest shift of the image in the middle of an edge, as a share of a face
+_MAX_CUTS = 4  # how often each edge is halved at most
+_EDGE = 1e-6  # tolerance for directions on an edge of the cube, as a share of their length
+# For each face, axis and sign of the directions of its columns and rows, as in OpenGL.
 _COLUMNS = ((2, -1.0), (2, 1.0), (0, 1.0), (0, 1.0), (0, 1.0), (0, -1.0))
 _ROWS = ((1, -1.0), (1, -1.0), (2, 1.0), (2, -1.0), (1, -1.0), (1, -1.0))
 
 
 def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
-    """A shape whose `uv` shows a cube texture that surrounds it.
+    """A shape with `uv` for a cube texture that surrounds it.
 
     Args:
-        shape: Triangles; the direction of a vertex from the cube's centre is `unscaled * scale`.
+        shape: Triangles. The direction of a vertex from the cube's centre is `unscaled * scale`.
         scale: Factors (3,).
-        side: Width of a face, px.
-        faces: How many faces the image holds: 6, or 1 that shows on all sides.
+        side: Width of a face in pixels.
+        faces: Number of faces in the image: 6, or 1 that is shown on all sides.
     """
     directions = shape.unscaled * scale
     corners = np.concatenate((shape.positions, shape.normals, directions), axis=1)[shape.triangles]
@@ -33,7 +33,7 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
         corners = _halved(corners)
     face = _faces_of(corners)
     uv = _coordinates(corners[..., 6:], face)
-    inset = 0.5 / side  # of the texture's filter, so that other faces do not shine through
+    inset = 0.5 / side  # for the texture filter, so that no other face is blended in
     uv = np.clip(uv, inset, 1.0 - inset)
     if faces > 1:
         uv[..., 1] = (uv[..., 1] + face[:, None]) / faces
@@ -41,13 +41,13 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
 
 
 def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
-    """Triangles (t, 3, k) cut where column i equals `sign` times column j."""
+    """Cut triangles (t, 3, k) where column i equals `sign` times column j."""
     values = corners[..., i] - sign * corners[..., j]
     values[np.abs(values) <= _EDGE * np.linalg.norm(corners[..., 6:], axis=-1)] = 0.0
     crossing = (values.min(axis=1) < 0.0) & (values.max(axis=1) > 0.0)
     pieces = [corners[~crossing]]
     corners, values = corners[crossing], values[crossing]
-    # Turned so that the first corner lies alone on its side, or on the line between the other two.
+    # Rotate the corners so that the first is alone on its side of the cut, or on the cut between the other two.
     signs = np.sign(values)
     alone = np.where(
         (signs == 0.0).any(axis=1),
@@ -67,13 +67,13 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
 
 
 def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
-    """Where values that are `at` (t,) at the points `a` (t, k), and `bt` at `b`, are zero."""
+    """The points (t, k) where values are zero that are `at` (t,) at the points `a` (t, k) and `bt` at `b`."""
     share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
     return a + share * (b - a)
 
 
 def _halved(corners: Floats) -> Floats:
-    """Triangles with those cut into four on which the image would be shifted."""
+    """Triangles, each cut into four where linear interpolation would shift the image by more than `_MAX_SHIFT`."""
     after = np.roll(corners, -1, axis=1)
     face = _faces_of(corners)
     ends = _coordinates(corners[..., 6:], face), _coordinates(after[..., 6:], face)
@@ -90,7 +90,7 @@ def _triangles(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _faces_of(corners: Floats) -> Indices:
-    """The face of the cube that each triangle lies on, (t,)."""
+    """Face of the cube for each triangle, (t,)."""
     middle = corners[..., 6:].mean(axis=1)
     axis = np.abs(middle).argmax(axis=1)
     is_negative = np.take_along_axis(middle, axis[:, None], axis=1)[:, 0] < 0.0
@@ -98,7 +98,7 @@ def _faces_of(corners: Floats) -> Indices:
 
 
 def _coordinates(directions: Floats, face: Indices) -> Floats:
-    """Columns and rows (t, 3, 2), 0 to 1, on the face that each triangle lies on."""
+    """Columns and rows (t, 3, 2) on each triangle's face, from 0 to 1."""
     axes = np.array([(column[0], row[0]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     signs = np.array([(column[1], row[1]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     depth = np.abs(np.take_along_axis(directions, (face // 2)[:, None, None], axis=2))
@@ -107,7 +107,7 @@ def _coordinates(directions: Floats, face: Indices) -> Floats:
 
 
 def _joined(corners: Floats, uv: Floats) -> Shape:
-    """Triangles (t, 3, 9) with texture coordinates (t, 3, 2) as a shape, vertices that agree taken once."""
+    """Triangles (t, 3, 9) with texture coordinates (t, 3, 2) as a shape without duplicate vertices."""
     rows = np.concatenate((corners, uv), axis=2).reshape(-1, 11)
     _, first, index = np.unique(rows.round(9), axis=0, return_index=True, return_inverse=True)
     rows = rows[first]

@@ -1,4 +1,4 @@
-"""The files of a house from which a client draws: the house, its object models, the person, and what joins them."""
+"""Export of a house for other renderers: the house, its object models, the person, and a JSON file that joins them."""
 
 import json
 import re
@@ -10,14 +10,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjsim.formats.gltf import textures
 from mjsim.formats.gltf.cube_maps import FACES
-from mjsim.formats.gltf.glb import UPRIGHT, Glb
-from mjsim.formats.gltf.lights import lights_of, rounded
-from mjsim.formats.gltf.parts import divided
+from mjsim.formats.gltf.glb import UPRIGHT, Glb, divided, pixels, texture_encoder, webp
 from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.store import SCENE
-from mjsim.formats.gltf.surfaces import Surface, drawn_scene, surfaces
+from mjsim.formats.gltf.surfaces import GeomSurface, drawn_scene, lights_of, rounded, surfaces
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.house.compiled.house import compiled_house
@@ -29,12 +26,12 @@ from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
-_AWAY = -100.0  # m; where the object models stand, below the house
+_AWAY = -100.0  # height of the object models, below the house, m
 _HANDS = tuple(f"{avatar.PREFIX}{hand}_hand" for hand in avatar.HANDS)
 
 
 def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
-    """All files of a house by name; `scene.json` says what the others are.
+    """All files of a house by name. `scene.json` describes the others.
 
     Raises:
         AssetError: The house breaks a convention of docs/models.md, or shows something that cannot be exported.
@@ -43,7 +40,7 @@ def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
 
 
 def export_episode(scene: Scene) -> bytes:
-    """One GLB file of an episode as it starts: the house, its receptacles and the objects where they lie.
+    """One GLB file of an episode at its start: the house, its receptacles, and the objects in their places.
 
     Raises:
         AssetError: The scene shows something that cannot be exported.
@@ -52,7 +49,7 @@ def export_episode(scene: Scene) -> bytes:
 
 
 def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
-    """The walking kernel's floor for a trunk of this radius, m: its arrays row by row."""
+    """The walking kernel's floor for a trunk of this radius, m, as JSON with each array row by row."""
     floor = Floor.of(compiled_house(catalogue).model, body_radius)
     plain = {
         name: np.ravel(value).tolist() if isinstance(value, np.ndarray) else value
@@ -79,20 +76,20 @@ def _one_of_each(catalogue: Catalogue) -> Scene:
 
 
 class _Export:
-    """A composed scene and what is seen of it."""
+    """Exporter of a composed scene."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._model = scene, scene.model
         self._data = mujoco.MjData(scene.model)
         mujoco.mj_forward(scene.model, self._data)
         self._drawn = drawn_scene(scene.model, self._data)
-        self._images = textures.Images(scene.model)
+        self._images = texture_encoder(scene.model)
         self._refuse_moving_lights()
 
     @cached_property
-    def _by_body(self) -> dict[int, list[Surface]]:
-        """Visible geoms by the body that carries them along, 0 for what never moves."""
-        found: dict[int, list[Surface]] = {}
+    def _by_body(self) -> dict[int, list[GeomSurface]]:
+        """Visible geoms by the body that they move with, 0 for what never moves."""
+        found: dict[int, list[GeomSurface]] = {}
         carried = self._model.body_weldid[self._model.geom_bodyid]
         for surface in surfaces(self._model, self._data, self._drawn):
             found.setdefault(int(carried[surface.geom]), []).append(surface)
@@ -105,17 +102,13 @@ class _Export:
                 raise AssetError(f"light {name!r} is part of an object; remove it, or move it into the house")
 
     def files(self) -> dict[str, bytes]:
-        """All files by name."""
         files: dict[str, bytes] = {}
         sizes: dict[str, dict[str, int]] = {}
 
         def add(name: str, glb: Glb, root: int) -> None:
             files[name] = glb.content(root)
-            sizes[name] = {
-                "triangles": glb.triangles,
-                "draw_calls": glb.primitives,
-                "bytes": len(files[name]),
-            }
+            counts = {"triangles": glb.triangles, "draw_calls": glb.primitives}
+            sizes[name] = {**counts, "bytes": len(files[name])}
 
         add(HOUSE, *self._house())
         add(PERSON, *self._person())
@@ -145,15 +138,13 @@ class _Export:
         return files
 
     def episode(self) -> bytes:
-        """House and objects in one file."""
         glb = Glb(self._images)
         nodes = self._rooms(glb)
         for placed in self._scene.episode.objects:
             position, rotation, quaternion = self._frame(self._scene.index.body(placed.name))
             inner = glb.mesh(placed.model, self._carried(placed, position, rotation))
-            nodes.append(
-                glb.node(placed.name, [inner], translation=position.tolist(), rotation=_xyzw(quaternion))
-            )
+            pose = {"translation": position.tolist(), "rotation": np.roll(quaternion, -1).tolist()}
+            nodes.append(glb.node(placed.name, [inner], **pose))
         return glb.content(glb.node("house", nodes, rotation=UPRIGHT, extras=lights_of(self._drawn)))
 
     def _house(self) -> tuple[Glb, int]:
@@ -161,8 +152,8 @@ class _Export:
         return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
 
     def _rooms(self, glb: Glb) -> list[int]:
-        """Nodes of what never moves, in parts that can be culled; what top-down views leave out is apart."""
-        groups: dict[tuple[bool, str], list[Surface]] = {}
+        """Nodes of what never moves, in parts that can be culled. Ceilings are apart: top-down views omit them."""
+        groups: dict[tuple[bool, str], list[GeomSurface]] = {}
         for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
         return [
@@ -178,7 +169,7 @@ class _Export:
         mesh = glb.mesh(placed.model, self._carried(placed, position, rotation))
         return glb, glb.node(placed.model, [mesh], rotation=UPRIGHT)
 
-    def _carried(self, placed: PlacedObject, position: Floats, rotation: Floats) -> Iterable[Surface]:
+    def _carried(self, placed: PlacedObject, position: Floats, rotation: Floats) -> Iterable[GeomSurface]:
         body = self._scene.index.body(placed.name)
         found = self._by_body.get(body, [])
         if not found:
@@ -186,7 +177,7 @@ class _Export:
         return (surface.within(position, rotation) for surface in found)
 
     def _person(self) -> tuple[Glb, int]:
-        """The body with the hands at rest; the body itself is not drawn."""
+        """The person's body, which is not drawn, with its hands at rest."""
         glb = Glb(self._images)
         base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
         hands = []
@@ -220,20 +211,19 @@ class _Export:
         }
 
     def _sky(self) -> bytes | None:
-        """The sky's six faces below each other: right, left, up, down, front, back; None without a sky."""
+        """The sky's six faces, stacked: right, left, up, down, front, back; None without a sky."""
         found = np.flatnonzero(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
         if not len(found):
             return None
-        image = textures.pixels(self._model, found[0])
-        faces = FACES * image.shape[1] // image.shape[0]  # 1 where the image has all six
-        return textures.webp(np.tile(image, (faces, 1, 1)), lossless=True)
+        image = pixels(self._model, found[0])
+        faces = FACES * image.shape[1] // image.shape[0]  # 1 if the image has all six
+        return webp(np.tile(image, (faces, 1, 1)), lossless=True)
 
     def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
-        """What draws the spots under objects, and their texture; None where the house has no material for them."""
+        """Parameters and texture of the spots under objects; None if the house has no material for them."""
         material = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_MATERIAL, shadows.MATERIAL)
-        texture = (
-            self._model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB] if material >= 0 else -1
-        )
+        textures = self._model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
+        texture = textures[material] if material >= 0 else -1
         if texture < 0:
             return None
         about = {
@@ -243,32 +233,23 @@ class _Export:
             "reach": shadows.REACH,
             "texture": SHADOW,
         }
-        return about, textures.webp(textures.pixels(self._model, texture), alpha=True, lossless=True)
+        return about, webp(pixels(self._model, texture), alpha=True, lossless=True)
 
 
 def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
-    """Rectangles on the floor with the label of their room, corners counter-clockwise, m."""
+    """Label and rectangle of each room, corners counter-clockwise, m."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return [
-        {
-            "label": rooms.label(key),
-            "polygon": [rounded(point) for point in centre + (corners * half) @ axes.T],
-        }
-        for key, centre, half, axes in zip(
-            rooms.keys, rooms.centers, rooms.half_sizes, rooms.axes, strict=True
-        )
+        {"label": rooms.label(key), "polygon": [rounded(xy) for xy in centre + (corners * half) @ axes.T]}
+        for key, centre, half, axes in zip(rooms.keys, *rooms.rectangles, strict=True)
     ]
 
 
 def _file_name(key: str) -> str:
-    """A name for a file and a URL from a catalogue key, which may hold anything."""
+    """A name for files and URLs from a catalogue key, which may contain any character."""
     if re.fullmatch(r"[A-Za-z0-9_-]{1,80}", key):
         return key
     return f"{re.sub(r'[^A-Za-z0-9_-]', '_', key)[:40]}-{zlib.crc32(key.encode()):08x}"
-
-
-def _xyzw(quaternion: Floats) -> list[float]:
-    return [float(v) for v in np.roll(quaternion, -1)]
 
 
 def _json(value: Mapping[str, Any]) -> bytes:

@@ -1,42 +1,53 @@
-"""Writing GLB files: merged meshes with quantised vertices, materials and WebP textures."""
+"""GLB files: merged meshes with quantised vertices, materials and WebP textures."""
 
+import functools
 import json
+import math
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import cv2
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from mjsim.formats.gltf.shapes import Floats
-from mjsim.formats.gltf.surfaces import Surface
+from mjsim.formats.gltf.surfaces import GeomSurface
+from mjsim.house.compiled.sites import RoomMap
 
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion xyzw that turns z up into y up
-_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # m between quantised positions: 1/128 mm to 128 mm
+_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # between quantised positions, m: 1/128 mm to 128 mm
 _UV_STEP = 2.0**-13
 _COMPONENTS = {
     np.dtype(kind): code
     for kind, code in (("i1", 5120), ("u1", 5121), ("u2", 5123), ("u4", 5125), ("f4", 5126))
 }
-_VERTICES, _TRIANGLES = 34962, 34963  # targets of buffer views
+_VERTICES, _TRIANGLES = 34962, 34963  # buffer view targets
 _EXTENSIONS = {"mesh": "KHR_mesh_quantization", "texture": "EXT_texture_webp"}
+_MANY_TRIANGLES = 50_000  # of one material, from which it gets a draw call in every room
+_SQUARE = 16.0  # side of a part, m; its positions are quantised to 0.25 mm
+_QUALITY, _LOSSLESS = 90, 101  # of OpenCV's WebP encoder
 
 
-class Look(NamedTuple):
-    """What surfaces share that are drawn by one call."""
+class MaterialKey(NamedTuple):
+    """The properties shared by surfaces that are drawn by one call."""
 
     texture: int  # id, -1 for none
     is_translucent: bool
-    is_decal: bool  # a translucent plane, which MuJoCo draws before all else that is translucent
+    is_decal: bool  # a translucent plane, which MuJoCo draws before other translucent geoms
 
     @classmethod
-    def of(cls, surface: Surface) -> "Look":
-        """The look of a surface."""
+    def of(cls, surface: GeomSurface) -> "MaterialKey":
         return cls(surface.texture, surface.is_translucent, surface.is_decal)
 
 
 class Glb:
-    """A GLB file in the making; `image` encodes the texture of an id, with or without alpha, and names it."""
+    """A GLB file under construction.
+
+    `image` returns the name and WebP file of a texture by its id, with or without alpha.
+    """
 
     def __init__(self, image: Callable[[int, bool], tuple[str, bytes]]) -> None:
         self._image = image
@@ -46,35 +57,37 @@ class Glb:
         self._images: list[dict[str, Any]] = []
         self._textures: dict[tuple[int, bool], int] = {}
         self._materials: list[dict[str, Any]] = []
-        self._looks: dict[Look, int] = {}
+        self._material_ids: dict[MaterialKey, int] = {}
         self._meshes: list[dict[str, Any]] = []
         self._nodes: list[dict[str, Any]] = []
         self.triangles = 0
         self.primitives = 0
 
     def node(self, name: str, children: Sequence[int] = (), **properties: Any) -> int:
-        """Add a node without a mesh, and return its number; `properties` as in glTF."""
+        """Add a node without a mesh, with `properties` as in glTF. Return its number."""
         node = {"name": name, **properties}
         if children:
             node["children"] = list(children)
         self._nodes.append(node)
         return len(self._nodes) - 1
 
-    def mesh(self, name: str, surfaces: Iterable[Surface], **properties: Any) -> int:
-        """Add a node with surfaces merged by look, and return its number."""
-        groups: dict[Look, list[Surface]] = {}
+    def mesh(self, name: str, surfaces: Iterable[GeomSurface], **properties: Any) -> int:
+        """Add a node with surfaces merged by material. Return its number."""
+        groups: dict[MaterialKey, list[GeomSurface]] = {}
         for surface in surfaces:
-            groups.setdefault(Look.of(surface), []).append(surface)
+            groups.setdefault(MaterialKey.of(surface), []).append(surface)
         every = np.concatenate([s.positions for group in groups.values() for s in group])
         low, extent = every.min(axis=0), float(np.ptp(every, axis=0).max())
         step = next((step for step in _STEPS if extent / step < 65535.0), extent / 65535.0)
-        primitives = [self._primitive(look, groups[look], low, step) for look in sorted(groups)]
+        primitives = [self._primitive(key, groups[key], low, step) for key in sorted(groups)]
         self._meshes.append({"name": name, "primitives": primitives})
         return self.node(
             name, mesh=len(self._meshes) - 1, translation=low.tolist(), scale=[step] * 3, **properties
         )
 
-    def _primitive(self, look: Look, group: Sequence[Surface], origin: Floats, step: float) -> dict[str, Any]:
+    def _primitive(
+        self, key: MaterialKey, group: Sequence[GeomSurface], origin: Floats, step: float
+    ) -> dict[str, Any]:
         counts = [len(surface.positions) for surface in group]
         starts = np.cumsum([0, *counts])
         triangles = np.concatenate(
@@ -82,7 +95,7 @@ class Glb:
         ).ravel()
         positions = np.rint((np.concatenate([s.positions for s in group]) - origin) / step).astype("u2")
         normals = np.concatenate([s.normals for s in group])
-        colours = np.repeat([_linear(s.rgba) for s in group], counts, axis=0)
+        colours = np.repeat([linear(s.rgba) for s in group], counts, axis=0)
         shine = np.repeat([s.shine for s in group], counts, axis=0)
         attributes = {
             "POSITION": self._attribute(positions, "VEC3", bounds=True),
@@ -90,7 +103,7 @@ class Glb:
             "COLOR_0": self._attribute(np.rint(colours * 65535.0).astype("u2"), "VEC4", normalized=True),
             "_SHINE": self._attribute(np.rint(shine * 255.0).astype("u1"), "VEC3", normalized=True),
         }
-        if look.texture >= 0:
+        if key.texture >= 0:
             uv = np.concatenate([s.uv for s in group if s.uv is not None])
             attributes["TEXCOORD_0"] = self._attribute(
                 (np.rint(uv / _UV_STEP) * _UV_STEP).astype("f4"), "VEC2"
@@ -101,20 +114,20 @@ class Glb:
         indices = self._accessor(
             triangles.astype(kind), self._view(triangles.astype(kind).tobytes(), _TRIANGLES), "SCALAR"
         )
-        return {"attributes": attributes, "indices": indices, "material": self._material(look)}
+        return {"attributes": attributes, "indices": indices, "material": self._material(key)}
 
-    def _material(self, look: Look) -> int:
-        if look not in self._looks:
+    def _material(self, key: MaterialKey) -> int:
+        if key not in self._material_ids:
             pbr: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
             material: dict[str, Any] = {"name": "plain", "pbrMetallicRoughness": pbr}
-            if look.texture >= 0:
-                pbr["baseColorTexture"] = {"index": self._texture(look.texture, look.is_translucent)}
-                material["name"] = self._image(look.texture, look.is_translucent)[0]
-            if look.is_translucent:
-                material |= {"alphaMode": "BLEND", "extras": {"decal": look.is_decal}}
+            if key.texture >= 0:
+                pbr["baseColorTexture"] = {"index": self._texture(key.texture, key.is_translucent)}
+                material["name"] = self._image(key.texture, key.is_translucent)[0]
+            if key.is_translucent:
+                material |= {"alphaMode": "BLEND", "extras": {"decal": key.is_decal}}
             self._materials.append(material)
-            self._looks[look] = len(self._materials) - 1
-        return self._looks[look]
+            self._material_ids[key] = len(self._materials) - 1
+        return self._material_ids[key]
 
     def _texture(self, texture: int, alpha: bool) -> int:
         key = (texture, alpha)
@@ -127,7 +140,7 @@ class Glb:
     def _attribute(
         self, values: NDArray[Any], kind: str, *, normalized: bool = False, bounds: bool = False
     ) -> int:
-        """An accessor of vertex values (n, k); each vertex begins at a multiple of 4 bytes."""
+        """Add an accessor of vertex values (n, k), each vertex aligned to 4 bytes."""
         width = values.shape[1] * values.itemsize
         stride = -(-width // 4) * 4
         padded = np.zeros((len(values), stride // values.itemsize), values.dtype)
@@ -166,7 +179,7 @@ class Glb:
         return len(self._views) - 1
 
     def content(self, root: int) -> bytes:
-        """The whole file; its scene has one root node."""
+        """The whole file, with one root node in its scene."""
         sampler = {"magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497}
         lists: Mapping[str, Any] = {
             "nodes": self._nodes,
@@ -201,7 +214,62 @@ class Glb:
         return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
-def _linear(rgba: Floats) -> Floats:
-    """A displayed colour (4,) as linear light, which glTF wants of vertices."""
+def linear(rgba: Floats) -> Floats:
+    """A displayed colour (4,) as linear light, as glTF requires for vertices."""
     rgb = rgba[:3]
     return np.append(np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), rgba[3])
+
+
+def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[GeomSurface, str]]:
+    """Divide what never moves into parts, few enough for drawing and small enough for culling and quantisation.
+
+    Yield each surface with the name of its part. The part is the room if the material has many triangles. Otherwise it
+    is a square of the floor, the smallest that is as wide as the surface, because next to much larger surfaces small
+    ones would be quantised more coarsely.
+    """
+    x_min, y_min, x_max, y_max = rooms.bounds
+    centre = np.array([x_min + x_max, y_min + y_max]) / 2
+    triangles = Counter[tuple[MaterialKey, bool]]()
+    for surface in surfaces:
+        triangles[MaterialKey.of(surface), surface.is_ceiling] += len(surface.triangles)
+    for surface in surfaces:
+        low, high = surface.positions.min(axis=0), surface.positions.max(axis=0)
+        middle, level = (low + high) / 2, max(0, math.ceil(math.log2((high - low).max() / _SQUARE)))
+        if triangles[MaterialKey.of(surface), surface.is_ceiling] > _MANY_TRIANGLES and not level:
+            yield surface, rooms.room_at(middle)
+        else:
+            i, j = np.rint((middle[:2] - centre) / (_SQUARE * 2**level)).astype(int)
+            yield surface, f"square_{level}_{i}_{j}"
+
+
+def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
+    """The image of a texture, uint8, (height, width, channels).
+
+    For cubes and skies it holds six stacked faces, or one that is shown on all sides.
+    """
+    sizes = model.tex_height, model.tex_width, model.tex_nchannel
+    shape = tuple(int(size[texture]) for size in sizes)
+    first = int(model.tex_adr[texture])
+    image: NDArray[np.uint8] = model.tex_data[first : first + int(np.prod(shape))].reshape(shape)
+    return image
+
+
+def texture_encoder(model: Any) -> Callable[[int, bool], tuple[str, bytes]]:
+    """A cached function for `Glb` that encodes the textures of a model."""
+
+    @functools.cache
+    def encode(texture: int, alpha: bool) -> tuple[str, bytes]:
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_TEXTURE, texture)
+        return str(name or f"texture {texture}"), webp(pixels(model, texture), alpha=alpha)
+
+    return encode
+
+
+def webp(image: NDArray[np.uint8], *, alpha: bool = False, lossless: bool = False) -> bytes:
+    """Encode an RGB or RGBA image, dropping its alpha channel unless `alpha`."""
+    keep = alpha and image.shape[2] == 4
+    conversion = cv2.COLOR_RGBA2BGRA if keep else cv2.COLOR_RGB2BGR
+    bgr = cv2.cvtColor(np.ascontiguousarray(image if keep else image[..., :3]), conversion)
+    quality = _LOSSLESS if lossless else _QUALITY
+    _, encoded = cv2.imencode(".webp", bgr, [cv2.IMWRITE_WEBP_QUALITY, quality])
+    return encoded.tobytes()

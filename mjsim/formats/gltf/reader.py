@@ -1,4 +1,4 @@
-"""Scenes of one mesh file (glTF, GLB, OBJ, ...), and Habitat's scene_instance.json that composes several."""
+"""Readers of mesh files (glTF, GLB, OBJ, ...) and of Habitat's scene_instance.json, which combines several."""
 
 import math
 import re
@@ -17,9 +17,9 @@ from mjsim.formats.scene.source_scene import (
     Bin,
     HouseOptions,
     ImportDecision,
-    Missing,
+    MissingFiles,
     NamedRoom,
-    Piece,
+    ScenePiece,
     SourceScene,
     boxes_of,
     left_out,
@@ -32,17 +32,17 @@ from mjsim.values.errors import AssetError
 
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"
-RECEPTACLE = "mjsim_receptacle"  # of a template's user_defined: the key of a bin of ours
+RECEPTACLE = "mjsim_receptacle"  # in a template's user_defined: the bin of ours that it was
 
 
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a mesh file in which a house stands; the nodes are its pieces."""
+    """Read a mesh file of a house. Each node becomes a piece."""
     parts = read_parts(path)
     points = np.concatenate([surface.corners.reshape(-1, 3) for _, surface in parts])
     sides = np.ptp(points, axis=0)
     frame = np.eye(4)
     notes: list[ImportDecision] = []
-    known = path.suffix.lower() in (*GLTF, ".dae")  # which say unit and up
+    known = path.suffix.lower() in (*GLTF, ".dae")  # formats that define unit and vertical axis
     given = options.up or _stage_up(path)
     up = given or ("z" if known else "y" if sides[1] <= sides[2] else "z")
     if up == "y" and not known:
@@ -51,19 +51,21 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
     unit, longest = options.units, float(sides.max())
-    if unit is None and (not known or longest > MAX_SIDE):  # many glTF files are not in metres
+    if unit is None and (
+        not known or longest > MAX_SIDE
+    ):  # many glTF files are not in metres, as they should be
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
-    pieces = tuple(Piece(name, surface.moved(frame)) for name, surface in parts)
+    pieces = tuple(ScenePiece(name, surface.moved(frame)) for name, surface in parts)
     return SourceScene(pieces, f"{path.suffix[1:].upper()} scene", tuple(notes))
 
 
 def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a stage with its objects; `AssetError` where a template or its mesh is not there."""
+    """Read a stage with its objects. Raise `AssetError` if a template or its mesh is missing."""
     scene = _read(path)
-    missing = Missing(options.skip_missing)
-    reader = _Habitat(path, missing)
+    missing = MissingFiles(options.skip_missing)
+    reader = _HabitatReader(path, missing)
     stage = scene.get("stage_instance")
     if not isinstance(stage, dict):
         raise AssetError(f"{path} has no stage_instance; give the scene of a house")
@@ -74,14 +76,14 @@ def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
     if found := scene.get("articulated_object_instances", []):
         notes.append(left_out(f"{len(found)} articulated objects", "URDF is not read"))
     if not pieces:
-        raise AssetError(f"{path} has no mesh that is there; add its stages and objects")
+        raise AssetError(f"{path}: none of its meshes is there; add its stages and objects")
     named = str(scene.get("semantic_scene_instance") or path.name.removesuffix(INSTANCE))
     rooms = reader.rooms(named.rpartition("/")[2])
     return SourceScene(tuple(pieces), "Habitat scene", tuple(notes), rooms, tuple(reader.bins))
 
 
 def _stage_up(path: Path) -> str | None:
-    """Which way is up in a mesh by Habitat's stage_config.json beside it; None where there is none."""
+    """The vertical axis of a mesh by the Habitat stage_config.json next to it; None without one."""
     config = path.with_suffix(".stage_config.json")
     if not config.is_file():
         return None
@@ -92,8 +94,8 @@ def _is_z_up(config: dict[str, Any]) -> bool:
     return int(np.argmax(np.abs(numbers(config.get("up", [0, 1, 0]), 3, Path("stage_config.json"))))) == 2
 
 
-class _Habitat:
-    def __init__(self, path: Path, missing: Missing) -> None:
+class _HabitatReader:
+    def __init__(self, path: Path, missing: MissingFiles) -> None:
         self._path = path
         self._missing = missing
         self.bins: list[Bin] = []
@@ -103,7 +105,7 @@ class _Habitat:
         }
 
     def rooms(self, name: str) -> tuple[NamedRoom, ...]:
-        """Rooms of the regions of a semantic_config.json; none where there is no such file."""
+        """Rooms of the regions in a semantic_config.json; none without the file."""
         found: dict[str, NamedRoom] = {}
         if (file := self._files.get(name + SEMANTICS)) is None:
             return ()
@@ -124,8 +126,8 @@ class _Habitat:
             found[key] = NamedRoom(key, f"{label} {same + 1}" if same else label, boxes)
         return tuple(found.values())
 
-    def instance(self, item: dict[str, Any], kind: str) -> Iterator[Piece]:
-        """Pieces of a stage or an object where it stands, z up."""
+    def instance(self, item: dict[str, Any], kind: str) -> Iterator[ScenePiece]:
+        """Pieces of a stage or an object in its pose, z up."""
         name = str(item.get("template_name", "")).rpartition("/")[2]
         config_file = self._files.get(f"{name}.{kind}_config.json")
         config = _read(config_file) if config_file else {}
@@ -146,7 +148,7 @@ class _Habitat:
         scale = numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
         scale = scale * float(item.get("uniform_scale", 1.0))
         upright = np.eye(4)
-        if _is_z_up(config):  # z is up in the mesh; Habitat turns it so that y is
+        if _is_z_up(config):  # Habitat turns such a mesh so that y is up
             upright = np.linalg.inv(Y_TO_Z)
         own: Floats = Y_TO_Z @ frame @ np.diag([*scale, 1.0]) @ upright @ np.linalg.inv(Y_TO_Z)
         marks = config.get("user_defined")
@@ -164,10 +166,10 @@ class _Habitat:
             whole = own if file.suffix.lower() in GLTF else own @ Y_TO_Z
             for part, surface in read_parts(file, whole):
                 solid = not seen or collision is None
-                yield Piece(part if kind == "stage" else name, surface, seen, solid, loose)
+                yield ScenePiece(part if kind == "stage" else name, surface, seen, solid, loose)
 
     def _mesh(self, config: Path | None, asset: str) -> Path | None:
-        """The file of an asset, beside its template or elsewhere in the data set; None where it is not there."""
+        """The file of an asset, next to its template or elsewhere in the data set; None if missing."""
         mesh = (config or self._path).parent / asset
         found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
         return found if found and found.name.endswith(SCENE_SUFFIXES) else None
@@ -179,5 +181,5 @@ def _read(path: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise AssetError(f"cannot read {path}: {error}; is it complete?") from error
     if not isinstance(found, dict):
-        raise AssetError(f"{path} holds no JSON object; export it again")
+        raise AssetError(f"{path} is not a JSON object; export it again")
     return found

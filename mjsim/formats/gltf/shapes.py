@@ -1,4 +1,4 @@
-"""Triangles of geoms, with the vertices and normals that MuJoCo's renderer gives them."""
+"""Triangles of geoms, with the vertices and normals of MuJoCo's renderer."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,9 +12,7 @@ Indices = NDArray[np.int64]
 
 _Geom = mujoco.mjtGeom
 MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
-_FLATTENED_BELOW = (
-    0.8  # cosine between the normals of a vertex and its face, below which MuJoCo takes the face's
-)
+_FLATTENED_BELOW = 0.8  # cosine of vertex and face normals below which MuJoCo uses the face's
 
 
 class Shape(NamedTuple):
@@ -24,13 +22,11 @@ class Shape(NamedTuple):
     normals: Floats  # of unit length, (n, 3)
     triangles: Indices  # counter-clockwise seen from outside, (t, 3)
     unscaled: Floats  # directions from the centre of a cube texture, (n, 3)
-    uv: (
-        Floats | None
-    )  # texture coordinates of one image over all, v downwards, (n, 2); None for meshes without
+    uv: Floats | None  # texture coordinates of one image, v downwards, (n, 2); None for meshes without
 
 
 def shape_of(model: Any, geom: Any) -> Shape:
-    """Triangles of an `MjvGeom` of a model; `ValueError` for a type of geom that cannot be shown."""
+    """Triangles of an `MjvGeom` of a model. Raise `ValueError` for a type of geom that cannot be shown."""
     kind, size = _Geom(geom.type), np.array(geom.size, np.float64)
     if kind in MESHES:
         return _mesh(model, geom.dataid // 2)
@@ -66,7 +62,7 @@ def _joined(*parts: Shape) -> Shape:
 
 
 def _grid(rows: int, columns: int) -> Indices:
-    """Two triangles for each cell between (rows + 1) x (columns + 1) vertices, row by row; the rows go up."""
+    """Two triangles for each cell between (rows + 1) x (columns + 1) vertices, row by row with the rows going up."""
     i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
     low = i * (columns + 1) + j
     high = low + columns + 1
@@ -74,22 +70,15 @@ def _grid(rows: int, columns: int) -> Indices:
 
 
 def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
-    """The unit sphere from the height `low` to `high`, each -1, 0 or 1."""
+    """The unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
     halves = max(stacks // 2, 1)
-    around, up = np.meshgrid(
-        np.arange(slices + 1) / slices, np.arange(low * halves, high * halves + 1) / halves
-    )
-    flat = np.cos(0.5 * math.pi * up)
-    points = np.stack(
-        (
-            flat * np.cos(2.0 * math.pi * around),
-            flat * np.sin(2.0 * math.pi * around),
-            np.sin(0.5 * math.pi * up),
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
+    heights = np.arange(low * halves, high * halves + 1) / halves
+    around, up = np.meshgrid(np.arange(slices + 1) / slices, heights)
+    flat, angle = np.cos(0.5 * math.pi * up), 2.0 * math.pi * around
+    axes = flat * np.cos(angle), flat * np.sin(angle), np.sin(0.5 * math.pi * up)
+    points = np.stack(axes, axis=-1).reshape(-1, 3)
     uv = np.column_stack((around.ravel(), (high - up.ravel()) / (high - low)))
-    # At a pole a cell is one triangle, with its corner there in the middle of the cell's part of the image.
+    # At a pole each cell is one triangle, whose corner there is in the middle of the cell's part of the image.
     is_pole = np.abs(points[:, 2]) > 1.0 - 1e-9
     uv[is_pole, 0] -= 0.5 / slices * np.sign(points[is_pole, 2])
     triangles = _grid(len(up) - 1, slices)
@@ -97,13 +86,13 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
 
 
 def _circle(slices: int) -> Floats:
-    """Points of the unit circle (slices + 1, 2), the first again as the last."""
+    """Points of the unit circle (slices + 1, 2), with the first repeated as the last."""
     angles = np.arange(slices + 1) * (2.0 * math.pi / slices)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def _tube(slices: int) -> Shape:
-    """The unit cylinder without its ends."""
+    """The lateral surface of the unit cylinder."""
     around = np.column_stack((_circle(slices), np.zeros(slices + 1)))
     up = np.array([0.0, 0.0, 1.0])
     points = np.concatenate((around - up, around + up))
@@ -113,7 +102,7 @@ def _tube(slices: int) -> Shape:
 
 
 def _disc(slices: int, height: float) -> Shape:
-    """The end of a unit cylinder at the height 1 or -1."""
+    """The end of the unit cylinder at height 1 or -1."""
     flat = np.concatenate((np.zeros((1, 2)), _circle(slices)[:-1]))
     number = np.arange(slices)
     triangles = np.column_stack((np.zeros(slices, np.int64), 1 + number, 1 + (number + 1) % slices))
@@ -129,17 +118,17 @@ def _quad() -> Shape:
 
 
 def _plane(size: Floats, far: float) -> Shape:
-    """A plane of half-sizes (x, y, ...), m; one of size 0 ends at `far`, where nothing is seen of it."""
+    """A plane of half-sizes (x, y, ...), m. A plane of size 0 is infinite and drawn up to `far`."""
     shape = _quad()
     endless = size[:2] <= 0.0
     half = np.where(endless, far, size[:2])
-    # An endless image begins in the middle and is 2 m wide.
+    # The image of an infinite plane begins in the middle and is 2 m wide.
     uv = shape.positions[:, :2] * [0.5, -0.5] * np.where(endless, half, 1.0) + np.where(endless, 0.0, 0.5)
     return shape._replace(positions=shape.positions * [*half, 1.0], uv=uv)
 
 
 def _box() -> Shape:
-    """Six quads, with the image upright on the sides and seen in a mirror on three of them."""
+    """Six quads, with the image upright on the sides and mirrored on three of them."""
     quad, sides = _quad(), []
     for normal, right, up in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for sign in (-1.0, 1.0):
@@ -153,13 +142,13 @@ def _box() -> Shape:
 
 
 def _capsule(size: Floats, slices: int, stacks: int) -> Shape:
-    """A tube between two half spheres, each with the whole image."""
+    """A tube between two hemispheres, each with the whole image."""
     radius, half = (size[0] + size[1]) / 2.0, size[2]
     parts = [_scaled(_tube(slices), size)]
     for low, high in ((0, 1), (-1, 0)):
         cap = _scaled(_sphere(slices, stacks, low, high), np.array([size[0], size[1], radius]))
         up = np.array([0.0, 0.0, low + high])
-        # MuJoCo's half spheres stand on the ends of the unit cylinder.
+        # MuJoCo's hemispheres are on the ends of the unit cylinder.
         parts.append(cap._replace(positions=cap.positions + half * up, unscaled=cap.unscaled + up))
     return _joined(*parts)
 
@@ -177,7 +166,7 @@ def _mesh(model: Any, mesh: int) -> Shape:
 
 
 def _flattened(corners: Floats, normals: Floats) -> Floats:
-    """Normals (t, 3, 3) of the corners (t, 3, 3) of triangles, those far from their face's replaced by it."""
+    """Normals (t, 3, 3) of corners (t, 3, 3) of triangles, replaced by the face's normal if they differ much."""
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-15)
     along = np.einsum("tck,tk->tc", normals, flat)
@@ -185,12 +174,11 @@ def _flattened(corners: Floats, normals: Floats) -> Floats:
 
 
 def _without_copies(faces: Any, vertices: Floats, normals: Floats, uv: Floats | None) -> Shape:
-    """Triangles of a mesh with one vertex for equal position, normal and texture coordinates."""
+    """Triangles of a mesh without duplicate vertices."""
     parts = [vertices[faces].reshape(-1, 3), normals.reshape(-1, 3)]
     if uv is not None:
         parts.append(uv.reshape(-1, 2))
     unique, index = np.unique(np.concatenate(parts, axis=1), axis=0, return_inverse=True)
     points = unique[:, :3]
-    return Shape(
-        points, unique[:, 3:6], index.reshape(-1, 3), points, unique[:, 6:] if uv is not None else None
-    )
+    places = None if uv is None else unique[:, 6:]
+    return Shape(points, unique[:, 3:6], index.reshape(-1, 3), points, places)

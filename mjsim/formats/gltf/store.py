@@ -1,13 +1,13 @@
-"""Where scene files lie on disk, for those who serve them; light to import."""
+"""Location and names of scene files on disk, apart from their writers so that servers import quickly."""
 
 from pathlib import Path
 
 from mjsim.support.kernels import cache_base
 
-GZIP = ".gz"  # ending of files that are stored compressed
-SCENE = "scene.json"  # the file that names the others
+GZIP = ".gz"  # suffix of compressed files
+SCENE = "scene.json"  # names the other files
 
 
 def scenes_folder() -> Path:
-    """Folder of all scenes: in `NUMBA_CACHE_DIR`, else in the user's cache folder."""
+    """Folder of all scenes: in `NUMBA_CACHE_DIR` if set, else in the user's cache folder."""
     return cache_base() / "scenes"

@@ -1,7 +1,7 @@
-"""What the `fast` profile shows of a scene, geom by geom: triangles, colours, shine and texture coordinates."""
+"""The surfaces and lights of a scene in the `fast` profile."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -14,13 +14,17 @@ from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
 from mjsim.values.errors import AssetError
 
-_OPAQUE_FROM = 0.995  # MuJoCo blends geoms of a lower alpha
+_OPAQUE_FROM = 0.995  # alpha below which MuJoCo blends a geom
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
+_MAX_LIGHTS = 8  # of OpenGL, including the headlight
+_AMBIENT_ALONE = 0.3  # ambient light of a scene without any light
+_COLOURS = ("ambient", "diffuse", "specular")
+_LIGHTS = {mujoco.mjtLightType.mjLIGHT_SPOT: "spot", mujoco.mjtLightType.mjLIGHT_DIRECTIONAL: "directional"}
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """What is seen of one geom, in the frame of the house.
+class GeomSurface:
+    """The visible surface of one geom, in the frame of the house.
 
     Attributes:
         geom: Id of the geom.
@@ -31,9 +35,8 @@ class Surface:
         texture: Id of the texture, -1 for none.
         rgba: Colour as displayed, 0 to 1, (4,).
         shine: Specular, shininess and emission, 0 to 1, (3,).
-        is_translucent: Whether it is blended with what is behind it.
-        is_decal: Whether it is a translucent plane (a drawn shadow); MuJoCo draws them before all else translucent.
-        is_ceiling: Whether top-down views leave it out.
+        is_decal: True for a translucent plane (a drawn shadow). MuJoCo draws decals before other translucent geoms.
+        is_ceiling: True if top-down views omit the geom.
     """
 
     geom: int
@@ -48,37 +51,32 @@ class Surface:
     is_decal: bool
     is_ceiling: bool
 
-    def within(self, position: Floats, rotation: Floats) -> "Surface":
-        """The same in the frame of a body at `position` (3,), m, with the axes in the columns of `rotation`, (3, 3)."""
-        return Surface(
-            **{
-                **vars(self),
-                "positions": (self.positions - position) @ rotation,
-                "normals": self.normals @ rotation,
-            }
-        )
+    def within(self, position: Floats, rotation: Floats) -> "GeomSurface":
+        """The surface in the frame of a body at `position`, m, with its axes in the columns of `rotation`."""
+        positions = (self.positions - position) @ rotation
+        return replace(self, positions=positions, normals=self.normals @ rotation)
 
 
 def drawn_scene(model: Any, data: Any) -> Any:
-    """MuJoCo's abstract scene of all that a first-person view can show."""
+    """MuJoCo's abstract scene of everything that a first-person view can show."""
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
     option = visual_option(FIRST_PERSON_GROUPS, FAST)
     mujoco.mjv_updateScene(model, data, option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, scene)
     return scene
 
 
-def surfaces(model: Any, data: Any, scene: Any) -> Iterator[Surface]:
-    """All visible geoms of an abstract scene, in its order.
+def surfaces(model: Any, data: Any, scene: Any) -> Iterator[GeomSurface]:
+    """Yield the visible geoms of an abstract scene, in its order.
 
     Raises:
-        AssetError: A geom is of a kind that cannot be shown.
+        AssetError: A geom is of a type that cannot be exported.
     """
     for geom in scene.geoms[: scene.ngeom]:
         if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.rgba[3] > 0.0:
             yield _surface(model, data, geom)
 
 
-def _surface(model: Any, data: Any, geom: Any) -> Surface:
+def _surface(model: Any, data: Any, geom: Any) -> GeomSurface:
     try:
         shape = shape_of(model, geom)
     except ValueError:
@@ -88,10 +86,10 @@ def _surface(model: Any, data: Any, geom: Any) -> Surface:
             f"geom {name!r} is of the type {kind}, which cannot be exported; make it a mesh"
         ) from None
     is_translucent = bool(geom.rgba[3] < _OPAQUE_FROM)
-    # The scene moves endless planes along with its camera.
+    # Not from the scene, which moves infinite planes along with its camera.
     position, rotation = data.geom_xpos[geom.objid], data.geom_xmat[geom.objid].reshape(3, 3)
     shape, texture = _textured(model, geom, shape)
-    return Surface(
+    return GeomSurface(
         geom=int(geom.objid),
         positions=shape.positions @ rotation.T + position,
         normals=shape.normals @ rotation.T,
@@ -107,7 +105,7 @@ def _surface(model: Any, data: Any, geom: Any) -> Surface:
 
 
 def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
-    """The shape with the texture coordinates that MuJoCo gives it, and the id of its texture, -1 for none."""
+    """The shape with MuJoCo's texture coordinates, and the id of its texture, -1 for none."""
     texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
     if texture < 0:
         return shape, -1
@@ -119,9 +117,45 @@ def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
         if shape.uv is not None:
             is_endless = geom.type == mujoco.mjtGeom.mjGEOM_PLANE and size[:2].min() <= 0.0
             return shape._replace(uv=shape.uv * repeat - 0.5 * is_endless), texture
-        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # it lies over the mesh's x and y axes
+        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # along the mesh's x and y axes
         return shape._replace(uv=over * repeat + 0.5), texture
     if shape.uv is not None and geom.type in MESHES:
-        return shape, -1  # a cube does not show on a mesh with coordinates of its own
+        return shape, -1  # MuJoCo does not draw cubes on meshes with texture coordinates
     width = int(model.tex_width[texture])
     return laid_out(shape, scale, width, int(model.tex_height[texture]) // width), texture
+
+
+def lights_of(scene: Any) -> dict[str, Any]:
+    """The `lights` of an `MjvScene`, in the house's frame, and the `headlight`, which shines along the view.
+
+    Positions are in m, cutoffs in degrees. Lights of type `point` and `image` are left out, because MuJoCo does not
+    draw them.
+    """
+    drawn = scene.lights[: min(scene.nlight, _MAX_LIGHTS)]
+    headlight = next((_colours(light) for light in drawn if light.headlight), None)
+    lights = [
+        {
+            "type": _LIGHTS[mujoco.mjtLightType(light.type)],
+            "position": rounded(light.pos),
+            "direction": rounded(light.dir),
+            "cutoff": float(light.cutoff),
+            "exponent": float(light.exponent),
+            "attenuation": rounded(light.attenuation),
+            **_colours(light),
+        }
+        for light in drawn
+        if not light.headlight and mujoco.mjtLightType(light.type) in _LIGHTS
+    ]
+    if headlight is None:
+        ambient = 0.0 if lights else _AMBIENT_ALONE
+        headlight = {"ambient": [ambient] * 3, "diffuse": [0.0] * 3, "specular": [0.0] * 3}
+    return {"lights": lights, "headlight": headlight}
+
+
+def rounded(values: Any) -> list[float]:
+    """Values rounded to 1e-6."""
+    return [round(float(value), 6) for value in values]
+
+
+def _colours(light: Any) -> dict[str, list[float]]:
+    return {name: rounded(getattr(light, name)) for name in _COLOURS}

@@ -1,1 +1,1 @@
-"""House JSON of ProcTHOR, read and written."""
+"""Reader and writer of ProcTHOR's house JSON."""

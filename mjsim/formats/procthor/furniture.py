@@ -1,4 +1,4 @@
-"""Furniture of ours for the things in ProcTHOR's houses, in their sizes."""
+"""Furniture of ours for the objects in ProcTHOR's houses, stretched to their sizes."""
 
 import math
 import re
@@ -11,11 +11,11 @@ import trimesh
 
 from mjsim.formats.procthor.plan import Thing
 from mjsim.formats.scene.mesh_files import primitive
-from mjsim.formats.scene.source_scene import Piece
+from mjsim.formats.scene.source_scene import ScenePiece
 from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import STYLE, used_materials
+from mjsim.generator.furniture.appearance import draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.look import draw_look
 from mjsim.generator.furniture.piece import flattened
 from mjsim.generator.palette import draw_palette
 from mjsim.generator.values import Asset
@@ -24,16 +24,16 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-DATABASE = "asset-database.json"  # of ProcTHOR: types and sizes of its assets
-_DRAWN = 4  # pieces of each kind, among which the nearest is chosen
-_STRETCH = math.log(2.2)  # the most that a side of ours is stretched
+DATABASE = "asset-database.json"  # ProcTHOR's file with types and sizes of its assets
+_DRAWN = 4  # pieces of each kind, from which the most similar is chosen
+_STRETCH = math.log(2.2)  # greatest factor by which a side is stretched
 _GREY, _BLACK = np.array([0.62, 0.6, 0.57]), np.array([0.08, 0.08, 0.09])
 _SCREENS = ("desktop", "microwave", "television")
 _Entry = tuple[tuple[str, ...], tuple[float, float, float]]
 _CAN: _Entry = ((), (0.45, 0.35, 0.55))
 _SHELVES: _Entry = (("bookcase", "low_bookcase", "cube_shelf"), (0.9, 0.35, 1.45))
 _PICTURE: _Entry = ((), (0.8, 0.16, 0.6))
-# What names hold -> kinds of ours that are near, and the usual width, depth and height, m; without a kind, boxes.
+# Word in a name -> similar kinds of ours, and typical width, depth and height, m. Without a kind it becomes a box.
 _TYPES: Mapping[str, _Entry] = {
     "armchair": (("armchair",), (0.95, 0.9, 0.9)),
     "bathtub": (("bathtub",), (1.7, 0.8, 0.6)),
@@ -82,19 +82,21 @@ _TYPES: Mapping[str, _Entry] = {
 
 
 @dataclass(frozen=True)
-class Assets:
-    """What is known of ProcTHOR's assets: by its database where the user has it, else by their names."""
+class AssetDatabase:
+    """Types and sizes of ProcTHOR's assets, from its database if available, otherwise from their names."""
 
     types: Mapping[str, str]  # asset -> type
     sizes: Mapping[str, Floats]  # asset -> width, depth and height, m
-    source: str  # for the report
+    source: str  # of the sizes, for the report
 
     @classmethod
-    def read(cls, folders: Iterable[Path]) -> "Assets":
-        """Read the first database in some folders; `AssetError` where it is none."""
+    def read(cls, folders: Iterable[Path]) -> "AssetDatabase":
+        """Read the first database in some folders. Raise `AssetError` if it is not valid."""
         file = next((folder / DATABASE for folder in folders if (folder / DATABASE).is_file()), None)
         if file is None:
-            return cls({}, {}, f"usual ones of each type; --models DIR with {DATABASE} says them")
+            return cls(
+                {}, {}, f"typical ones of each type; for exact ones, pass --models DIR with {DATABASE}"
+            )
         try:
             every = [(kind, asset) for kind, assets in read_json(read_text(file)).items() for asset in assets]
             types = {asset["assetId"]: kind for kind, asset in every}
@@ -104,11 +106,13 @@ class Assets:
                 if asset.get("boundingBox")
             }
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-            raise AssetError(brief(f"{file} is no asset database of ProcTHOR: {error}")) from error
+            raise AssetError(
+                brief(f"cannot read {file} as an asset database of ProcTHOR: {error}")
+            ) from error
         return cls(types, sizes, f"of {DATABASE}")
 
     def type_of(self, thing: Thing) -> str:
-        """The key of `_TYPES` that a thing's type, asset or id holds, of several the longest; "" without any."""
+        """The longest key of `_TYPES` in a thing's type, asset or id, tried in this order;  if none."""
         for text in (self.types.get(thing.asset_id, ""), thing.asset_id, thing.id):
             plain = re.sub(r"[^a-z]", "", text.lower())
             if found := [key for key in _TYPES if key in plain]:
@@ -116,9 +120,10 @@ class Assets:
         return ""
 
     def size_of(self, thing: Thing, kind: str) -> Floats | None:
-        """Width, depth and height of a thing, m; None where nothing tells it.
+        """Width, depth and height of a thing, m; None if unknown.
 
-        Without a database they are the usual ones; what stands on the floor is twice as high as its middle.
+        Without a database it is the typical size of the type, with twice the height of the thing's middle above the
+        floor.
         """
         size = self.sizes.get(thing.asset_id)
         if size is None and kind:
@@ -126,12 +131,12 @@ class Assets:
             if 0.5 < 2 * thing.position.y / size[2] < 1.6:
                 size[2] = 2 * thing.position.y
         if size is not None and _TYPES.get(kind) is _PICTURE:
-            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # so that it stands out of the wall
+            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # so that it protrudes from the wall
         return size
 
 
 def in_our_style(world: str, assets: Iterable[str]) -> str:
-    """MJCF of a world in the classes of the apartment."""
+    """MJCF of a world with the default classes of the apartment."""
     style = (models_root() / STYLE / "defaults.xml").read_text(encoding="utf-8")
     default = style[style.index("<default>") : style.rindex("</mujocoinclude>")]
     return (
@@ -140,13 +145,13 @@ def in_our_style(world: str, assets: Iterable[str]) -> str:
     )
 
 
-class Library:
-    """Pieces of furniture of all kinds that some types need, written as one MJCF file and read back as surfaces."""
+class FurnitureLibrary:
+    """Pieces of the kinds that some types need, written as one MJCF file and read back as surfaces."""
 
     def __init__(self, types: Iterable[str], folder: Path) -> None:
         self.file = folder / "furniture.xml"
-        self._pieces: dict[str, list[list[Piece]]] = {}
-        look = draw_look(draw_palette(0), stream(0, "look"))
+        self._pieces: dict[str, list[list[ScenePiece]]] = {}
+        look = draw_appearance(draw_palette(0), stream(0, "look"))
         bodies: list[str] = []
         own: dict[str, Asset] = {}
         for kind in sorted({kind for name in types if name for kind in _TYPES[name][0]}):
@@ -155,7 +160,7 @@ class Library:
                 piece = next((one for one, *_ in flattened(made) if one.kind == kind), made)
                 bodies.append(f'<body name="{kind}:{number}">{piece.geoms}</body>')
                 pictures = [asset for picture in piece.pictures for asset in picture.assets]
-                own |= {asset.name: asset for asset in (*look.of(piece.geoms), *pictures)}
+                own |= {asset.name: asset for asset in (*look.assets_of(piece.geoms), *pictures)}
         (folder / "textures").mkdir()
         for asset in own.values():
             if asset.image is not None:
@@ -164,35 +169,38 @@ class Library:
         text = in_our_style(world, used_materials(world, [], own.values(), models_root()))
         self.file.write_text(text, encoding="utf-8")
 
-    def take(self, pieces: Iterable[Piece]) -> None:
-        """Keep what was read from `file`."""
-        bodies: dict[str, list[Piece]] = {}
+    def take(self, pieces: Iterable[ScenePiece]) -> None:
+        """Keep the pieces that were read from `file`."""
+        bodies: dict[str, list[ScenePiece]] = {}
         for piece in pieces:
             bodies.setdefault(piece.name, []).append(piece)
         for name, found in bodies.items():
             self._pieces.setdefault(name.partition(":")[0], []).append(found)
 
-    def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[Piece], str]:
-        """A thing in its place, and the kind of ours that it became; a box, and "", where none is near.
+    def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[ScenePiece], str]:
+        """A thing in its place, and the kind of ours that it became; a box and "" if none is similar.
 
         Args:
-            thing: What it is.
+            thing: The thing.
             name: Its type, a key of `_TYPES` or "".
             size: Its width, depth and height, m, (3,).
-            frame: From its middle to the house (4, 4).
+            frame: Transform from its centre to the house (4, 4).
         """
-        choices: list[tuple[float, str, list[Piece], Floats, Floats]] = []
+        choices: list[tuple[float, str, list[ScenePiece], Floats, Floats]] = []
         for kind in _TYPES[name][0] if name else ():
             for pieces in self._pieces.get(kind, []):
                 corners = np.concatenate([p.surface.corners.reshape(-1, 3) for p in pieces if p.solid])
-                low, high = corners.min(axis=0) * (1, 1, 0), corners.max(axis=0)  # legs may only be seen
+                low, high = (
+                    corners.min(axis=0) * (1, 1, 0),
+                    corners.max(axis=0),
+                )  # from z = 0, since legs may not be solid
                 stretch = float(np.abs(np.log(size / (high - low))).max())
                 choices.append((stretch, kind, pieces, low, high))
         best = min(choices, default=None, key=lambda choice: choice[0])
         if best is None or best[0] > _STRETCH:
             box = primitive(trimesh.creation.box(size), _BLACK if name in _SCREENS else _GREY)
-            return [Piece(thing.id, box.moved(frame))], ""
+            return [ScenePiece(thing.id, box.moved(frame))], ""
         _, kind, pieces, low, high = best
         fit = np.diag([*(size / (high - low)), 1.0])
         fit[:3, 3] = -fit.diagonal()[:3] * (low + high) / 2
-        return [Piece(thing.id, p.surface.moved(frame @ fit), p.seen, p.solid) for p in pieces], kind
+        return [ScenePiece(thing.id, p.surface.moved(frame @ fit), p.seen, p.solid) for p in pieces], kind

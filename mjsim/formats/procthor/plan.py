@@ -1,7 +1,7 @@
-"""ProcTHOR's house JSON: rooms, walls, doors and windows, and the objects with their places.
+"""Rooms, walls, openings and objects of ProcTHOR's house JSON.
 
-Its axes are x, y up and z, left-handed: seen from above, (x, z) are our (x, y). Walls have no thickness; ours lie on
-the middle of theirs. An object's position is the middle of its box, and at a rotation of 0 its front looks along z.
+Its axes are x, y up and z, left-handed; seen from above, (x, z) are our (x, y). Its walls have no thickness and are the
+centre lines of ours. An object's position is the centre of its box, and at a rotation of 0 its front faces z.
 """
 
 import math
@@ -20,8 +20,8 @@ from mjsim.generator.values import WALL
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-NAMES = "mjsim_rooms"  # of the metadata: room id -> [key, label], where the house was one of ours
-_TYPES = {"livingroom": "living_room"}  # the others are their own words
+NAMES = "mjsim_rooms"  # key of the metadata: room id -> [key, label], if the house was exported by us
+_TYPES = {"livingroom": "living_room"}  # other types are split into words by their capitals
 
 
 _Number = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
@@ -59,11 +59,11 @@ class _Opening(msgspec.Struct, rename="camel"):
     room0: str | None = None
     room1: str | None = None
     hole_polygon: list[Vector] = []
-    bounding_box: _Span | None = None  # of older files
+    bounding_box: _Span | None = None  # in older files
 
 
 class Thing(msgspec.Struct, rename="camel"):
-    """An object with those that stand on it."""
+    """An object with the objects on it."""
 
     id: str
     position: Vector
@@ -84,7 +84,7 @@ class _House(msgspec.Struct):
 
 @dataclass(frozen=True)
 class PlanWall:
-    """A wall on the floor."""
+    """A wall, by its centre line on the floor."""
 
     start: tuple[float, float]  # m
     end: tuple[float, float]
@@ -100,12 +100,12 @@ class PlanOpening:
     bottom: float
     top: float
     is_door: bool
-    rooms: tuple[str, ...]  # keys of those that it joins; one for a front door
+    rooms: tuple[str, ...]  # keys of the rooms it connects; one for a front door
 
 
 @dataclass(frozen=True)
 class ProcthorPlan:
-    """What a house's JSON says of its plan, in metres, z up."""
+    """The plan of a house, in metres, z up."""
 
     rooms: tuple[NamedRoom, ...]
     walls: tuple[PlanWall, ...]
@@ -113,11 +113,13 @@ class ProcthorPlan:
 
 
 def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
-    """Rooms, walls and openings of a house, and its objects; `AssetError` where the file holds no such house."""
+    """Read the plan of a house and its objects. Raise `AssetError` if the file is not a valid house."""
     try:
         house = msgspec.convert(_without_nulls(read_json(read_text(path))), _House)
     except (OSError, ValueError, RecursionError) as error:
-        raise AssetError(brief(f"{path} is no house of ProcTHOR: {error}; export it again")) from error
+        raise AssetError(
+            brief(f"cannot read {path} as a house of ProcTHOR: {error}; export it again")
+        ) from error
     if not house.rooms:
         raise AssetError(f"{path} has no rooms; give a house of ProcTHOR")
     rooms = tuple(_rooms(house, path))
@@ -138,7 +140,7 @@ def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
 
 
 def _without_nulls(value: Any) -> Any:
-    """JSON without what is null: a door to the outside has a null for its second room."""
+    """JSON without nulls, such as the missing second room of a front door."""
     if isinstance(value, dict):
         return {key: _without_nulls(one) for key, one in value.items() if one is not None}
     return [_without_nulls(one) for one in value] if isinstance(value, list) else value
@@ -165,7 +167,7 @@ def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
 
 
 def _ends(wall: _Wall, path: Path) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Where a wall begins and ends on the floor, in its own order, and its height, m."""
+    """Start and end of a wall on the floor, in the file's order, and its height, m."""
     heights = [point.y for point in wall.polygon] or [0.0]
     low = [point for point in wall.polygon if point.y < min(heights) + 0.01]
     if len(low) < 2:

@@ -1,4 +1,4 @@
-"""A house of ProcTHOR as a scene: its plan as floors and walls, its objects as furniture of ours in their size."""
+"""Reader of ProcTHOR houses: the plan becomes floors and walls, the objects furniture of ours in their size."""
 
 import math
 import tempfile
@@ -11,29 +11,29 @@ import numpy as np
 from trimesh.transformations import rotation_matrix
 
 from mjsim.formats.mjcf_reader import read_mjcf
-from mjsim.formats.procthor.furniture import Assets, Library, in_our_style
+from mjsim.formats.procthor.furniture import AssetDatabase, FurnitureLibrary, in_our_style
 from mjsim.formats.procthor.plan import PlanOpening, PlanWall, ProcthorPlan, Thing, read_plan
 from mjsim.formats.scene.source_scene import HouseOptions, ImportDecision, NamedRoom, SourceScene, left_out
 from mjsim.formats.scene.surface import Floats
 from mjsim.generator.files import used_materials
 from mjsim.generator.palette import surfaces
 from mjsim.generator.programme import use_of
-from mjsim.generator.values import WALL, FloorPlan, Rectangle, Room
+from mjsim.generator.values import WALL, HomePlan, Rectangle, Room
 from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.validation.object_rules import SIZE
 
 SUFFIXES = (".json",)
-_ON = 0.05  # m from a wall, within which an opening is in it
-_THICK = {"door": 0.04, "window": 0.02}  # m, of what closes an opening
+_ON = 0.05  # distance within which an opening belongs to a wall, m
+_THICK = {"door": 0.04, "window": 0.02}  # thickness of panels in openings, m
 
 
 def read_procthor(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a house; `AssetError` where it is none or has no plan that can be used."""
+    """Read a house. Raise `AssetError` if it is not valid or its plan cannot be used."""
     plan, things = read_plan(path)
-    assets = Assets.read(options.models)
+    assets = AssetDatabase.read(options.models)
     types = [(thing, assets.type_of(thing)) for thing in _flat(things)]
     with tempfile.TemporaryDirectory() as folder:
-        library = Library({kind for _, kind in types}, Path(folder))
+        library = FurnitureLibrary({kind for _, kind in types}, Path(folder))
         shell = read_mjcf(_write_shell(plan, Path(folder) / "shell.xml"), options)
         library.take(read_mjcf(library.file, options).pieces)
     pieces = list(shell.pieces)
@@ -61,9 +61,8 @@ def read_procthor(path: Path, options: HouseOptions) -> SourceScene:
         ImportDecision("sizes", assets.source, "a house's JSON names assets, not their sizes"),
     ]
     if boxes:
-        notes.append(
-            ImportDecision("boxes", str(boxes.total()), f"no kind of ours is near: {_listed(boxes)}")
-        )
+        reason = f"no kind of ours is similar: {_listed(boxes)}"
+        notes.append(ImportDecision("boxes", str(boxes.total()), reason))
     if small:
         notes.append(left_out(f"{len(small)} small or unknown", _listed(Counter(small))))
     return SourceScene(tuple(pieces), "ProcTHOR house", tuple(notes), plan.rooms)
@@ -80,20 +79,20 @@ def _flat(things: Iterable[Thing]) -> Iterator[Thing]:
 
 
 def _frame(thing: Thing) -> Floats:
-    """From the middle of a thing, with its front along y, to the house (4, 4)."""
+    """Transform (4, 4) from a thing's centre, with its front along y, to the house."""
     frame: Floats = np.asarray(rotation_matrix(-math.radians(thing.rotation.y), [0, 0, 1]))
     frame[:3, 3] = thing.position.x, thing.position.z, thing.position.y
     return frame
 
 
 def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
-    """Floors, walls, ceilings, and what closes windows and front doors, as MJCF."""
+    """Write MJCF of floors, walls, ceilings, and panels that close windows and front doors."""
     rooms = []
     for room in plan.rooms:
         low, high = np.min(room.boxes, axis=0), np.max(room.boxes, axis=0)
         rooms.append(Room(room.key, use_of(room.key), room.label, Rectangle(*low[:2], *high[2:])))
     daylight = '<material name="daylight" rgba="0.72 0.85 0.95 1"/>'
-    materials = [*surfaces(0, FloorPlan(tuple(rooms), (), ())), daylight]
+    materials = [*surfaces(0, HomePlan(tuple(rooms), (), ())), daylight]
     height = max((wall.height for wall in plan.walls), default=2.5)
     geoms: list[str] = []
     for room in plan.rooms:
@@ -117,14 +116,13 @@ def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
             name = "front entrance" if one.is_door else "window pane"
             geoms.append(_slab(f"{name} {len(geoms)}", wall, _THICK[kind], material, *span))
     world = "\n".join(geoms)
-    path.write_text(
-        in_our_style(world, used_materials(world, materials, (), models_root())), encoding="utf-8"
-    )
+    used = used_materials(world, materials, (), models_root())
+    path.write_text(in_our_style(world, used), encoding="utf-8")
     return path
 
 
 def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
-    """Key of a room at a wall: the one with a box nearest to its middle."""
+    """Key of the room nearest to the middle of a wall."""
     x, y = np.add(wall.start, wall.end) / 2
 
     def distance(room: NamedRoom) -> float:
@@ -134,10 +132,10 @@ def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
 
 
 def _parts(wall: PlanWall, openings: Iterable[PlanOpening]) -> Iterator[tuple[float, float, float, float]]:
-    """A wall without its openings: from, to, bottom, top, m, along and up."""
+    """A wall without its openings: start, end, bottom and top of each part along the wall, m."""
     start, length = np.array(wall.start), math.dist(wall.start, wall.end)
     along = np.subtract(wall.end, start) / length
-    at = -WALL / 2  # into the corner
+    at = -WALL / 2  # the wall extends into the corner
     holes = []
     for one in openings:
         ends = np.array([one.start, one.end]) - start

@@ -1,21 +1,19 @@
-"""The plan of a house as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
+"""Export of a plan as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
 
-Walls have no thickness there: they stand in the middle of ours. Names of assets are those of ProcTHOR whose size is
-nearest.
+Walls have no thickness there and are the centre lines of ours. Doors and windows become the ProcTHOR assets of the
+nearest size.
 """
 
 from collections.abc import Iterator
 from typing import Any
 
-from mjsim.generator.openings import portions
-from mjsim.generator.values import HEIGHT, SIDES, WALL, Door, FloorPlan, Room, Side, Window, opposite
+from mjsim.generator.openings import wall_stretches
+from mjsim.generator.values import CEILING_HEIGHT, SIDES, WALL, Door, HomePlan, Room, Side, Window, opposite
 
-NAMES = (
-    "mjsim_rooms"  # of the metadata: room id -> [key, label], which ProcTHOR's four types of rooms cannot say
-)
+NAMES = "mjsim_rooms"  # key of the metadata: room id -> [key, label], since ProcTHOR has only four room types
 _TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
-_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # m, from which it is a passage
-_WINDOWS = {  # width, m
+_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # width from which a door is a passage, m
+_WINDOWS = {  # by width, m
     0.92: "Window_Fixed_36x48",
     1.22: "Window_Slider_48x48",
     1.53: "Window_Slider_60x48",
@@ -23,8 +21,8 @@ _WINDOWS = {  # width, m
 }
 
 
-def procthor_house(plan: FloorPlan) -> dict[str, Any]:
-    """A floor plan as a house of ProcTHOR, ready for JSON."""
+def procthor_house(plan: HomePlan) -> dict[str, Any]:
+    """A plan as a house of ProcTHOR, ready for JSON."""
     ids = {room.key: f"room|{number}" for number, room in enumerate(plan.rooms, 2)}
     walls = [wall for room in plan.rooms for wall in _walls(plan, room, ids)]
     return {
@@ -61,13 +59,13 @@ def _room(room: Room, name: str) -> dict[str, Any]:
     }
 
 
-def _walls(plan: FloorPlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """The walls of a room, and what is seen of them from outside."""
+def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str, Any]]:
+    """The walls of a room, and their outer sides."""
     for side in SIDES:
-        for start, end, is_outside in portions(room, side, plan.rooms):
+        for start, end, is_outside in wall_stretches(room, side, plan.rooms):
             name = _wall_name(ids[room.key], room, side, start, end)
             ends = [_on(room, side, at) for at in _ordered(side, start, end)]
-            polygon = [_point(x, z, y) for z in (0.0, HEIGHT) for x, y in ends]
+            polygon = [_point(x, z, y) for z in (0.0, CEILING_HEIGHT) for x, y in ends]
             material = {"name": "Walldrywall4Tiled"}
             yield {"id": name, "roomId": ids[room.key], "polygon": polygon, "material": material}
             if is_outside:
@@ -76,12 +74,12 @@ def _walls(plan: FloorPlan, room: Room, ids: dict[str, str]) -> Iterator[dict[st
 
 
 def _ordered(side: Side, start: float, end: float) -> tuple[float, float]:
-    """The ends of a wall in the order in which the outline of the floor passes them: clockwise from above."""
+    """The ends of a wall in the order of the floor's outline, clockwise from above."""
     return (start, end) if side in ("west", "north") else (end, start)
 
 
 def _on(room: Room, side: Side, at: float) -> tuple[float, float]:
-    """A point of the middle of a wall."""
+    """A point on the centre line of a wall."""
     x, y = room.floor.along(side, at, at, -WALL / 2, -WALL / 2).center
     return round(x, 4), round(y, 4)
 
@@ -92,12 +90,13 @@ def _wall_name(room: str, at: Room, side: Side, start: float, end: float) -> str
 
 
 def _hole(
-    plan: FloorPlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
+    plan: HomePlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
 ) -> tuple[str, dict[str, Any]]:
-    """The wall of a room that an opening is in, and its hole along it."""
+    """The wall of a room that has an opening, and the opening's hole along it."""
     of = plan.room(room)
     start, end, _ = min(
-        portions(of, side, plan.rooms), key=lambda one: max(one[0] - opening.center, opening.center - one[1])
+        wall_stretches(of, side, plan.rooms),
+        key=lambda one: max(one[0] - opening.center, opening.center - one[1]),
     )
     middle = abs(opening.center - _ordered(side, start, end)[0])
     bottom, top = (opening.sill, opening.top) if isinstance(opening, Window) else (0.0, opening.height)
@@ -109,7 +108,7 @@ def _hole(
     return name, {"holePolygon": corners, "assetPosition": _point(middle, (bottom + top) / 2, 0.0)}
 
 
-def _door(plan: FloorPlan, door: Door, ids: dict[str, str], number: int) -> dict[str, Any]:
+def _door(plan: HomePlan, door: Door, ids: dict[str, str], number: int) -> dict[str, Any]:
     first, last = door.rooms[0], door.rooms[-1]
     wall0, hole = _hole(plan, first, door.side, door, ids)
     wall1 = "wall|exterior|" + wall0.split("|", 2)[2]
@@ -128,7 +127,7 @@ def _door(plan: FloorPlan, door: Door, ids: dict[str, str], number: int) -> dict
     }
 
 
-def _window(plan: FloorPlan, window: Window, ids: dict[str, str], number: int) -> dict[str, Any]:
+def _window(plan: HomePlan, window: Window, ids: dict[str, str], number: int) -> dict[str, Any]:
     wall, hole = _hole(plan, window.room, window.side, window, ids)
     return {
         "id": f"window|{number}",

@@ -1,1 +1,1 @@
-"""The scene that readers return: pieces with surfaces, rooms and bins, and how mesh files become pieces."""
+"""The scene that readers return, and readers of mesh files."""

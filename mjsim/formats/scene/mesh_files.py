@@ -1,6 +1,6 @@
-"""Reading mesh files with trimesh: every node of the scene graph in its place, with its colours.
+"""Reading of mesh files with trimesh: every node of the scene graph in its place, with its colours.
 
-As parts of a scene, they are in metres and z up if the file says what its unit and axis are.
+Parts of a scene are in metres and z up if the file format defines unit and axis.
 """
 
 import io
@@ -27,17 +27,17 @@ from mjsim.values.errors import AssetError
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # bytes
 MAX_TRIANGLES = 5_000_000
-PLAIN = (0.74, 0.72, 0.68)  # RGB of what has no colour
+PLAIN = (0.74, 0.72, 0.68)  # RGB of meshes without a colour
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
 
 
 class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
-    """Files that a mesh names, such as its materials, if they are files."""
+    """Resolver for files that a mesh names, such as its materials."""
 
     def absolute(self, name: str) -> Path:
-        """The path of a file by its name; an OSError where reading it would not end."""
+        """Path of a named file. Raise OSError for special files, which could be read for ever."""
         path = Path(super().absolute(name))
         if path.exists():
             check_input(path)
@@ -45,7 +45,7 @@ class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
 
 
 def read_surface(path: Path) -> Surface:
-    """All triangles of a mesh file, in its own unit and axes; `AssetError` where there are none that can be read."""
+    """All triangles of a mesh file, in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
         geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
@@ -59,7 +59,7 @@ def read_surface(path: Path) -> Surface:
 
 
 def missing_colours(path: Path) -> tuple[str, ...]:
-    """Files of materials and pictures that an OBJ file names and that are not there."""
+    """Missing material and image files that an OBJ file names."""
     if path.suffix.lower() != ".obj":
         return ()
     named = _named(path, "mtllib")
@@ -68,7 +68,7 @@ def missing_colours(path: Path) -> tuple[str, ...]:
 
 
 def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> None:
-    """`AssetError` unless a file of such a kind is there, neither empty nor too large."""
+    """Raise `AssetError` unless the file exists, has one of the suffixes, and is neither empty nor too large."""
     if path.suffix.lower() not in suffixes:
         raise AssetError(f"{path} is not a {', '.join(suffixes[:-1])} or {suffixes[-1]} file; convert it")
     if not path.is_file():
@@ -78,7 +78,7 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
         raise AssetError(f"{path} is empty; export it again")
     if size > MAX_FILE:
         raise AssetError(f"{path} has {size / 1e6:.0f} MB; reduce it to {MAX_FILE / 1e6:.0f} MB or less")
-    if path.suffix.lower() in (".glb", ".gltf"):
+    if path.suffix.lower() in GLTF:
         with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             needed = re.findall(rb'"extensionsRequired"\s*:\s*\[([^]]*)', data)
         if packed := re.search(rb"\w*meshopt\w*", b" ".join(needed)):
@@ -87,7 +87,7 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
 
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
-    """Turn whatever a parser raises on a damaged file into an `AssetError`, and keep its warnings off the terminal."""
+    """Turn any error of a parser into an `AssetError`, and hide its warnings."""
     log = logging.getLogger("trimesh")
     before = log.level
     log.setLevel(logging.CRITICAL)
@@ -95,7 +95,7 @@ def parsing(path: Path) -> Iterator[None]:
         yield
     except MemoryError as error:
         raise AssetError(f"{path} claims to be larger than the memory; export it again") from error
-    except Exception as error:  # the parsers of trimesh raise whatever they come across
+    except Exception as error:  # trimesh's parsers raise errors of any type
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         kind = path.suffix.lower()
         raise AssetError(
@@ -111,7 +111,7 @@ def _what_it_has(geometries: list[Any]) -> str:
 
 
 def _named(path: Path, keyword: str) -> list[str]:
-    """What follows a keyword in the lines of an OBJ or MTL file; nothing if there is no such file."""
+    """Last words of the lines of an OBJ or MTL file with a keyword; none without the file."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -120,10 +120,12 @@ def _named(path: Path, keyword: str) -> list[str]:
 
 
 def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
-    """One mesh of a file; `linear` if its plain colours are linear, as in glTF.
+    """The surface of one mesh of a file.
 
     Args:
-        side: Longest side of its picture, px, which is reduced to that; None to leave it as it is.
+        mesh: The mesh.
+        linear: Whether its plain colours are linear, as in glTF.
+        side: Longest side in pixels to which its image is reduced; None to leave it as it is.
     """
     count = len(mesh.faces)
     corners = np.asarray(mesh.triangles, np.float64)
@@ -149,7 +151,7 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
 
 
 def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Plain colour (3,) and picture (height, width, 3), reduced to a side, px, of a material, RGB from 0 to 1."""
+    """Plain colour (3,) and image (height, width, 3) of a material, RGB from 0 to 1."""
     if isinstance(material, trimesh.visual.material.PBRMaterial):
         factor, picture = material.baseColorFactor, material.baseColorTexture
     else:
@@ -164,20 +166,19 @@ def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float
 
 
 def _srgb(linear: Floats) -> Floats:
-    """Colours as screens show them, of the same shape, from linear ones (IEC 61966-2-1)."""
+    """Displayed colours from linear ones, of the same shape (IEC 61966-2-1)."""
     low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, low, high)
 
 
 class _Nearby(Beside):
-    """Files that a mesh names in its own folder or beside that, such as `../materials/textures/wood.png`."""
+    """Resolver for files in the mesh's folder or next to it, such as `../materials/textures/wood.png`."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(file)
         self._file = file
 
     def absolute(self, name: str) -> Path:
-        """The path of a file by its name; an OSError where reading it would not end."""
         folder = self._file.parent.resolve()
         path = (folder / name).resolve()
         if not path.is_relative_to(folder.parent):
@@ -188,12 +189,12 @@ class _Nearby(Beside):
 
 
 def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
-    """Parts of a mesh file by the names of their nodes, moved by a transform (4, 4).
+    """Parts of a mesh file with the names of their nodes, moved by a transform (4, 4).
 
-    glTF comes in metres and z up, COLLADA too, by what the file says; the others as they are.
+    glTF and COLLADA are returned in metres and z up, other formats unchanged.
 
     Raises:
-        AssetError: There is no such file, it is damaged, or it has no triangles.
+        AssetError: The file is missing or damaged, or has no triangles.
     """
     check_mesh_file(path, SCENE_SUFFIXES)
     whole = np.eye(4) if transform is None else transform
@@ -223,19 +224,19 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
 
 
 def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:
-    """A shape of one colour (3,), RGB from 0 to 1."""
+    """A surface of one colour (3,), RGB from 0 to 1."""
     corners = np.asarray(mesh.triangles, np.float64)
     count = len(corners)
     return Surface(corners, np.tile(colour, (count, 3, 1)), np.zeros((count, 3, 2)), np.full(count, -1))
 
 
 def _without_comments(path: Path) -> io.BytesIO:
-    """A COLLADA file without comments: pycollada drops a geometry that has one."""
+    """A COLLADA file without comments, because pycollada drops geometries that contain one."""
     return io.BytesIO(re.sub(rb"<!--.*?-->", b"", read_bytes(path), flags=re.DOTALL))
 
 
 def _collada_frame(path: Path) -> Floats:
-    """Transform (4, 4) from a COLLADA file to metres and z up, by its <asset>, which trimesh leaves alone."""
+    """Transform (4, 4) from a COLLADA file to metres and z up by its <asset>, which trimesh ignores."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
         for tag, element in _elements(path):

@@ -1,4 +1,4 @@
-"""The scene that every reader returns, options and decisions of an import, and helpers that readers share."""
+"""The scene that all readers return, options and decisions of an import, and helpers for readers."""
 
 import re
 from collections.abc import Iterator
@@ -13,51 +13,51 @@ from numpy.typing import NDArray
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.values.errors import AssetError
 
-UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # metres; in the order of guessing
+UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # in metres; guessed in this order
 AXES = ("y", "z")
-TEXTURE_SIDE = 512  # px, longest side of a picture
-MIN_SIDE, MAX_SIDE = 3.0, 60.0  # m, longest sides that houses have
-_STEP = 0.1  # m, of the rectangles that cover slanted outlines
+TEXTURE_SIDE = 512  # longest side of an image, in pixels
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # limits of a house's longest side, m
+_STEP = 0.1  # width of rectangles that cover slanted outlines, m
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What the user gives; None for what is to be found out."""
+    """Options of an object import; None for values to be determined."""
 
     units: str | None = None  # key of `UNITS`
     up: str | None = None  # one of `AXES`
     scale: float = 1.0  # factor on top of the unit
     mass: float | None = None  # kg
-    density: float | None = None  # kg/m^3; not with `mass`
+    density: float | None = None  # kg/m^3; excludes `mass`
 
 
 @dataclass(frozen=True)
 class ImportDecision:
     """One line of the report."""
 
-    what: str  # what was decided
-    choice: str  # how
-    reason: str = ""  # why, or what to do if it is not what was meant
+    what: str  # subject
+    choice: str
+    reason: str = ""  # why, or what to do if another choice was meant
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """A thing of a scene in the frame of the scene: z up, m."""
+class ScenePiece:
+    """An object or part of a scene, in the frame of the scene: z up, m."""
 
-    name: str  # as the source calls it
+    name: str  # its name in the source
     surface: Surface
-    seen: bool = True  # whether it is drawn
-    solid: bool = True  # whether one bumps into it
-    loose: bool = False  # whether the source lets it move
+    seen: bool = True  # drawn
+    solid: bool = True  # collides
+    loose: bool = False  # movable in the source
 
 
 @dataclass(frozen=True)
 class NamedRoom:
-    """A room that the user or the source gives."""
+    """A room named by the user or the source."""
 
     key: str
     label: str
-    boxes: tuple[tuple[float, float, float, float], ...]  # xmin, ymin, xmax, ymax of rectangles, m
+    boxes: tuple[tuple[float, float, float, float], ...]  # rectangles: xmin, ymin, xmax, ymax, m
 
 
 @dataclass(frozen=True)
@@ -66,56 +66,56 @@ class Bin:
 
     key: str
     room: str  # room key
-    x: float  # m, middle of its base
+    x: float  # middle of its base, m
     y: float
     yaw: float  # rad
     z: float = 0.0
-    place: str = "against the wall"  # as people read it
+    place: str = "against the wall"  # description shown to participants
 
 
 @dataclass(frozen=True, eq=False)
 class SourceScene:
     """A scene as it was read."""
 
-    pieces: tuple[Piece, ...]
-    kind: str  # of the source, such as `SDF world`
-    notes: tuple[ImportDecision, ...] = ()  # what was decided on the way
-    rooms: tuple[NamedRoom, ...] = ()  # where the source names them
-    bins: tuple[Bin, ...] = ()  # where the source was a house of ours
+    pieces: tuple[ScenePiece, ...]
+    kind: str  # kind of source, such as `SDF world`
+    notes: tuple[ImportDecision, ...] = ()  # the reader's decisions
+    rooms: tuple[NamedRoom, ...] = ()  # if the source names them
+    bins: tuple[Bin, ...] = ()  # if the source was exported from a house of ours
 
 
 @dataclass(frozen=True)
 class HouseOptions:
-    """What the user gives; None for what is to be found out."""
+    """Options of a house import; None for values to be determined."""
 
-    units: str | None = None  # key of `mjsim.formats.scene.source_scene.UNITS`
-    up: str | None = None  # `y` or `z`
+    units: str | None = None  # key of `UNITS`
+    up: str | None = None  # one of `AXES`
     scale: float = 1.0  # factor on top of the unit
     floor: float | None = None  # height of the floor in the source, m
     rooms: Path | None = None  # TOML file that names rooms
-    models: tuple[Path, ...] = ()  # folders in which the source's models lie
-    skip_missing: bool = False  # whether files that are not there are left out
+    models: tuple[Path, ...] = ()  # folders with the source's models
+    skip_missing: bool = False  # leave out missing files
 
 
 @dataclass
-class Missing:
-    """Files that a source names and that are not there: refused, or left out if the user says so."""
+class MissingFiles:
+    """Files that a source names but that are missing: an error, or left out with `skip`."""
 
     skip: bool
     files: list[str] = field(default_factory=list)
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """What was left out, for the report."""
+        """Report of the files that were left out."""
         return (left_out(f"{len(self.files)} missing", ", ".join(self.files[:6])),) if self.files else ()
 
 
 def left_out(what: str, why: str) -> ImportDecision:
-    """A line of the report about something that the house lacks."""
+    """A line of the report about something that was left out."""
     return ImportDecision("left out", what, why)
 
 
 def numbers(values: Any, count: int, path: Path) -> Floats:
-    """So many numbers of a file, (count,); `AssetError` where they are none or not finite."""
+    """`count` numbers of a file as an array (count,). Raise `AssetError` if they are not finite numbers."""
     try:
         found = np.array(values, np.float64)
     except (TypeError, ValueError):
@@ -125,9 +125,9 @@ def numbers(values: Any, count: int, path: Path) -> Floats:
     return found
 
 
-def moved(pieces: list[Piece], transform: Floats) -> list[Piece]:
+def moved(pieces: list[ScenePiece], transform: Floats) -> list[ScenePiece]:
     """Pieces moved by a homogeneous transform (4, 4)."""
-    return [Piece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]
+    return [ScenePiece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]
 
 
 def unit_of(longest: float) -> str | None:
@@ -136,7 +136,9 @@ def unit_of(longest: float) -> str | None:
 
 
 def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
-    """Rectangles, m, that cover a polygon (k, 2); one with slanted sides in steps of 0.1 m. `ValueError` for none."""
+    """Rectangles, m, that cover a polygon (k, 2), in steps of 0.1 m if its sides are slanted. Raise `ValueError` if it
+    has no area.
+    """
     polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
     if not polygon.is_valid or polygon.area < _STEP**2:
         raise ValueError("has no floor")
@@ -154,7 +156,9 @@ def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
 
 
 def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
-    """Rectangles that cover the cells of a mask (nx, ny) once: rows from, to, columns from, to, ends not included."""
+    """Rectangles (first row, end row, first column, end column) that cover each cell of a mask (nx, ny) once; ends are
+    exclusive.
+    """
     left = mask.copy()
     for row in range(len(left)):
         while left[row].any():
@@ -170,5 +174,5 @@ def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, 
 
 
 def words_of(name: str) -> list[str]:
-    """Words of a name such as `KitchenCabinet_01_001`: kitchen, cabinet."""
+    """Words of a name: `KitchenCabinet_01_001` gives kitchen, cabinet."""
     return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]

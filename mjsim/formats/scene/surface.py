@@ -1,4 +1,4 @@
-"""The triangles of a mesh file with their colours, as plain arrays."""
+"""Triangles of a mesh with their colours, as arrays."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WELD_DIGITS = 6  # corners nearer than 1e-6 m are one
-_MIN_AREA = 1e-13  # m^2; smaller triangles have no direction
+WELD_DIGITS = 6  # corners are equal if they agree to 1e-6 m
+_MIN_AREA = 1e-13  # area below which a triangle has no normal, m^2
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles with colours. A point's colour is that of the corners, interpolated, times that of the image."""
+    """Triangles with colours. The colour of a point is interpolated from the corners and multiplied by the image."""
 
     corners: Floats  # corners of the triangles, m, (n, 3, 3)
     colours: Floats  # colour at each corner, RGB from 0 to 1, (n, 3, 3)
-    uv: Floats  # where each corner lies in its image, from 0 to 1 from the lower left, repeating, (n, 3, 2)
-    image: Ints  # number of each triangle's image, -1 for none, (n,)
+    uv: Floats  # texture coordinates of the corners, from 0 to 1 from the lower left, repeating, (n, 3, 2)
+    image: Ints  # index of each triangle's image, -1 for none, (n,)
     images: tuple[Floats, ...] = ()  # RGB from 0 to 1, rows from the top, (height, width, 3) each
 
     def __len__(self) -> int:
@@ -29,25 +29,20 @@ class Surface:
 
     def select(self, rows: NDArray[Any]) -> Self:
         """The triangles of a mask (n,), or of row numbers (k,)."""
-        return replace(
-            self,
-            corners=self.corners[rows],
-            colours=self.colours[rows],
-            uv=self.uv[rows],
-            image=self.image[rows],
-        )
+        arrays = {name: getattr(self, name)[rows] for name in ("corners", "colours", "uv", "image")}
+        return replace(self, **arrays)
 
     def moved(self, transform: Floats) -> Self:
-        """All corners moved by a homogeneous transform (4, 4)."""
+        """The surface moved by a homogeneous transform (4, 4)."""
         return replace(self, corners=self.corners @ transform[:3, :3].T + transform[:3, 3])
 
     def mesh(self) -> trimesh.Trimesh:
-        """The triangles joined where their corners coincide; face k is triangle k."""
+        """The triangles joined where their corners coincide. Face k is triangle k."""
         vertices, faces = _welded(self.corners)
         return trimesh.Trimesh(vertices, faces, process=False)
 
     def colours_at(self, triangles: Ints, weights: Floats) -> Floats:
-        """Colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and weights of the corners (k, 3)."""
+        """Colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and barycentric weights (k, 3)."""
         colours: Floats = np.einsum("kc,kcd->kd", weights, self.colours[triangles])
         places = np.einsum("kc,kcd->kd", weights, self.uv[triangles])
         for number, image in enumerate(self.images):
@@ -57,7 +52,6 @@ class Surface:
 
 
 def joined(surfaces: list[Surface]) -> Surface:
-    """Several surfaces as one."""
     first = np.cumsum([0, *(len(s.images) for s in surfaces)])
     return Surface(
         corners=np.concatenate([s.corners for s in surfaces]),
@@ -71,7 +65,7 @@ def joined(surfaces: list[Surface]) -> Surface:
 
 
 def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
-    """Without triangles that are not finite, have no area, or repeat another one; and how many of each went."""
+    """Remove triangles that are not finite, have no area, or are duplicates. Return also the number of each."""
     finite = np.asarray(np.isfinite(surface.corners).all(axis=(1, 2)))
     kept = surface.select(finite)
     edges = np.diff(kept.corners, axis=1)
@@ -89,14 +83,14 @@ def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
 
 
 def _welded(corners: Floats) -> tuple[Floats, Ints]:
-    """Distinct vertices (k, 3), and the vertex of every corner, shape (n, 3)."""
+    """Distinct vertices (k, 3), and the vertex of every corner (n, 3)."""
     points = np.round(corners.reshape(-1, 3), WELD_DIGITS) + 0.0
     vertices, faces = np.unique(points, axis=0, return_inverse=True)
     return vertices, faces.reshape(-1, 3)
 
 
 def _sample(image: Floats, places: Floats) -> Floats:
-    """Bilinear colours (k, 3) of an image (h, w, 3), which repeats, at places (k, 2)."""
+    """Bilinear colours (k, 3) of a repeating image (h, w, 3) at texture coordinates (k, 2)."""
     height, width = image.shape[:2]
     x, y = places[:, 0] * width - 0.5, (1.0 - places[:, 1]) * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)

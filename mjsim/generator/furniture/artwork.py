@@ -8,50 +8,50 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mjsim.generator.furniture.look import Look
-from mjsim.generator.furniture.piece import Picture
+from mjsim.generator.furniture.appearance import Appearance
+from mjsim.generator.furniture.piece import DrawnTexture
 
-Image = NDArray[np.float64]  # (height, width, 3), red green blue, 0 to 1
+Image = NDArray[np.float64]  # RGB from 0 to 1, (height, width, 3)
 Plane = NDArray[np.float64]  # (height, width)
-Manner = Callable[[np.random.Generator, Image, Plane, Plane, Image], None]
+Style = Callable[[np.random.Generator, Image, Plane, Plane, Image], None]
 
 
-def painting(rng: np.random.Generator, look: Look, wide: int = 128, high: int = 96) -> Picture:
-    """A picture in one of seven manners, px."""
+def painting(rng: np.random.Generator, look: Appearance, wide: int = 128, high: int = 96) -> DrawnTexture:
+    """Draw a picture of `wide` x `high` pixels in one of seven styles."""
     y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
     colours = _palette(rng, look, 6)
     image = (0.75 + 0.25 * colours[0]) * (1 - 0.25 * y[..., None])
-    _MANNERS[int(rng.integers(len(_MANNERS)))](rng, image, x, y, colours)
+    _STYLES[int(rng.integers(len(_STYLES)))](rng, image, x, y, colours)
     return _file("picture", image)
 
 
-def carpet(rng: np.random.Generator, look: Look, round_one: bool = False) -> Picture:
-    """The pattern of a rug in one of six manners, or rings."""
+def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) -> DrawnTexture:
+    """Draw the pattern of a rug, in one of six styles, or in rings for a round one."""
     n = 128
     y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
     ground, one, two, three = _palette(rng, look, 4)
     ground = 0.55 * ground + 0.45 * np.array([0.9, 0.87, 0.8]) if rng.random() < 0.6 else ground
     image = np.broadcast_to(ground, (n, n, 3)).copy()
     edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
-    manner, k = "rings" if round_one else _RUGS[int(rng.integers(len(_RUGS)))], int(rng.integers(3, 7))
-    if manner == "rings":
+    style, k = "rings" if round_one else _RUGS[int(rng.integers(len(_RUGS)))], int(rng.integers(3, 7))
+    if style == "rings":
         edge = 0.5 - np.hypot(x - 0.5, y - 0.5)
         image[np.mod(2 * k * edge, 1) < 0.35], image[edge < 0.04] = one, two
-    elif manner == "stripes":
+    elif style == "stripes":
         bands = np.mod(2 * k * x, 1)
         image[bands < 0.3], image[(bands > 0.5) & (bands < 0.6)] = one, two
-    elif manner == "lozenges":
+    elif style == "lozenges":
         away = np.abs(np.mod(x * k, 1) - 0.5) + np.abs(np.mod(y * k, 1) - 0.5)
         image[away < 0.4], image[away < 0.25], image[away < 0.1] = one, two, three
-    elif manner == "medallion":
+    elif style == "medallion":
         lobes = 1 + 0.07 * np.cos(12 * np.arctan2(y - 0.5, x - 0.5))
         away = np.hypot((x - 0.5) * 1.3, y - 0.5) * lobes
         image[away < 0.34], image[away < 0.26], image[away < 0.12] = one, ground, two
-    elif manner == "zigzag":
+    elif style == "zigzag":
         image[np.mod(y * (k // 2 + 1) + 0.25 * np.abs(np.mod(x * 4, 2) - 1), 0.5) < 0.05] = 0.35 * one
-    elif manner == "checks":
+    elif style == "checks":
         image[(np.floor(x * k) + np.floor(y * k)) % 2 == 0] = 0.8 * one + 0.2 * ground
-    if manner in ("lozenges", "medallion", "border"):
+    if style in ("lozenges", "medallion", "border"):
         image[edge < 0.09], image[edge < 0.07], image[edge < 0.025] = two, one, three
     worn = cv2.GaussianBlur(rng.standard_normal((n, n)), (0, 0), 1.2)
     return _file("rug", image * (1 + 0.1 * worn[..., None]))
@@ -62,10 +62,8 @@ _RUGS = ("stripes", "lozenges", "medallion", "zigzag", "checks", "border")
 
 def _hills(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
     aspect = x.shape[1] / x.shape[0]
-    sun = np.hypot((x - rng.uniform(0.2, 0.8)) * aspect, y - rng.uniform(0.15, 0.35)) < rng.uniform(
-        0.07, 0.13
-    )
-    image[sun] = (1.0, 0.9, 0.7)
+    from_sun = np.hypot((x - rng.uniform(0.2, 0.8)) * aspect, y - rng.uniform(0.15, 0.35))
+    image[from_sun < rng.uniform(0.07, 0.13)] = (1.0, 0.9, 0.7)
     waves, tall = ((1.5, 5), 0.09) if rng.random() < 0.5 else ((8, 16), 0.02)
     for i in range(4):
         crest = 0.42 + 0.14 * i + tall * np.sin(rng.uniform(*waves) * x + rng.uniform(0, 6.3))
@@ -75,10 +73,9 @@ def _hills(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: 
 def _discs(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
     aspect = x.shape[1] / x.shape[0]
     for colour in colours:
-        at = np.hypot((x - rng.uniform(0.1, 0.9)) * aspect, y - rng.uniform(0.1, 0.9)) < rng.uniform(
-            0.1, 0.32
-        )
-        image[at] = 0.25 * image[at] + 0.75 * colour
+        away = np.hypot((x - rng.uniform(0.1, 0.9)) * aspect, y - rng.uniform(0.1, 0.9))
+        disc = away < rng.uniform(0.1, 0.32)
+        image[disc] = 0.25 * image[disc] + 0.75 * colour
 
 
 def _fields(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
@@ -94,15 +91,12 @@ def _branch(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours:
     for i in range(9):
         at, side = 0.12 + 0.085 * i, 1 if i % 2 else -1
         p, q = (x - stem - lean * (1 - at) - side * 0.13) * aspect, y - at + 0.05
-        along, across = (
-            p * math.cos(0.7) - q * math.sin(0.7) * side,
-            p * math.sin(0.7) * side + q * math.cos(0.7),
-        )
+        along = p * math.cos(0.7) - q * math.sin(0.7) * side
+        across = p * math.sin(0.7) * side + q * math.cos(0.7)
         image[(along / 0.15) ** 2 + (across / 0.045) ** 2 < 1] = colours[1 + i % 2] * 0.8
 
 
 def _town(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """Towers with lit windows."""
     left = 0.0
     while left < 1:
         wide, tall = rng.uniform(0.08, 0.18), rng.uniform(0.25, 0.7)
@@ -114,26 +108,24 @@ def _town(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: I
 
 
 def _woven(rng: np.random.Generator, image: Image, x: Plane, y: Plane, colours: Image) -> None:
-    """Broad lines across each other."""
     for i in range(int(rng.integers(5, 9))):
-        image[np.abs((x if i % 2 else y) - rng.uniform(0, 1)) < rng.uniform(0.02, 0.09)] = colours[
-            i % len(colours)
-        ]
+        away = np.abs((x if i % 2 else y) - rng.uniform(0, 1))
+        image[away < rng.uniform(0.02, 0.09)] = colours[i % len(colours)]
 
 
-_MANNERS: tuple[Manner, ...] = (_hills, _hills, _discs, _fields, _branch, _town, _woven)
+_STYLES: tuple[Style, ...] = (_hills, _hills, _discs, _fields, _branch, _town, _woven)
 
 
-def _palette(rng: np.random.Generator, look: Look, count: int) -> Image:
-    """Colours (count, 3) of a picture: some of the home's, lighter and darker."""
+def _palette(rng: np.random.Generator, look: Appearance, count: int) -> Image:
+    """Colours (count, 3) of a picture: some of the home's, lighter or darker."""
     chosen = np.array(look.colours)[rng.permutation(len(look.colours))[: min(count, 5)]]
     while len(chosen) < count:
         chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])
     return np.asarray(np.clip(chosen * rng.uniform(0.85, 1.15, (len(chosen), 1)), 0, 1))
 
 
-def _file(name: str, image: Image) -> Picture:
-    """An image as a texture whose name tells its content."""
+def _file(name: str, image: Image) -> DrawnTexture:
+    """An image as a texture that is named by a hash of its content."""
     pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
     png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
-    return Picture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)
+    return DrawnTexture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)

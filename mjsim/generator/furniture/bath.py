@@ -1,11 +1,10 @@
-"""Bathrooms and laundries."""
+"""Bathroom and laundry furniture."""
 
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Member, Piece, group
 
 
 def toilet(b: Builder) -> Piece:
-    """With a cistern, or hung in front of a wall, in three sizes."""
     w, d = b.pick(0.37, 0.4), b.pick(0.62, 0.68) if b.smaller < 2 else 0.58
     b.shadow(w, (0, d))
     hung = b.chance(0.4)
@@ -32,11 +31,9 @@ def toilet(b: Builder) -> Piece:
     parts = [(-wide / 2, 0.0, wide / 2, d, top)]
     if b.smaller == 0:
         parts.append((-w / 2 - 0.17, 0.0, -wide / 2, 0.14, top))  # the paper
-    return b.piece(
-        (max(wide, w + 0.34) if b.smaller == 0 else wide, d, top),
-        use=((-aside, d, aside, d + 0.55),),
-        parts=parts,
-    )
+    if b.smaller == 0:
+        wide = max(wide, w + 0.34)
+    return b.piece((wide, d, top), use=((-aside, d, aside, d + 0.55),), parts=parts)
 
 
 def _tap(b: Builder, x: float, y: float, z: float) -> None:
@@ -45,14 +42,10 @@ def _tap(b: Builder, x: float, y: float, z: float) -> None:
 
 
 def washbasin(b: Builder) -> Piece:
-    """On a cupboard, with a foot, or a double one, with a mirror over it."""
-    form = (
-        b.pick("cupboard", "foot", "bowl", "double") if b.smaller == 0 else b.pick("cupboard", "foot", "bowl")
-    )
-    w, d = (
-        {"cupboard": b.size(0.6, 0.8, 0.1), "foot": 0.55, "bowl": b.size(0.7, 0.9, 0.1), "double": 1.2}[form],
-        0.46,
-    )
+    forms = ("cupboard", "foot", "bowl", "double")
+    form = b.pick(*forms) if b.smaller == 0 else b.pick(*forms[:3])
+    widths = {"cupboard": b.size(0.6, 0.8, 0.1), "foot": 0.55, "bowl": b.size(0.7, 0.9, 0.1), "double": 1.2}
+    w, d = widths[form], 0.46
     if b.smaller > 1:
         form, w, d = "foot", 0.45, 0.4
     b.shadow(w, (0, d))
@@ -94,7 +87,6 @@ def washbasin(b: Builder) -> Piece:
 
 
 def bathtub(b: Builder) -> Piece:
-    """Along the wall, with water, taps, and sometimes a pane."""
     w, d, h = (b.pick(1.6, 1.7, 1.8), 1.6, 1.5)[min(b.smaller, 2)], b.pick(0.72, 0.76), 0.57
     side = b.pick(-1, 1)
     b.shadow(w, (0, d))
@@ -126,16 +118,11 @@ def bathtub(b: Builder) -> Piece:
         middle = side * (w / 2 - high)
         tops = (0.62, 2.1) if side > 0 else (2.1, 0.62)
         parts = [(-w / 2, 0.0, middle, d, tops[0]), (middle, 0.0, w / 2, d, tops[1])]
-    return b.piece(
-        (w, d, 2.1),
-        use=((-0.4, d, 0.4, d + 0.55),),
-        parts=parts,
-        stands="left" if side < 0 else "right",
-    )
+    stands = "left" if side < 0 else "right"
+    return b.piece((w, d, 2.1), use=((-0.4, d, 0.4, d + 0.55),), parts=parts, stands=stands)
 
 
 def shower(b: Builder) -> Piece:
-    """A tray in a corner between two panes."""
     w = d = b.pick(0.8, 0.9) if b.smaller else b.pick(0.9, 1.0)
     side = b.pick(-1, 1)  # where the wall is
     b.shadow(w, (0, d))
@@ -144,11 +131,8 @@ def shower(b: Builder) -> Piece:
     b.box("ceramic_shade", w - 0.12, (0.06, d - 0.06), (0.05, 0.053), seen=True)
     b.box("pane", w - 0.02, (d - 0.012, d - 0.004), (0.05, 1.95), seen=True)
     b.box("pane", 0.008, (0, d - 0.012), (0.05, 1.95), -side * (w / 2 - 0.008), seen=True)
-    for x, y in (
-        (-side * (w / 2 - 0.01), d - 0.01),
-        (side * (w / 2 - 0.01), d - 0.01),
-        (-side * (w / 2 - 0.01), 0.01),
-    ):
+    edge = side * (w / 2 - 0.01)
+    for x, y in ((-edge, d - 0.01), (edge, d - 0.01), (-edge, 0.01)):
         b.box(b.metal, 0.02, (y - 0.01, y + 0.01), (0.05, 1.97), x, seen=True)
     b.box(b.metal, w, (d - 0.02, d), (1.95, 1.97), seen=True)
     b.box("chrome", 0.02, (d, d + 0.03), (0.95, 1.15), -side * 0.2, seen=True)
@@ -157,13 +141,11 @@ def shower(b: Builder) -> Piece:
     b.rod("chrome", (x, 0.04, 2.05), (x, 0.3, 2.08), 0.011)
     b.post("chrome", x, 0.32, (2.05, 2.07), b.pick(0.09, 0.13))
     b.box("chrome", 0.16, (0.02, 0.06), (1.05, 1.09), x, seen=True)
-    return b.piece(
-        (w, d + 0.03, 2.09), use=((-0.35, d + 0.03, 0.35, d + 0.58),), stands="left" if side < 0 else "right"
-    )
+    stands = "left" if side < 0 else "right"
+    return b.piece((w, d + 0.03, 2.09), use=((-0.35, d + 0.03, 0.35, d + 0.58),), stands=stands)
 
 
 def wash_corner(b: Builder) -> Piece:
-    """Shower, toilet and washbasin in a row behind a screen, where a home has no bathroom."""
     row = [draw(Builder(name, b.rng, b.look, 1)) for name, draw in (("shower", shower), ("toilet", toilet))]
     row.append(washbasin(Builder("washbasin", b.rng, b.look, 1)))
     side = 1 if row[0].stands == "left" else -1  # away from the corner
@@ -178,7 +160,6 @@ def wash_corner(b: Builder) -> Piece:
 
 
 def _machine(b: Builder, z: float, glass: str) -> None:
-    """A washing machine or a dryer whose bottom is at z."""
     b.box("white", 0.59, (0, 0.56), (z, z + 0.85))
     b.disc("chrome", 0, 0.565, z + 0.4, 0.19, 0.03)
     b.disc(glass, 0, 0.582, z + 0.4, 0.15, 0.012)
@@ -188,7 +169,6 @@ def _machine(b: Builder, z: float, glass: str) -> None:
 
 
 def washing_machine(b: Builder) -> Piece:
-    """With a basket or towels on it."""
     b.shadow(0.6, (0, 0.6))
     _machine(b, 0, b.pick("dark", "black"))
     if b.chance(0.5):
@@ -201,7 +181,6 @@ def washing_machine(b: Builder) -> Piece:
 
 
 def washing_tower(b: Builder) -> Piece:
-    """A dryer on a washing machine."""
     b.shadow(0.6, (0, 0.6))
     _machine(b, 0, "dark")
     b.box("grey", 0.58, (0, 0.55), (0.85, 0.87), seen=True)
@@ -210,7 +189,6 @@ def washing_tower(b: Builder) -> Piece:
 
 
 def towel_rail(b: Builder) -> Piece:
-    """A flat radiator with towels."""
     w, h, paint = b.pick(0.45, 0.5, 0.6), b.pick(1.4, 1.6), b.pick("chrome", "white", "black")
     b.guard(w, (0.0, 0.1), (0, h))
     for x in (-w / 2 + 0.015, w / 2 - 0.015):
@@ -223,7 +201,6 @@ def towel_rail(b: Builder) -> Piece:
 
 
 def bath_cabinet(b: Builder) -> Piece:
-    """A tall narrow cupboard."""
     w, d, h = b.pick(0.35, 0.4, 0.5), 0.35, b.pick(1.3, 1.7)
     paint = b.pick("white", b.wood, b.front)
     b.shadow(w, (0, d))
@@ -236,7 +213,6 @@ def bath_cabinet(b: Builder) -> Piece:
 
 
 def towel_shelf(b: Builder) -> Piece:
-    """An open shelf with towels and baskets."""
     w, d, h = b.size(0.4, 0.6), 0.32, b.pick(0.95, 1.5)
     paint = b.pick(b.wood, b.metal, "white")
     b.shadow(w, (0, d))
@@ -250,19 +226,13 @@ def towel_shelf(b: Builder) -> Piece:
             b.box("wicker", 0.8 * w, (0.04, d - 0.04), (z + 0.018, z + 0.2), seen=True)
         elif i < rows:
             for j, towel in enumerate(("towel_a", "towel_white", "towel_b")):
-                b.box(
-                    towel,
-                    0.66 * w,
-                    (0.05, d - 0.05),
-                    (z + 0.018 + 0.055 * j, z + 0.071 + 0.055 * j),
-                    seen=True,
-                )
+                height = (z + 0.018 + 0.055 * j, z + 0.071 + 0.055 * j)
+                b.box(towel, 0.66 * w, (0.05, d - 0.05), height, seen=True)
     b._plant(0, d / 2, h)
     return b.piece((w, d, h + 0.35), use=0.6)
 
 
 def drying_rack(b: Builder) -> Piece:
-    """A clothes horse with some washing."""
     w, d, h = b.pick(0.9, 1.1), 0.55, 0.95
     b.guard(w, (0, d), (0, h))
     for x in (-w / 2 + 0.01, w / 2 - 0.01):
@@ -276,18 +246,3 @@ def drying_rack(b: Builder) -> Piece:
         x = 0.2 * w * b.pick(-1, 1)
         b.box(cloth, b.pick(0.3, 0.4), (y - 0.008, y + 0.008), (h - 0.4 - 0.05 * (i % 2), h), x, seen=True)
     return b.piece((w, d, h), use=0.6)
-
-
-KINDS = (
-    toilet,
-    washbasin,
-    bathtub,
-    shower,
-    wash_corner,
-    washing_machine,
-    washing_tower,
-    towel_rail,
-    bath_cabinet,
-    towel_shelf,
-    drying_rack,
-)

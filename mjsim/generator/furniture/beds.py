@@ -1,13 +1,12 @@
-"""Beds, from the cot to the double bed with its bedside tables."""
+"""Beds and bedside tables."""
 
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece, Spot, group
 
-SIDE = 0.62  # m, to get in beside it
+SIDE = 0.62  # m of free floor beside a bed, for getting in
 
 
 def _headboard(b: Builder, w: float) -> float:
-    """Writes one of four headboards against the wall; returns its height."""
     top = b.size(0.85, 1.15)
     form = b.pick("panel", "padded", "slats", "channels")
     if form == "panel":
@@ -17,39 +16,30 @@ def _headboard(b: Builder, w: float) -> float:
         b.box(b.wood, w, (0, 0.05), (top - 0.08, top), seen=True)
         count = max(5, round(w / 0.16))
         for i in range(count):
-            b.box(
-                b.wood,
-                0.035,
-                (0.01, 0.04),
-                (0.5, top - 0.08),
-                (w - 0.04) * (i / (count - 1) - 0.5),
-                seen=True,
-            )
+            x = (w - 0.04) * (i / (count - 1) - 0.5)
+            b.box(b.wood, 0.035, (0.01, 0.04), (0.5, top - 0.08), x, seen=True)
     else:
         b.box(b.cloth, w, (0, 0.07), (0, top))
         count = 2 if form == "padded" else max(4, round(w / 0.22))
         for i in range(count):
-            wide = w / count
-            b.soft(
-                b.cloth,
-                (w * ((i + 0.5) / count - 0.5), 0.07, (top + 0.45) / 2),
-                (wide / 2, 0.03, top / 2 - 0.24),
-            )
+            middle = (w * ((i + 0.5) / count - 0.5), 0.07, (top + 0.45) / 2)
+            b.soft(b.cloth, middle, (w / count / 2, 0.03, top / 2 - 0.24))
     return top
 
 
 def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: int) -> None:
-    """Mattress, quilt, pillows and sometimes a throw; their frame ends at `z`."""
+    """Add a mattress, a quilt, pillows and sometimes a throw to a frame whose top is at `z`."""
     quilt = b.pick(*b.look.quilts)
     b.box("linen", w - 0.04, (y[0] + 0.02, y[1] - 0.02), (z, z + 0.18))
     start = y[0] + b.pick(0.45, 0.55, 0.62)
-    side = "quilt_a" if quilt == "quilt_c" else quilt  # its pattern would be smeared on the narrow sides
+    side = (
+        "quilt_a" if quilt == "quilt_c" else quilt
+    )  # the pattern of quilt_c would be stretched along its narrow sides
     b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
     b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)
     if b.chance(0.5):
-        b.rod(
-            "linen", (-w / 2 + 0.05, start, z + 0.19), (w / 2 - 0.05, start, z + 0.19), 0.045, shape="capsule"
-        )
+        half = w / 2 - 0.05
+        b.rod("linen", (-half, start, z + 0.19), (half, start, z + 0.19), 0.045, shape="capsule")
     if b.chance(0.5):
         b.box(b.cloth2, w + 0.02, (y[1] - 0.55, y[1] - 0.15), (z + 0.04, z + 0.225), seen=True)
     each = w / pillows
@@ -78,7 +68,6 @@ def _bed(b: Builder, w: float, pillows: int, sides: tuple[int, ...]) -> Piece:
 
 
 def bedside_table(b: Builder) -> Piece:
-    """Drawers, an open box, a round one or a stool, beside a bed, with a lamp or something to read."""
     w, d, h = b.size(0.38, 0.48), 0.4, b.size(0.42, 0.56)
     form = b.pick("drawers", "open", "round", "legs")
     b.shadow(w, (0, d), round_one=form == "round")
@@ -107,14 +96,12 @@ def bedside_table(b: Builder) -> Piece:
 
 
 def _tables(b: Builder, bed: Piece, sides: tuple[int, ...]) -> Piece:
-    """A bed with bedside tables at some of its sides."""
     table = bedside_table(Builder("bedside_table", b.rng, b.look))
     away = bed.size[0] / 2 + table.size[0] / 2 + 0.03
     return group(b.kind, [(bed, 0, 0, 0), *((table, side * away, 0, 0) for side in sides)], use=bed.use)
 
 
 def double_bed(b: Builder) -> Piece:
-    """1.4 to 1.8 m wide, with two bedside tables, with one, or beside a wall without."""
     w = (b.pick(1.6, 1.8), b.pick(1.4, 1.6), 1.4, 1.2)[min(b.smaller, 3)]
     if b.smaller == 0 and b.chance(0.8):
         return _tables(b, _bed(b, w, 2, (-1, 1)), (-1, 1))
@@ -124,14 +111,12 @@ def double_bed(b: Builder) -> Piece:
 
 
 def single_bed(b: Builder) -> Piece:
-    """0.9 to 1.2 m wide, with a bedside table where there is room."""
     w, side = b.pick(0.9, 1.0, 1.2) if b.smaller == 0 else 0.9, b.pick(-1, 1)
     bed = _bed(b, w, 1, (side,))
     return _tables(b, bed, (side,)) if b.smaller == 0 and b.chance(0.7) else bed
 
 
 def day_bed(b: Builder) -> Piece:
-    """Lies along the wall, with a back and cushions."""
     w, d = 2.04, b.pick(0.85, 0.95)
     b.shadow(w, (0, d))
     b.box(b.wood, w, (0, d), (0.1, 0.3))
@@ -146,7 +131,6 @@ def day_bed(b: Builder) -> Piece:
 
 
 def bunk_bed(b: Builder) -> Piece:
-    """Two beds over each other with a ladder."""
     w, d, h = 2.04, b.pick(0.96, 1.02), 1.75
     paint = b.pick(b.wood, b.front, "white")
     b.shadow(w, (0, d))
@@ -165,6 +149,3 @@ def bunk_bed(b: Builder) -> Piece:
     for i in range(5):
         b.box(paint, 0.33, (d - 0.015, d + 0.015), (0.25 + 0.26 * i, 0.29 + 0.26 * i), 0.725, seen=True)
     return b.piece((w, d + 0.02, h), use=0.7)
-
-
-KINDS = (double_bed, single_bed, bunk_bed, day_bed, bedside_table)

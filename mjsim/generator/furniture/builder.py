@@ -1,4 +1,4 @@
-"""Writes the geoms of one piece of furniture: boxes, legs, fronts, cushions, and small things on top."""
+"""`Builder`, which writes the MJCF geoms of one piece of furniture."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,107 +6,98 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mjsim.generator.furniture.look import Look
-from mjsim.generator.furniture.piece import Part, Picture, Piece, Spot
+from mjsim.generator.furniture.appearance import Appearance
+from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Spot
 
 Span = tuple[float, float]
 Point = tuple[float, float, float]
 T = TypeVar("T")
-PANEL = 0.016  # m, thickness of doors and drawers
-GAP = 0.008  # m, between them
+PANEL = 0.016  # thickness of doors and drawers, m
+GAP = 0.008  # gap between doors or drawers, m
 _THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
-FACING = 'xyaxes="-1 0 0 0 0 1"'  # an image that is seen from +y
+FACING = 'xyaxes="-1 0 0 0 0 1"'  # turns an image to be seen from +y
 
 
 def numbers(*values: float) -> str:
-    """Numbers of MJCF, to a tenth of a millimetre."""
+    """Format numbers for MJCF, to a tenth of a millimetre."""
     return " ".join(f"{round(float(v), 4) + 0.0:g}" for v in values)
 
 
+def _extent(w: float, y: Span, z: Span, x: float) -> str:
+    half = numbers(w / 2, (y[1] - y[0]) / 2, (z[1] - z[0]) / 2)
+    return f'pos="{numbers(x, sum(y) / 2, sum(z) / 2)}" size="{half}"'
+
+
 class Builder:
-    """Collects geoms in the frame of a piece; `w` is always the whole width, and `x` its middle."""
+    """Collects the geoms of a piece in its own frame.
+
+    In all methods `w` is a full width along x and `x` its middle, `y` and `z` are intervals; all in m. Geoms with
+    `seen` are drawn and do not collide. Those of `guard` collide and are not drawn.
+    """
 
     def __init__(
-        self, kind: str, rng: np.random.Generator, look: Look, smaller: int = 0, fit: Point | None = None
+        self,
+        kind: str,
+        rng: np.random.Generator,
+        look: Appearance,
+        smaller: int = 0,
+        fit: Point | None = None,
     ) -> None:
         self.kind, self.rng, self.look, self.smaller, self.fit = kind, rng, look, smaller, fit
         self.geoms: list[str] = []
-        self.pictures: list[Picture] = []
+        self.pictures: list[DrawnTexture] = []
         self.wood, self.wood2 = self.pick(*look.woods), self.pick(*look.woods)
         self.cloth, self.cloth2 = self.pick(*look.cloths), self.pick(*look.cloths)
         self.front, self.metal = self.pick(*look.fronts), self.pick(*look.metals)
         self.handle = self.pick("bar", "knob", "none", "bar")
 
     def pick(self, *options: T) -> T:
-        """One of some options."""
         return options[int(self.rng.integers(len(options)))]
 
     def size(self, low: float, high: float, step: float = 0.05) -> float:
-        """A length, m, from `low` to `high` in steps; the smaller the piece has to be, the nearer to `low`."""
+        """Draw a length, m, from `low` to `high` in steps, nearer to `low` the smaller the piece has to be."""
         count = round((high - low) / step)
         drawn = int(self.rng.integers(count + 1))
         return round(low + step * max(0, min(drawn, round(count * (1 - 0.5 * self.smaller)))), 4)
 
     def chance(self, share: float) -> bool:
-        """True in this share of cases."""
         return bool(self.rng.random() < share)
 
     def add(self, shape: str, material: str, seen: bool, attributes: str) -> None:
-        """A geom of any shape; `seen` ones do not collide."""
         kind = "" if shape == "box" else f' type="{shape}"'
         label = ' class="decor"' if seen else ""
         self.geoms.append(f'<geom{label}{kind} material="{material}" {attributes}/>')
 
     def box(self, material: str, w: float, y: Span, z: Span, x: float = 0.0, *, seen: bool = False) -> None:
-        """A box of width `w` around `x`."""
-        middle = numbers(x, sum(y) / 2, sum(z) / 2)
-        self.add(
-            "box",
-            material,
-            seen,
-            f'pos="{middle}" size="{numbers(w / 2, (y[1] - y[0]) / 2, (z[1] - z[0]) / 2)}"',
-        )
+        self.add("box", material, seen, _extent(w, y, z, x))
 
     def guard(self, w: float, y: Span, z: Span, x: float = 0.0) -> None:
-        """A box that collides and is not seen."""
-        middle, half = (
-            numbers(x, sum(y) / 2, sum(z) / 2),
-            numbers(w / 2, (y[1] - y[0]) / 2, (z[1] - z[0]) / 2),
-        )
-        self.geoms.append(f'<geom class="guard" pos="{middle}" size="{half}"/>')
+        self.geoms.append(f'<geom class="guard" {_extent(w, y, z, x)}/>')
 
     def post(self, material: str, x: float, y: float, z: Span, radius: float, *, seen: bool = True) -> None:
-        """An upright cylinder."""
         half = numbers(radius, (z[1] - z[0]) / 2)
         self.add("cylinder", material, seen, f'pos="{numbers(x, y, sum(z) / 2)}" size="{half}"')
 
     def rod(self, material: str, start: Point, end: Point, radius: float, *, shape: str = "cylinder") -> None:
-        """A seen rod, or with `shape` "capsule" a roll."""
         self.add(shape, material, True, f'fromto="{numbers(*start, *end)}" size="{numbers(radius)}"')
 
     def soft(self, material: str, at: Point, half: Point, turn: Point = (0.0, 0.0, 0.0)) -> None:
-        """A seen ellipsoid, turned by Euler angles."""
         euler = f' euler="{numbers(*turn)}"' if any(turn) else ""
         self.add("ellipsoid", material, True, f'pos="{numbers(*at)}" size="{numbers(*half)}"{euler}')
 
     def disc(self, material: str, x: float, y: float, z: float, radius: float, thick: float = 0.012) -> None:
-        """A seen disc that faces the room, its middle at `y`."""
-        turned = 'euler="1.5708 0 0"'
-        self.add(
-            "cylinder",
-            material,
-            True,
-            f'pos="{numbers(x, y, z)}" size="{numbers(radius, thick / 2)}" {turned}',
-        )
+        """Add a disc that faces the room, with its middle at `y`."""
+        size = numbers(radius, thick / 2)
+        self.add("cylinder", material, True, f'pos="{numbers(x, y, z)}" size="{size}" euler="1.5708 0 0"')
 
     def image(self, material: str, w: float, z: Span, y: float, x: float = 0.0, thick: float = 0.008) -> None:
-        """A seen upright panel that shows an image to the room; it ends at `y`."""
+        """Add a panel that shows an image to the room, with its front at `y`."""
         middle = numbers(x, y - thick / 2, sum(z) / 2)
         half = numbers(w / 2, (z[1] - z[0]) / 2, thick / 2)
         self.add("box", material, True, f'pos="{middle}" size="{half}" {FACING}')
 
     def shadow(self, w: float, y: Span, x: float = 0.0, *, round_one: bool = False) -> None:
-        """A contact shadow around a footprint; heights differ, so that two that overlap do not flicker."""
+        """Add a contact shadow around a footprint. Heights differ, so that overlapping shadows do not flicker."""
         height = 0.0038 + 0.0001 * int(self.rng.integers(12))
         material = ' material="shadow_round"' if round_one else ""
         half = numbers(w / 2 + 0.1, (y[1] - y[0]) / 2 + 0.09, 0.1)
@@ -124,7 +115,6 @@ class Builder:
         radius: float = 0.022,
         x: float = 0.0,
     ) -> None:
-        """Four seen legs, round or square."""
         square = self.chance(0.5)
         for sx in (-1, 1):
             for v in (y[0] + inset, y[1] - inset):
@@ -145,7 +135,7 @@ class Builder:
         x: float = 0.0,
         doors: bool = False,
     ) -> None:
-        """Drawers, or doors, with handles; they begin at `y`."""
+        """Add drawers or doors with handles in front of `y`."""
         wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
         for i in range(columns):
             for j in range(rows):
@@ -155,7 +145,6 @@ class Builder:
                 self._handle(u, v, y + PANEL, wide, high, (1 if i % 2 == 0 else -1) if doors else 0)
 
     def _handle(self, u: float, v: float, y: float, wide: float, high: float, side: int) -> None:
-        """A handle of a front of `wide` x `high`, at its middle or at one side of a door."""
         out = (y - 0.002, y + 0.016)
         if self.handle == "none":
             return
@@ -173,7 +162,7 @@ class Builder:
     def clutter(
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
-        """Small things on a top of width `w` around `x`; `low` ones end 0.13 m above it."""
+        """Add small objects on a surface at height `z`. With `low` they end 0.13 m above it."""
         things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
@@ -207,33 +196,31 @@ class Builder:
                 self.soft(fruit, (x + u, y + v, z + 0.075), (0.035, 0.035, 0.035))
 
     def _box(self, x: float, y: float, z: float) -> None:
-        self.box(
-            self.pick("wicker", self.cloth2, "white"), 0.22, (y - 0.08, y + 0.08), (z, z + 0.11), x, seen=True
-        )
+        material = self.pick("wicker", self.cloth2, "white")
+        self.box(material, 0.22, (y - 0.08, y + 0.08), (z, z + 0.11), x, seen=True)
 
     def _candles(self, x: float, y: float, z: float) -> None:
         for u, tall in ((-0.05, 0.13), (0.02, 0.09)):
             self.post("cream", x + u, y, (z, z + tall), 0.025)
 
     def lamp(self, x: float, y: float, z: float) -> None:
-        """A table lamp."""
         self.soft(self.pick("ceramic", *self.look.accents), (x, y, z + 0.1), (0.07, 0.07, 0.1))
         self.post("shade", x, y, (z + 0.2, z + 0.37), self.pick(0.1, 0.12))
 
     def pillow(self, material: str, at: Point, half: Point, tilt: float = 0.0) -> None:
-        """A soft cushion, with a box inside so that it looks square."""
+        """Add a cushion: an ellipsoid with a box inside, so that it looks square."""
         self.soft(material, at, half, (tilt, 0.0, 0.0))
         euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
         core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
         self.add("box", material, True, f'pos="{numbers(*at)}" size="{core}"{euler}')
 
-    def own(self, picture: Picture) -> str:
-        """A material with a texture that was made for this piece; returns its name."""
+    def own(self, picture: DrawnTexture) -> str:
+        """Register a texture that was drawn for this piece. Return the name of its material."""
         self.pictures.append(picture)
         return picture.name
 
     def on_ceiling(self) -> None:
-        """What was written hangs from the ceiling: it is left out of a view from above."""
+        """Mark the geoms so far as hanging from the ceiling, which views from above leave out."""
         self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
 
     def piece(
@@ -245,13 +232,13 @@ class Builder:
         stem: float = 0.0,
         **more: Any,
     ) -> Piece:
-        """The piece of what was written.
+        """The piece with the geoms so far.
 
         Args:
-            size: Along the wall, into the room, up, m.
-            use: Depth, m, of free floor in front of it; or the places, each x0, y0, x1, y1.
-            parts: x0, y0, x1, y1, top, m, of what nobody can walk through; by default the whole size.
-            stem: Half the width, m, of what people bump into, where only this is narrower than the parts.
+            size: Width along the wall, depth into the room, height, m.
+            use: Depth, m, of the free floor needed in front of it, or rectangles of it, each (x0, y0, x1, y1).
+            parts: Obstacles, each (x0, y0, x1, y1, height), m; the whole size by default.
+            stem: Half the width, m, of what people bump into, if it is narrower than the parts.
             more: Other fields of `Piece`.
         """
         w, d, h = (float(v) for v in size)
@@ -263,7 +250,7 @@ class Builder:
             self.kind,
             (w, d, h),
             "".join(self.geoms),
-            tuple(Part((a, b, c, e), top, stem) for a, b, c, e, top in parts),
+            tuple(Obstacle((a, b, c, e), top, stem) for a, b, c, e, top in parts),
             tuple(use),
             mounts=tuple(more.pop("mounts", ())),
             pictures=tuple(self.pictures),
@@ -273,20 +260,20 @@ class Builder:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of furniture, of which every generator makes another piece."""
+    """A kind of furniture, of which every random generator makes a different piece."""
 
     name: str
     draw: Callable[[Builder], Piece]
 
     def make(
-        self, rng: np.random.Generator, look: Look, *, smaller: int = 0, fit: Point | None = None
+        self, rng: np.random.Generator, look: Appearance, *, smaller: int = 0, fit: Point | None = None
     ) -> Piece:
-        """A piece of this kind.
+        """Make a piece.
 
         Args:
             rng: Draws size, materials and form.
-            look: The colours of the home.
-            smaller: 0 as large as drawn; 1, 2, ... for a lack of space.
-            fit: Width, lower and upper end, m, of what it goes with, such as a window; None for any.
+            look: Materials of the home.
+            smaller: 0 for a piece as large as drawn; 1, 2, ... for ever smaller ones.
+            fit: Width, lower and upper end, m, of what it has to fit, such as a window; None for any.
         """
         return self.draw(Builder(self.name, rng, look, smaller, fit))

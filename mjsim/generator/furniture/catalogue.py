@@ -1,7 +1,13 @@
-"""All kinds of furniture."""
+"""All kinds of furniture: each public function of the modules below draws one kind."""
+
+from inspect import isfunction
 
 from mjsim.generator.furniture import bath, beds, decoration, kitchen, living, plants, seats, storage, tables
 from mjsim.generator.furniture.builder import Kind
 
-_FAMILIES = (beds, seats, tables, storage, kitchen, bath, living, plants, decoration)
-KINDS = {draw.__name__: Kind(draw.__name__, draw) for family in _FAMILIES for draw in family.KINDS}
+KINDS = {
+    name: Kind(name, draw)
+    for module in (beds, seats, tables, storage, kitchen, bath, living, plants, decoration)
+    for name, draw in vars(module).items()
+    if isfunction(draw) and draw.__module__ == module.__name__ and not name.startswith("_")
+}

@@ -1,16 +1,14 @@
-"""What hangs on walls and ceilings and lies on floors: pictures, rugs, mirrors, curtains, radiators, lamps."""
+"""Objects on walls, ceilings and floors: pictures, mirrors, rugs, curtains, radiators, lamps."""
 
 import math
 
 from mjsim.generator.furniture.artwork import carpet, painting
 from mjsim.generator.furniture.builder import Builder, numbers
 from mjsim.generator.furniture.piece import Piece
-
-CEILING = 2.6  # m
+from mjsim.generator.values import CEILING_HEIGHT
 
 
 def picture(b: Builder) -> Piece:
-    """One to three framed pictures on a wall."""
     many = b.pick(1, 1, 1, 1, 2, 3) if b.smaller == 0 else 1
     frame, border = b.pick(b.wood, "black", "white", b.metal), b.pick(0.02, 0.03, 0.05)
     w = b.pick(0.8, 1.0, 0.7) if many == 1 and not b.smaller else b.pick(0.4, 0.5)
@@ -22,21 +20,14 @@ def picture(b: Builder) -> Piece:
         b.box(frame, w, (0.0, 0.022), (middle - h / 2, middle + h / 2), x, seen=True)
         mat = 2 * border
         if border > 0.02 and b.chance(0.5):
-            b.box(
-                "white",
-                w - mat,
-                (0.022, 0.025),
-                (middle - h / 2 + border, middle + h / 2 - border),
-                x,
-                seen=True,
-            )
+            inner = (middle - h / 2 + border, middle + h / 2 - border)
+            b.box("white", w - mat, (0.022, 0.025), inner, x, seen=True)
             mat += 0.1
         b.image(b.own(image), w - mat, (middle - h / 2 + mat / 2, middle + h / 2 - mat / 2), 0.03, x, 0.006)
     return b.piece((w + step * (many - 1), 0.03, middle + h / 2), parts=(), stands="hangs")
 
 
 def wall_mirror(b: Builder) -> Piece:
-    """Round or high."""
     if b.chance(0.5):
         r = b.pick(0.28, 0.35)
         b.disc(b.pick(b.metal, b.wood), 0, 0.01, 1.55, r, 0.02)
@@ -49,7 +40,6 @@ def wall_mirror(b: Builder) -> Piece:
 
 
 def clock(b: Builder) -> Piece:
-    """A round clock."""
     r = b.pick(0.13, 0.16, 0.19)
     b.disc(b.pick("black", b.metal, b.wood, "white"), 0, 0.015, 1.85, r, 0.03)
     face = f'pos="0 0.031 1.85" size="{numbers(r - 0.012, 0.004)}" xyaxes="-1 0 0 0 0 1"'
@@ -58,7 +48,6 @@ def clock(b: Builder) -> Piece:
 
 
 def pinboard(b: Builder) -> Piece:
-    """Notes on a board."""
     w, h = b.pick(0.6, 0.9), b.pick(0.45, 0.6)
     b.box(b.wood, w, (0, 0.018), (1.3, 1.3 + h), seen=True)
     b.image("pinboard", w - 0.04, (1.32, 1.28 + h), 0.026)
@@ -66,7 +55,6 @@ def pinboard(b: Builder) -> Piece:
 
 
 def wall_shelf(b: Builder) -> Piece:
-    """One or two boards with things on them, over what stands below."""
     w = b.size(0.5, 0.9, 0.1)
     for z in (1.45, 1.75)[: b.pick(1, 2)]:
         b.box(b.wood, w, (0, 0.2), (z, z + 0.025), seen=True)
@@ -77,7 +65,6 @@ def wall_shelf(b: Builder) -> Piece:
 
 
 def wall_lamp(b: Builder) -> Piece:
-    """A shade or a globe on an arm."""
     b.box(b.metal, 0.08, (0, 0.02), (1.62, 1.74), seen=True)
     b.rod(b.metal, (0, 0.02, 1.68), (0, 0.13, 1.7), 0.01)
     if b.chance(0.5):
@@ -88,7 +75,7 @@ def wall_lamp(b: Builder) -> Piece:
 
 
 def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = False) -> Piece:
-    """Flat on the floor, 3.5 mm high: a plate's bottom is higher."""
+    """A flat piece on the floor, 3.5 mm high, which is less than the bottom of a plate."""
     if round_one:
         b.post(material, 0, d / 2, (0.0005, 0.0035), d / 2)
     else:
@@ -97,7 +84,6 @@ def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = F
 
 
 def rug(b: Builder) -> Piece:
-    """A rectangle with a pattern of its own."""
     w, d = b.pick((1.2, 0.8), (1.6, 1.1), (2.0, 1.4)) if b.smaller == 0 else (1.0, 0.7)
     if b.fit is not None:
         w, d, _ = b.fit
@@ -105,24 +91,20 @@ def rug(b: Builder) -> Piece:
 
 
 def runner(b: Builder) -> Piece:
-    """Long and narrow."""
     w, d = b.pick((2.2, 0.7), (1.8, 0.6)) if b.smaller == 0 else (1.3, 0.6)
     return _on_floor(b, w, d, b.own(carpet(b.rng, b.look)))
 
 
 def round_rug(b: Builder) -> Piece:
-    """With rings."""
     d = b.pick(1.2, 1.5) if b.smaller == 0 else 0.9
     return _on_floor(b, d, d, b.own(carpet(b.rng, b.look, True)), True)
 
 
 def bath_mat(b: Builder) -> Piece:
-    """A towel on the floor."""
     return _on_floor(b, b.pick(0.7, 0.8), b.pick(0.45, 0.5), b.pick("towel_a", "towel_b", "towel_white"))
 
 
 def door_mat(b: Builder) -> Piece:
-    """Behind the front door."""
     return _on_floor(b, b.pick(0.7, 0.8), 0.45, b.pick("soil", "wicker", "dark"))
 
 
@@ -131,41 +113,33 @@ def _window(b: Builder) -> tuple[float, float, float]:
 
 
 def curtains(b: Builder) -> Piece:
-    """Beside a window, to the floor, or to below the sill where `smaller`."""
+    """Curtains beside a window, to the floor, or to below the sill if `smaller`."""
     w, low, high = _window(b)
     long = b.smaller == 0
-    side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING - 0.05)
+    side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING_HEIGHT - 0.05)
     end = 0.03 if long else low - 0.15
     total = w + 2 * side
     for sign in (-1, 1):
         for i in range(2):
             x = sign * (w / 2 - 0.02 + side * (i + 0.5) / 2)
-            b.box(
-                "curtain", side / 2 - 0.004, (0.07 + 0.012 * i, 0.115 + 0.012 * i), (end, top), x, seen=True
-            )
-    b.add(
-        "cylinder",
-        b.metal,
-        True,
-        f'pos="{numbers(0, 0.1, top + 0.012)}" size="{numbers(0.013, total / 2 + 0.05)}" euler="0 1.5708 0"',
-    )
+            depth = (0.07 + 0.012 * i, 0.115 + 0.012 * i)
+            b.box("curtain", side / 2 - 0.004, depth, (end, top), x, seen=True)
+    size = numbers(0.013, total / 2 + 0.05)
+    b.add("cylinder", b.metal, True, f'pos="{numbers(0, 0.1, top + 0.012)}" size="{size}" euler="0 1.5708 0"')
     return b.piece((total + 0.1, 0.14, top + 0.03), parts=(), stands="hangs")
 
 
 def roller_blind(b: Builder) -> Piece:
-    """A roll of cloth in the window's recess, drawn a part of the way down."""
     w, low, high = _window(b)
     down = round(b.pick(0.2, 0.35) * (high - low), 2)
     b.box("white", w - 0.004, (-0.07, -0.01), (high - 0.07, high - 0.002), seen=True)
-    b.box(
-        b.pick("curtain", "linen", b.cloth), w - 0.03, (-0.044, -0.036), (high - down, high - 0.07), seen=True
-    )
+    cloth = b.pick("curtain", "linen", b.cloth)
+    b.box(cloth, w - 0.03, (-0.044, -0.036), (high - down, high - 0.07), seen=True)
     b.box("white", w - 0.02, (-0.05, -0.03), (high - down - 0.02, high - down), seen=True)
     return b.piece((w, 0.0, high), parts=(), stands="recess")
 
 
 def blind(b: Builder) -> Piece:
-    """Slats in the window's recess, drawn a part of the way down."""
     w, low, high = _window(b)
     down = round(b.pick(0.15, 0.25, 0.35) * (high - low), 2)
     b.box("white", w - 0.004, (-0.07, -0.01), (high - 0.05, high - 0.002), seen=True)
@@ -178,13 +152,9 @@ def blind(b: Builder) -> Piece:
 
 
 def radiator(b: Builder) -> Piece:
-    """Below a window: panels or ribs."""
     w, low, _ = _window(b)
-    w, top, paint = (
-        min(w, 1.4) - 0.1,
-        min(low - 0.12, b.pick(0.6, 0.72)),
-        b.pick("white", "white", "cream", "dark"),
-    )
+    w, top = min(w, 1.4) - 0.1, min(low - 0.12, b.pick(0.6, 0.72))
+    paint = b.pick("white", "white", "cream", "dark")
     b.box(paint, w, (0.03, 0.09), (0.12, top))
     if b.chance(0.5):
         count = round(w / 0.09)
@@ -198,8 +168,8 @@ def radiator(b: Builder) -> Piece:
 
 
 def ceiling_lamp(b: Builder) -> Piece:
-    """Flat under the ceiling, above the light that casts shadows: a disc, a bowl, a square, a bar, a star."""
-    form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING
+    """A flat lamp, above the light that casts shadows."""
+    form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING_HEIGHT
     if form == "disc":
         b.post("bulb", 0, 0, (z - 0.05, z), b.pick(0.18, 0.24))
         b.post(b.metal, 0, 0, (z - 0.02, z), 0.27)
@@ -222,7 +192,6 @@ def ceiling_lamp(b: Builder) -> Piece:
 
 
 def floor_lamp(b: Builder) -> Piece:
-    """A shade on a stem, a tripod, a globe, or a bow."""
     form, tall, r = b.pick("stem", "tripod", "globe", "uplight"), b.pick(1.4, 1.55), 0.2
     b.shadow(0.32, (0.04, 0.36), round_one=True)
     b.guard(0.14, (r - 0.07, r + 0.07), (0, tall))
@@ -243,31 +212,8 @@ def floor_lamp(b: Builder) -> Piece:
 
 
 def standing_mirror(b: Builder) -> Piece:
-    """A high mirror that leans on the wall."""
     w, h = b.pick(0.45, 0.55, 0.65), b.pick(1.6, 1.75)
     b.shadow(w, (0, 0.08))
     b.box(b.pick(b.wood, b.metal), w, (0.01, 0.05), (0, h))
     b.image("mirror", w - 0.07, (0.035, h - 0.035), 0.058)
     return b.piece((w, 0.06, h), use=0.6)
-
-
-KINDS = (
-    picture,
-    wall_mirror,
-    clock,
-    pinboard,
-    wall_shelf,
-    wall_lamp,
-    rug,
-    runner,
-    round_rug,
-    bath_mat,
-    door_mat,
-    curtains,
-    blind,
-    roller_blind,
-    radiator,
-    ceiling_lamp,
-    floor_lamp,
-    standing_mirror,
-)

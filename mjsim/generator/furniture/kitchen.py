@@ -1,23 +1,25 @@
-"""Kitchens: runs of modules of 0.6 m, straight or around a corner, an island, and single pieces."""
+"""Kitchens: runs of modules of 0.6 m, straight or around a corner, and single pieces."""
 
 import math
 
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Mount, Piece, group
 
-WIDE = 0.6  # m, a module
-SIZES = 4  # of kitchens
-DEEP = 0.62  # m, with the worktop
-TOP = 0.9  # m, of the worktop
-ON_TOP = 1.09  # m, of what stands on it, a little below the sills of kitchens
-TALL = 2.05  # m, of fridges and tall ovens
-LOW, HIGH = 1.5, 2.15  # m, of what hangs on the wall: bins of a dish rack need 0.3 m of air
-HOOD = 2.5  # m, its pipe's end
-FRONT = 0.57  # m from the wall, where fronts begin
+# Lengths in m; heights from the floor, depths from the wall.
+WIDE = 0.6  # width of a module
+SIZES = 4  # number of kitchen sizes
+DEEP = 0.62  # depth of the worktop
+TOP = 0.9  # height of the worktop
+ON_TOP = 1.09  # height of objects on the worktop, a little below the sills of kitchens
+TALL = 2.05  # height of fridges and tall ovens
+LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets; the dish rack needs 0.3 m of air above its bin
+HOOD = 2.5  # top of the pipe of a cooker hood
+FRONT = 0.57  # depth at which fronts begin
+GAP = 0.012  # between the doors of a fridge
 
 
-class Run:
-    """Modules side by side along the wall; `front` is the material of their doors."""
+class KitchenRun:
+    """Kitchen modules side by side along a wall. Each `_NAME(x)` adds the module NAME and returns its height."""
 
     def __init__(self, b: Builder, modules: tuple[str, ...], hanging: bool) -> None:
         self.b, self.modules, self.hanging = b, modules, hanging
@@ -26,14 +28,13 @@ class Run:
         self.parts: list[tuple[float, float, float, float, float]] = []
 
     def write(self) -> Piece:
-        """The whole run."""
         self.b.shadow(self.w, (0, DEEP))
         for i, name in enumerate(self.modules):
             x = WIDE * (i + 0.5) - self.w / 2
             top = getattr(self, f"_{name}")(x)
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
-            if name not in ("fridge", "tall_oven"):  # low where a window may be
+            if name not in ("fridge", "tall_oven"):  # low if a window may be above
                 self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > LOW else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
@@ -66,7 +67,7 @@ class Run:
         self._base(x)
         if not self.b.chance(0.5):
             return TOP
-        paint = self.b.pick("steel", "white", "accent_a", "black")  # of a kettle or a toaster
+        paint = self.b.pick("steel", "white", "accent_a", "black")  # for a kettle or a toaster
         if self.b.chance(0.5):
             self.b.post(paint, x, 0.3, (TOP, ON_TOP), 0.075)
             self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
@@ -75,7 +76,6 @@ class Run:
         return ON_TOP
 
     def _rack(self, x: float) -> float:
-        """Where the bin for dishes stands."""
         self.b.fronts(self.b.front, WIDE, (0.1, 0.85), FRONT, 1, 1, x, doors=True)
         self.mounts.append(Mount("dish_bin", (x, DEEP / 2 + 0.02, TOP)))
         return self._base(x)
@@ -139,14 +139,8 @@ class Run:
         for low, high in ((0.04, split), (split + GAP, tall - 0.005)):
             b.box(paint, WIDE - 0.015, (FRONT, FRONT + 0.03), (low, high), x, seen=True)
             middle = high - 0.25 if low < 0.1 else low + 0.25
-            b.box(
-                "chrome",
-                0.02,
-                (FRONT + 0.03, FRONT + 0.05),
-                (middle - 0.16, middle + 0.16),
-                x + 0.24,
-                seen=True,
-            )
+            handle = (middle - 0.16, middle + 0.16)
+            b.box("chrome", 0.02, (FRONT + 0.03, FRONT + 0.05), handle, x + 0.24, seen=True)
         return tall
 
     def _tall_oven(self, x: float) -> float:
@@ -155,23 +149,14 @@ class Run:
         b.fronts(b.front, WIDE, (0.1, 0.75), FRONT, 1, 2, x)
         for low, high in ((0.76, 1.3), (1.31, 1.66)):  # oven, microwave
             b.box("steel", WIDE - 0.01, (FRONT, FRONT + 0.018), (low, high), x, seen=True)
-            b.box(
-                "black", 0.44, (FRONT + 0.018, FRONT + 0.022), (low + 0.06, high - 0.12), x - 0.03, seen=True
-            )
-            b.box(
-                "chrome",
-                0.44,
-                (FRONT + 0.018, FRONT + 0.042),
-                (high - 0.08, high - 0.06),
-                x - 0.03,
-                seen=True,
-            )
+            pane, handle = (low + 0.06, high - 0.12), (high - 0.08, high - 0.06)
+            b.box("black", 0.44, (FRONT + 0.018, FRONT + 0.022), pane, x - 0.03, seen=True)
+            b.box("chrome", 0.44, (FRONT + 0.018, FRONT + 0.042), handle, x - 0.03, seen=True)
         b.fronts(b.front, WIDE, (1.67, TALL - 0.01), FRONT, 1, 1, x)
         return TALL
 
 
-GAP = 0.012  # m, between the doors of a fridge
-_STRAIGHT = (  # by size
+_STRAIGHT = (  # modules by size, the largest first
     (
         "fridge drawers sink rack cooker doors dishwasher",
         "tall_oven doors cooker drawers rack sink fridge",
@@ -188,26 +173,26 @@ _STRAIGHT = (  # by size
 
 
 def straight_kitchen(b: Builder) -> Piece:
-    """Four to seven modules along a wall, with a bin for dishes beside the sink."""
     size = _size(b)
     modules = tuple(b.pick(*_STRAIGHT[size]).split())
     b.handle = b.pick("bar", "knob", "none")
-    return Run(b, modules if b.chance(0.5) else modules[::-1], b.smaller < SIZES).write()
+    return KitchenRun(b, modules if b.chance(0.5) else modules[::-1], b.smaller < SIZES).write()
 
 
 def _size(b: Builder) -> int:
-    """Kitchens that had no place with cabinets on the wall are tried without, first the larger of the two smallest."""
+    """The size of a kitchen, 0 being the largest.
+
+    If no size fits with wall cabinets, the two smallest are tried without, the larger first.
+    """
     return b.smaller if b.smaller < SIZES else b.smaller - 2
 
 
 def kitchenette(b: Builder) -> Piece:
-    """Sink, cooker and the place for dishes; the fridge stands elsewhere."""
     modules = b.pick(("sink", "rack", "cooker"), ("cooker", "rack", "sink"), ("rack", "sink", "cooker"))
-    return Run(b, modules, b.smaller < 2).write()
+    return KitchenRun(b, modules, b.smaller < 2).write()
 
 
 def corner_kitchen(b: Builder) -> Piece:
-    """Two runs that meet in a corner."""
     b.handle = b.pick("bar", "knob", "none")
     side = b.pick(-1, 1)
     longer = b.pick(("rack", "sink", "dishwasher", "fridge"), ("sink", "rack", "drawers", "doors", "fridge"))
@@ -217,10 +202,10 @@ def corner_kitchen(b: Builder) -> Piece:
     other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if size < 2 else ("cooker",)
     if size == 3:
         other = ("rack", "cooker")
-    # the corner itself: a closed module that both runs touch
+    # A closed module in the corner, which both runs touch.
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
-    run = Run(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
-    leg = Run(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)
+    run = KitchenRun(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
+    leg = KitchenRun(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)
     for r in (run, leg):
         r.b.front, r.b.handle, r.b.metal = b.front, b.handle, b.metal
     x = side * run.w / 2
@@ -234,12 +219,10 @@ def corner_kitchen(b: Builder) -> Piece:
 
 
 def fridge(b: Builder) -> Piece:
-    """A fridge on its own."""
-    return Run(b, ("fridge",), False).write()
+    return KitchenRun(b, ("fridge",), False).write()
 
 
 def kitchen_trolley(b: Builder) -> Piece:
-    """Shelves on wheels."""
     w, d, h = b.size(0.5, 0.8, 0.1), b.pick(0.4, 0.45), 0.88
     paint = b.pick(b.metal, "white", b.wood)
     b.shadow(w, (0, d))
@@ -254,13 +237,9 @@ def kitchen_trolley(b: Builder) -> Piece:
 
 
 def larder(b: Builder) -> Piece:
-    """A tall cupboard for food."""
     w, d, h = b.pick(0.6, 0.9, 1.0), 0.5, b.pick(1.9, TALL)
     b.shadow(w, (0, d))
     b.box("front_dark", w, (0, d - 0.035), (0, h))
     b.fronts(b.front, w, (0.08, 1.2), d - 0.035, 1 if w < 0.7 else 2, 1, doors=True)
     b.fronts(b.front, w, (1.2, h - 0.01), d - 0.035, 1 if w < 0.7 else 2, 1, doors=True)
     return b.piece((w, d, h), use=0.65)
-
-
-KINDS = (straight_kitchen, corner_kitchen, kitchenette, fridge, kitchen_trolley, larder)

@@ -1,4 +1,4 @@
-"""Living rooms and halls: television with seats, piano, stove, aquarium, coats and shoes."""
+"""Furniture of living rooms and halls: television with seats, piano, stove, aquarium, coat rack, umbrella stand."""
 
 import math
 
@@ -9,7 +9,6 @@ from mjsim.generator.furniture.piece import Piece, group
 
 
 def television(b: Builder) -> Piece:
-    """A stand with a television on it."""
     stand = storage.tv_stand(Builder("tv_stand", b.rng, b.look))
     w, h = b.pick(1.1, 1.25, 1.4), stand.size[2]
     y, tall = 0.14, 0.57 * w
@@ -25,7 +24,6 @@ def television(b: Builder) -> Piece:
 
 
 def lounge(b: Builder) -> Piece:
-    """A television, a sofa in front of it, often a coffee table between them on a rug, and armchairs."""
     tv = television(Builder("television", b.rng, b.look))
     corner = b.smaller == 0 and b.chance(0.4)
     draw, name = (seats.corner_sofa, "corner_sofa") if corner else (seats.sofa, "sofa")
@@ -52,7 +50,6 @@ def lounge(b: Builder) -> Piece:
 
 
 def piano(b: Builder) -> Piece:
-    """An upright piano with its stool."""
     w, d, h = 1.42, 0.6, b.pick(1.1, 1.18)
     paint = b.pick("black", b.wood, "white")
     b.shadow(w, (0, d))
@@ -64,14 +61,11 @@ def piano(b: Builder) -> Piece:
     b.box("piano_keys", w - 0.16, (0.4, d - 0.02), (0.68, 0.705), seen=True)
     b.image("linen", 0.34, (0.84, 1.05), 0.35, thick=0.006)
     b.clutter(0.8 * w, (0.08, 0.26), h, 2)
-    base = b.piece((w, d, h + 0.3), use=0.7)
-    return group(
-        b.kind, [(base, 0, 0, 0), (seats.stool(Builder("stool", b.rng, b.look)), 0, d + 0.02, 0)], use=()
-    )
+    base, stool = b.piece((w, d, h + 0.3), use=0.7), seats.stool(Builder("stool", b.rng, b.look))
+    return group(b.kind, [(base, 0, 0, 0), (stool, 0, d + 0.02, 0)], use=())
 
 
 def stove(b: Builder) -> Piece:
-    """A stove for wood with its pipe, on a plate."""
     w, d, h = b.pick(0.45, 0.5), b.pick(0.4, 0.45), b.pick(0.95, 1.1)
     paint = b.pick("black", "dark", "cream")
     b.shadow(w, (0.1, 0.1 + d))
@@ -93,7 +87,6 @@ def stove(b: Builder) -> Piece:
 
 
 def aquarium(b: Builder) -> Piece:
-    """A tank with fish on a cupboard."""
     w, d, h = b.pick(0.8, 1.0), 0.42, 0.72
     b.shadow(w, (0, d))
     b.box(b.wood, w, (0, d - 0.035), (0, h))
@@ -113,7 +106,6 @@ def aquarium(b: Builder) -> Piece:
 
 
 def coat_rack(b: Builder) -> Piece:
-    """Hooks on the wall with coats, with a shelf for hats, over shoes."""
     w = b.size(0.8, 1.2, 0.1)
     b.box(b.wood, w, (0.0, 0.02), (1.45, 1.75), seen=True)
     b.box(b.wood, w, (0.0, 0.26), (1.75, 1.775), seen=True)
@@ -140,7 +132,6 @@ def coat_rack(b: Builder) -> Piece:
 
 
 def umbrella_stand(b: Builder) -> Piece:
-    """With one or two umbrellas."""
     r = 0.13
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     b.guard(2 * r - 0.04, (0.02, 2 * r - 0.02), (0, 0.5))
@@ -151,6 +142,3 @@ def umbrella_stand(b: Builder) -> Piece:
         b.rod(b.pick(*b.look.accents), (0.5 * x, r, 0.4), (x, r, 0.78), 0.025)
         b.rod(b.wood, (x, r, 0.78), (x, r, 0.9), 0.01)
     return b.piece((2 * r, 2 * r, 0.9))
-
-
-KINDS = (lounge, television, piano, stove, aquarium, coat_rack, umbrella_stand)

@@ -1,6 +1,6 @@
-"""Pieces of furniture as values, and groups of them.
+"""Pieces of furniture, and groups of pieces.
 
-The frame of a piece: the origin is the middle of its back edge on the floor, +y points into the room, z up; metres.
+The origin of a piece is on the floor in the middle of its back edge; +y points into the room, z up; in m.
 """
 
 import math
@@ -9,22 +9,20 @@ from dataclasses import dataclass
 
 from mjsim.generator.values import Asset
 
-Spot = tuple[float, float, float, float]  # x0, y0, x1, y1 on the floor
+Spot = tuple[float, float, float, float]  # a rectangle on the floor: x0, y0, x1, y1, m
 
 
 @dataclass(frozen=True)
-class Part:
-    """A part of the floor that a piece stands on, or hangs over, with the height of what is there."""
+class Obstacle:
+    """A rectangle of the floor on or over which a piece stands, and its height there."""
 
-    spot: Spot  # m
+    spot: Spot
     top: float  # m
-    stem: float = (
-        0.0  # m, half the width of what people bump into, where leaves or a shade reach farther; 0: all of it
-    )
+    # Half the width, m, of what people bump into, if leaves or a shade reach farther; 0 for the whole rectangle.
+    stem: float = 0.0
 
     @property
-    def hit(self) -> Spot:
-        """What people bump into."""
+    def hit(self) -> Spot:  # the rectangle that people bump into
         x0, y0, x1, y1 = self.spot
         x, y, r = (x0 + x1) / 2, (y0 + y1) / 2, self.stem
         return (x - r, y - r, x + r, y + r) if r else self.spot
@@ -34,21 +32,20 @@ class Part:
 class Mount:
     """A place for a bin on a piece."""
 
-    receptacle: str  # its model, such as "dish_bin"
-    position: tuple[float, float, float]  # m, of the middle of its base
-    yaw: float = math.pi  # of the bin, whose front is its local -y
+    receptacle: str  # key of the bin, such as "dish_bin"
+    position: tuple[float, float, float]  # middle of the bin's base, m
+    yaw: float = math.pi  # yaw of the bin, whose front is its local -y
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A texture that a piece brings, and the material of the same name."""
+class DrawnTexture:
+    """A texture that was drawn for one piece, and the material of the same name."""
 
-    name: str  # of the material
-    png: bytes  # the texture's file
+    name: str
+    png: bytes
 
     @property
     def assets(self) -> tuple[Asset, Asset]:
-        """Texture and material."""
         image = f"{self.name}_image"
         texture = f'<texture name="{image}" type="2d" file="{image}.png"/>'
         material = f'<material name="{self.name}" texture="{image}"/>'
@@ -59,25 +56,24 @@ class Picture:
 class Piece:
     """A piece of furniture, or a group that belongs together."""
 
-    kind: str  # name of its kind
-    size: tuple[float, float, float]  # along the wall, into the room, up, m
+    kind: str
+    size: tuple[float, float, float]  # width along the wall, depth into the room, height, m
     geoms: str  # MJCF elements in the frame of the piece
-    parts: tuple[Part, ...]  # what nobody can walk through
-    use: tuple[Spot, ...] = ()  # where somebody stands to use it: stays free, and can be reached
-    stands: str = (
-        "wall"  # "wall", "left" and "right" (that end in a corner), "free", "hangs", "flat", "recess"
-    )
-    seats: int = 0  # how many can sit
-    mounts: tuple[Mount, ...] = ()  # for bins
-    pictures: tuple[Picture, ...] = ()  # its own textures
-    members: tuple["Member", ...] = ()  # of a group, which has no geoms of its own
+    parts: tuple[Obstacle, ...]
+    use: tuple[Spot, ...] = ()  # floor on which people stand to use it; it stays free and reachable
+    # "wall", "left" or "right" (a wall, with this end in a corner), "free", "hangs", "flat", "recess" or "ceiling"
+    stands: str = "wall"
+    seats: int = 0
+    mounts: tuple[Mount, ...] = ()
+    pictures: tuple[DrawnTexture, ...] = ()
+    members: tuple["Member", ...] = ()  # a group has members and no geoms of its own
 
 
-Member = tuple[Piece, float, float, float]  # a piece, and where in its group: x, y, m, and yaw
+Member = tuple[Piece, float, float, float]  # a piece and its pose in the group: x, y, m, and yaw
 
 
 def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
-    """The rectangle around a rectangle that is turned by `yaw` and then moved, m."""
+    """The bounding rectangle, m, of a rectangle that is turned by `yaw` and then moved."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     corners = [(u, v) for u in (spot[0], spot[2]) for v in (spot[1], spot[3])]
     xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
@@ -93,13 +89,15 @@ def group(
     stands: str = "wall",
     seats: int | None = None,
 ) -> Piece:
-    """Pieces that belong together as one piece, moved so that its back edge is at y = 0 and its middle at x = 0.
+    """Combine pieces into one whose back edge is at y = 0 and whose middle is at x = 0.
 
-    `use` in the frame of the group; by default the members' own, and so are the `seats`.
+    `use` is in the frame of the group. `use` and `seats` default to those of the members.
     """
     members = list(members)
     parts = [
-        Part(moved(part.spot, x, y, yaw), part.top, part.stem) for p, x, y, yaw in members for part in p.parts
+        Obstacle(moved(part.spot, x, y, yaw), part.top, part.stem)
+        for p, x, y, yaw in members
+        for part in p.parts
     ]
     spots = [part.spot for part in parts]
     left, right = min(s[0] for s in spots), max(s[2] for s in spots)
@@ -116,7 +114,7 @@ def group(
         kind,
         (right - left, front - back, max(p.size[2] for p, *_ in members)),
         "",
-        tuple(Part(moved(part.spot, dx, dy, 0), part.top, part.stem) for part in parts),
+        tuple(Obstacle(moved(part.spot, dx, dy, 0), part.top, part.stem) for part in parts),
         tuple(moved(spot, dx, dy, 0) for spot in use),
         stands,
         sum(p.seats for p, *_ in members) if seats is None else seats,
@@ -126,7 +124,7 @@ def group(
 
 
 def flattened(piece: Piece, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Iterator[Member]:
-    """A piece and all members of groups, each with where it stands."""
+    """Yield a piece and all members of groups, each with its pose."""
     if piece.geoms:
         yield piece, x, y, yaw
     cos, sin = math.cos(yaw), math.sin(yaw)

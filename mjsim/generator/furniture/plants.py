@@ -1,4 +1,4 @@
-"""Plants in pots on the floor."""
+"""Potted plants on the floor."""
 
 import math
 
@@ -9,7 +9,7 @@ _GREENS = ("leaves", "leaves_dark", "leaves_pale")
 
 
 def _pot(b: Builder, r: float, h: float, y: float) -> str:
-    """A pot around `y`, sometimes on legs; returns the leaves' material."""
+    """Add a pot around `y`, sometimes on legs. Return the leaves' material."""
     b.shadow(2 * r, (y - r, y + r), round_one=True)
     paint, form = b.pick("pot_a", "pot_b", "wicker"), b.pick("round", "round", "square", "raised")
     if form == "square":
@@ -24,15 +24,14 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
 
 
 def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
-    """A plant whose leaves reach `wide` around the middle of its pot, at y = wide; nobody walks into the pot."""
-    reach = max(r, 0.8 * wide)  # neighbours stay out of its leaves
+    """A plant whose leaves reach `wide` around the middle of its pot, at y = wide. People bump only into the pot."""
+    reach = max(r, 0.8 * wide)  # neighbouring pieces stay out of the leaves
     return b.piece(
         (2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),), stem=r
     )
 
 
 def bush(b: Builder) -> Piece:
-    """Round and dense."""
     r, h = b.pick(0.16, 0.19, 0.22), b.pick(0.26, 0.34)
     wide = 1.25 * r
     green = _pot(b, r, h, wide)
@@ -42,7 +41,6 @@ def bush(b: Builder) -> Piece:
 
 
 def tree(b: Builder) -> Piece:
-    """A trunk with a crown, up to 2 m."""
     r, h, tall, y = b.pick(0.17, 0.2), b.pick(0.3, 0.38), b.size(1.3, 1.8, 0.1), 0.3
     green = _pot(b, r, h, y)
     b.rod("wood_b", (0, y, h), (0.02, y + 0.02, tall - 0.2), 0.02)
@@ -54,7 +52,6 @@ def tree(b: Builder) -> Piece:
 
 
 def snake_plant(b: Builder) -> Piece:
-    """Upright leaves."""
     r, h, tall, y = b.pick(0.14, 0.17), b.pick(0.24, 0.3), b.pick(0.5, 0.65), 0.22
     green = _pot(b, r, h, y)
     for i in range(7):
@@ -65,7 +62,6 @@ def snake_plant(b: Builder) -> Piece:
 
 
 def palm(b: Builder) -> Piece:
-    """Fronds that hang over."""
     r, h, tall, y = b.pick(0.16, 0.19), b.pick(0.28, 0.34), b.pick(1.0, 1.25), 0.42
     green = _pot(b, r, h, y)
     for i in range(9):
@@ -77,7 +73,6 @@ def palm(b: Builder) -> Piece:
 
 
 def cactus(b: Builder) -> Piece:
-    """A column with arms."""
     r, h, tall, y = b.pick(0.13, 0.16), b.pick(0.22, 0.28), b.pick(0.5, 0.75), 0.2
     _pot(b, r, h, y)
     b.rod("leaves_dark", (0, y, h), (0, y, h + tall), 0.07, shape="capsule")
@@ -89,7 +84,6 @@ def cactus(b: Builder) -> Piece:
 
 
 def fern_stand(b: Builder) -> Piece:
-    """A fern on a high stand."""
     r, h, y = 0.16, b.pick(0.7, 0.85), 0.3
     b.shadow(2 * r, (y - r, y + r), round_one=True)
     b.guard(2 * r, (y - r, y + r), (0, h + 0.2))
@@ -100,10 +94,6 @@ def fern_stand(b: Builder) -> Piece:
     b.soft(green, (0, y, h + 0.24), (0.2, 0.19, 0.1))
     for i in range(6):
         a = 1.05 * i
-        b.soft(
-            green, (0.19 * math.cos(a), y + 0.18 * math.sin(a), h + 0.17), (0.11, 0.035, 0.03), (0, 0.6, a)
-        )
+        at = (0.19 * math.cos(a), y + 0.18 * math.sin(a), h + 0.17)
+        b.soft(green, at, (0.11, 0.035, 0.03), (0, 0.6, a))
     return _potted(b, r, y, h + 0.36)
-
-
-KINDS = (bush, tree, snake_plant, palm, cactus, fern_stand)

@@ -1,4 +1,4 @@
-"""Seats: sofas, armchairs, chairs, stools and benches. Their backs are at y = 0."""
+"""Sofas, armchairs, chairs, stools and benches, each with its back at y = 0."""
 
 import math
 
@@ -7,7 +7,7 @@ from mjsim.generator.furniture.piece import Piece
 
 
 def _arms(b: Builder, w: float, d: float, form: str, cloth: str) -> float:
-    """Two armrests; returns the width of one."""
+    """Add two armrests. Return the width of one."""
     wide = {"box": 0.17, "round": 0.2, "thin": 0.1, "none": 0.0}[form]
     for side in (-1, 1) if wide else ():
         x = side * (w - wide) / 2
@@ -24,7 +24,6 @@ def _arms(b: Builder, w: float, d: float, form: str, cloth: str) -> float:
 
 
 def _cushions(b: Builder, w: float, y: tuple[float, float], count: int, cloth: str, x: float = 0.0) -> None:
-    """Seat cushions between y, and cushions for the back behind them."""
     wide = w / count
     for i in range(count):
         u = x + w * ((i + 0.5) / count - 0.5)
@@ -34,14 +33,12 @@ def _cushions(b: Builder, w: float, y: tuple[float, float], count: int, cloth: s
 
 
 def _loose(b: Builder, w: float, y: float, most: int) -> None:
-    """Loose cushions in the corners of a seat."""
     for side in (-1, 1)[: int(b.rng.integers(0, most + 1))]:
         cloth = b.pick(*b.look.cloths, "linen")
         b.pillow(cloth, (side * (w / 2 - 0.22), y, 0.6), (0.19, 0.075, 0.18), -0.35)
 
 
 def sofa(b: Builder) -> Piece:
-    """For two or three, with four forms of arms, on a plinth or on legs."""
     w, d = b.size(1.5, 2.2, 0.1), b.pick(0.86, 0.92, 0.96)
     form = b.pick("box", "round", "thin", "none")
     back = b.pick(0.76, 0.82, 0.86)
@@ -62,7 +59,6 @@ def sofa(b: Builder) -> Piece:
 
 
 def corner_sofa(b: Builder) -> Piece:
-    """A sofa with a long seat at one end."""
     w, d, long, side = b.size(2.1, 2.6, 0.1), 0.92, b.pick(1.45, 1.6), b.pick(-1, 1)
     b.shadow(w, (0, d))
     end = 0.92
@@ -86,12 +82,11 @@ def corner_sofa(b: Builder) -> Piece:
 
 
 def armchair(b: Builder) -> Piece:
-    """Five forms, from the club chair to the wooden one with loose cushions."""
     w, d = b.size(0.74, 0.9), b.pick(0.78, 0.84)
     form = b.pick("box", "round", "thin", "shell", "none")
     back = b.pick(0.78, 0.88, 1.0)
     b.shadow(w, (0, d), round_one=form == "shell")
-    if form == "shell":  # a tub: a round seat in a wall of upright rolls
+    if form == "shell":  # a round seat within a wall of upright rolls
         r = min(w, d) / 2 - 0.02
         b.post(b.cloth, 0, d / 2, (0.14, 0.3), r, seen=False)
         for i in range(11):
@@ -116,7 +111,6 @@ def armchair(b: Builder) -> Piece:
 
 
 def pouf(b: Builder) -> Piece:
-    """A round or square seat without a back."""
     r, h = b.pick(0.22, 0.26, 0.3), b.pick(0.36, 0.42)
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     if b.chance(0.6):
@@ -130,7 +124,6 @@ def pouf(b: Builder) -> Piece:
 
 
 def dining_chair(b: Builder) -> Piece:
-    """Four forms: padded, bars, ladder, shell."""
     w, d, h = 0.44, 0.48, b.pick(0.82, 0.9, 0.96)
     form = b.pick("padded", "bars", "ladder", "shell")
     b.guard(w, (0.02, d), (0, 0.46))
@@ -164,7 +157,6 @@ def dining_chair(b: Builder) -> Piece:
 
 
 def stool(b: Builder) -> Piece:
-    """A round or square seat on legs."""
     r, h = b.pick(0.16, 0.19), b.pick(0.45, 0.48)
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     if b.chance(0.5):
@@ -178,7 +170,6 @@ def stool(b: Builder) -> Piece:
 
 
 def bar_stool(b: Builder) -> Piece:
-    """A high seat on a foot or on legs."""
     r, h = 0.19, b.pick(0.64, 0.72)
     b.guard(2 * r, (0, 2 * r), (0, h))
     b.post(b.pick(b.wood, b.cloth, "black"), 0, r, (h - 0.05, h), r - 0.01)
@@ -195,7 +186,6 @@ def bar_stool(b: Builder) -> Piece:
 
 
 def bench(b: Builder) -> Piece:
-    """A bench for the hall or a bedroom: a box with cushions, open with baskets, or on legs."""
     w, d, h = b.size(0.8, 1.2, 0.1), b.pick(0.36, 0.4), 0.46
     b.shadow(w, (0, d))
     form = b.pick("box", "baskets", "legs")
@@ -214,7 +204,6 @@ def bench(b: Builder) -> Piece:
 
 
 def office_chair(b: Builder) -> Piece:
-    """On five arms, with a padded back or one of mesh."""
     w, d = 0.56, 0.56
     paint = b.pick(b.cloth, "black", "dark")
     b.shadow(0.44, (0.06, 0.5), round_one=True)
@@ -233,6 +222,3 @@ def office_chair(b: Builder) -> Piece:
             b.box("dark", 0.05, (0.16, 0.42), (0.64, 0.67), x, seen=True)
             b.box("dark", 0.03, (0.26, 0.3), (0.44, 0.64), x, seen=True)
     return b.piece((w, d, 1.0), seats=1)
-
-
-KINDS = (sofa, corner_sofa, armchair, pouf, dining_chair, stool, bar_stool, bench, office_chair)

@@ -1,4 +1,4 @@
-"""Storage: wardrobes, chests, shelves, sideboards, and what stands on them."""
+"""Wardrobes, chests, shelves and sideboards, with the things on them."""
 
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece
@@ -26,38 +26,32 @@ def _wardrobe(b: Builder, mirrored: bool) -> Piece:
 
 
 def wardrobe(b: Builder) -> Piece:
-    """Two to four doors with handles."""
     return _wardrobe(b, False)
 
 
 def mirror_wardrobe(b: Builder) -> Piece:
-    """Sliding doors, some of them mirrors."""
     return _wardrobe(b, True)
 
 
 def chest_of_drawers(b: Builder) -> Piece:
-    """Two columns and three or four rows of drawers, on a plinth or on legs."""
     w, d, h = b.size(0.7, 1.3, 0.1), b.pick(0.42, 0.48), b.pick(0.75, 0.85, 1.0)
     carcass, low = b.pick(b.wood, "white", b.front), b.pick(0.0, 0.12)
     b.shadow(w, (0, d))
     b.box(carcass, w, (0, d - 0.035), (low, h))
     if low:
         b.legs(b.wood, w, (0, d - 0.03), low, 0.05, 0.02)
-    b.fronts(
-        b.pick(carcass, b.wood2), w, (low + 0.03, h - 0.025), d - 0.035, 1 if w < 0.85 else 2, b.pick(3, 4)
-    )
+    fronts, columns = b.pick(carcass, b.wood2), 1 if w < 0.85 else 2
+    b.fronts(fronts, w, (low + 0.03, h - 0.025), d - 0.035, columns, b.pick(3, 4))
     b.clutter(0.8 * w, (0.1, d - 0.1), h)
     return b.piece((w, d, h + 0.3), use=0.65)
 
 
 def _books(b: Builder, w: float, z: float, high: float, d: float, x: float) -> None:
-    """A row of books on a shelf."""
     b.box("cream", w, (0.05, d - 0.06), (z, z + high - 0.01), x, seen=True)
     b.image("book_spines", w, (z, z + high), d - 0.052, x)
 
 
 def _filled(b: Builder, w: float, z: float, high: float, d: float, x: float) -> None:
-    """What stands in one compartment of a shelf."""
     what = b.pick("books", "books", "books", "basket", "thing", "empty")
     if what == "books":
         wide = w * float(b.rng.uniform(0.6, 0.95))
@@ -93,23 +87,19 @@ def _shelf(b: Builder, w: float, h: float, d: float, columns: int, rows: int, ba
 
 
 def bookcase(b: Builder) -> Piece:
-    """High, with books."""
     return _shelf(b, b.size(0.6, 1.2, 0.1), b.pick(1.6, 1.8, 2.0), b.pick(0.28, 0.32), 1, b.pick(4, 5))
 
 
 def low_bookcase(b: Builder) -> Piece:
-    """To the waist, with two or three shelves."""
     return _shelf(b, b.size(0.7, 1.3, 0.1), b.pick(0.78, 1.1), b.pick(0.28, 0.32), b.pick(1, 2), b.pick(2, 3))
 
 
 def cube_shelf(b: Builder) -> Piece:
-    """Square compartments."""
     columns, rows = (2, b.pick(2, 3, 4)) if b.smaller else (b.pick(2, 3), b.pick(2, 3, 4))
     return _shelf(b, 0.36 * columns + 0.04, 0.36 * rows + 0.06, 0.36, columns, rows)
 
 
 def ladder_shelf(b: Builder) -> Piece:
-    """Boards between two uprights that lean."""
     w, d, h = b.size(0.5, 0.7), 0.36, b.pick(1.7, 1.85)
     b.shadow(w, (0, d))
     b.guard(w, (0, d), (0, 0.9))
@@ -125,7 +115,6 @@ def ladder_shelf(b: Builder) -> Piece:
 
 
 def sideboard(b: Builder) -> Piece:
-    """Low and wide, with doors and drawers."""
     w, d, h = b.size(1.2, 1.8, 0.1), b.pick(0.42, 0.46), b.pick(0.7, 0.8)
     low, carcass = b.pick(0.04, 0.15), b.pick(b.wood, b.wood, "white", b.front)
     b.shadow(w, (0, d))
@@ -141,14 +130,13 @@ def sideboard(b: Builder) -> Piece:
 
 
 def dresser(b: Builder) -> Piece:
-    """A cupboard with plates on the shelves over it."""
     w, d, h = b.size(0.9, 1.2, 0.1), 0.45, b.pick(1.8, 1.9)
     paint = b.pick("cream", b.front, b.wood)
     b.shadow(w, (0, d))
     b.box(paint, w, (0, d - 0.035), (0, 0.86))
     b.fronts(paint, w, (0.06, 0.62), d - 0.035, 2, 1, doors=True)
     b.fronts(paint, w, (0.63, 0.84), d - 0.035, 2)
-    b.box(b.wood, w + 0.0, (0, d), (0.86, 0.89), seen=True)
+    b.box(b.wood, w, (0, d), (0.86, 0.89), seen=True)
     b.guard(w, (0, 0.22), (0.89, h))
     b.box(paint, w, (0, 0.015), (0.89, h), seen=True)
     for x in (-w / 2 + 0.012, w / 2 - 0.012):
@@ -164,7 +152,6 @@ def dresser(b: Builder) -> Piece:
 
 
 def display_cabinet(b: Builder) -> Piece:
-    """With doors of glass."""
     w, d, h = b.size(0.7, 1.0, 0.1), 0.4, b.pick(1.7, 1.9)
     paint = b.pick(b.wood, "white", b.front)
     b.shadow(w, (0, d))
@@ -186,7 +173,6 @@ def display_cabinet(b: Builder) -> Piece:
 
 
 def tv_stand(b: Builder) -> Piece:
-    """Low, with doors, open or on legs."""
     w, d, h = b.size(1.2, 1.8, 0.1), 0.4, b.pick(0.42, 0.5)
     low, carcass = b.pick(0.03, 0.14), b.pick(b.wood, b.wood, "white", b.front)
     b.shadow(w, (0, d))
@@ -202,7 +188,6 @@ def tv_stand(b: Builder) -> Piece:
 
 
 def shoe_cupboard(b: Builder) -> Piece:
-    """Flat, with flaps."""
     w, d, h = b.size(0.6, 1.0, 0.1), b.pick(0.24, 0.28), b.pick(0.85, 1.05)
     paint = b.pick("white", b.wood, b.front)
     b.shadow(w, (0, d))
@@ -213,7 +198,6 @@ def shoe_cupboard(b: Builder) -> Piece:
 
 
 def filing_cabinet(b: Builder) -> Piece:
-    """Drawers of sheet steel or wood under a desk's height, or higher."""
     w, d, h = b.pick(0.42, 0.46), 0.5, b.pick(0.68, 1.02, 1.3)
     paint = b.pick("grey", "white", "front_dark", b.wood)
     b.shadow(w, (0, d))
@@ -225,7 +209,6 @@ def filing_cabinet(b: Builder) -> Piece:
 
 
 def trunk(b: Builder) -> Piece:
-    """A chest with a lid."""
     w, d, h = b.size(0.8, 1.1, 0.1), b.pick(0.42, 0.48), 0.45
     paint = b.pick(b.wood, "wicker", b.front)
     b.shadow(w, (0, d))
@@ -239,7 +222,6 @@ def trunk(b: Builder) -> Piece:
 
 
 def toy_shelf(b: Builder) -> Piece:
-    """Low, with coloured tubs."""
     w, d, h = b.pick(0.9, 1.1), 0.36, b.pick(0.62, 0.9)
     rows = 2 if h < 0.8 else 3
     frame = b.pick("white", b.wood)
@@ -261,22 +243,3 @@ def toy_shelf(b: Builder) -> Piece:
     b.soft("wicker", (0.3 * w, 0.16, h + 0.1), (0.08, 0.07, 0.1))
     b.soft("wicker", (0.3 * w, 0.16, h + 0.25), (0.065, 0.065, 0.065))
     return b.piece((w, d, h + 0.32), use=0.6)
-
-
-KINDS = (
-    wardrobe,
-    mirror_wardrobe,
-    chest_of_drawers,
-    bookcase,
-    low_bookcase,
-    cube_shelf,
-    ladder_shelf,
-    sideboard,
-    dresser,
-    display_cabinet,
-    tv_stand,
-    shoe_cupboard,
-    filing_cabinet,
-    trunk,
-    toy_shelf,
-)

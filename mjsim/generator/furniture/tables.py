@@ -1,4 +1,4 @@
-"""Tables, desks, and the groups that they form with seats."""
+"""Tables and desks, and groups of them with seats."""
 
 import math
 
@@ -8,7 +8,6 @@ from mjsim.generator.furniture.piece import Mount, Piece, group
 
 
 def _table(b: Builder, w: float, d: float, h: float) -> None:
-    """A top with one of four undersides."""
     form = b.pick("posts", "blocks", "trestle", "splayed")
     top = 0.045 if form == "blocks" else 0.03
     b.box(b.wood, w, (0, d), (h - top, h))
@@ -22,19 +21,12 @@ def _table(b: Builder, w: float, d: float, h: float) -> None:
             for y in (0.06, d - 0.06):
                 b.rod(b.wood2, (x, y, 0), (0.82 * x, d / 2 + 0.7 * (y - d / 2), h - top), 0.022)
     else:
-        b.legs(
-            b.wood if form == "blocks" else b.pick(b.wood2, b.metal),
-            w,
-            (0, d),
-            h - top,
-            0.06,
-            0.035 if form == "blocks" else 0.022,
-        )
+        wood, radius = (b.wood, 0.035) if form == "blocks" else (b.pick(b.wood2, b.metal), 0.022)
+        b.legs(wood, w, (0, d), h - top, 0.06, radius)
         b.box(b.wood, w - 0.16, (0.05, d - 0.05), (h - top - 0.07, h - top), seen=True)
 
 
 def _round(b: Builder, r: float, h: float) -> None:
-    """A round top on a foot or on legs."""
     b.post(b.pick(b.wood, b.wood, "stone"), 0, r, (h - 0.03, h), r, seen=False)
     if b.chance(0.5):
         b.post(b.pick(b.metal, b.wood2), 0, r, (0.02, h - 0.03), 0.05 if r > 0.3 else 0.025, seen=False)
@@ -44,7 +36,6 @@ def _round(b: Builder, r: float, h: float) -> None:
 
 
 def table(b: Builder) -> Piece:
-    """A rectangular dining table without seats."""
     w, d = b.size(1.1, 1.8, 0.1), b.pick(0.75, 0.8, 0.9)
     b.shadow(w, (0, d))
     _table(b, w, d, 0.74)
@@ -59,7 +50,6 @@ def _laid(b: Builder, w: float, y: float) -> None:
 
 
 def round_table(b: Builder) -> Piece:
-    """A round dining table without seats."""
     r = b.pick(0.45, 0.5, 0.55)
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     _round(b, r, 0.74)
@@ -68,7 +58,6 @@ def round_table(b: Builder) -> Piece:
 
 
 def pendant_lamp(b: Builder) -> Piece:
-    """Hangs over a table: a dome, a drum, or two globes."""
     form, low, y = b.pick("dome", "drum", "balls"), 1.72, 0.3
     paint = b.pick(*b.look.accents, "white", "black")
     for x in (-0.25, 0.25) if form == "balls" else (0.0,):
@@ -85,16 +74,14 @@ def pendant_lamp(b: Builder) -> Piece:
 
 
 def dining(b: Builder) -> Piece:
-    """A table with two to six chairs of one form, most often free in the room, and with a lamp over it."""
     against = b.smaller >= 1  # one long side at the wall
     name = "table" if against or b.chance(0.7) else "round_table"
     made = Builder(name, b.rng, b.look, b.smaller)
     base = table(made) if name == "table" else round_table(made)
     w, d, _ = base.size
-    state = int(b.rng.integers(2**31))
+    state = int(b.rng.integers(2**31))  # the same for all chairs, so that they are alike
 
     def chair() -> Piece:
-        """The same chair again: its draws begin anew."""
         return seats.dining_chair(
             Builder("dining_chair", type(b.rng)(type(b.rng.bit_generator)(state)), b.look)
         )
@@ -118,7 +105,6 @@ def dining(b: Builder) -> Piece:
 
 
 def coffee_table(b: Builder) -> Piece:
-    """Low; rectangular, round, a box or two nested ones."""
     form, h = b.pick("rectangle", "round", "box", "shelf"), b.pick(0.38, 0.42, 0.46)
     if form == "round":
         r = b.pick(0.35, 0.42)
@@ -141,7 +127,6 @@ def coffee_table(b: Builder) -> Piece:
 
 
 def side_table(b: Builder) -> Piece:
-    """Small, beside a seat, with a lamp or a plant."""
     r, h = b.pick(0.2, 0.24), b.pick(0.5, 0.56)
     b.shadow(2 * r, (0, 2 * r), round_one=True)
     if b.chance(0.6):
@@ -157,7 +142,6 @@ def side_table(b: Builder) -> Piece:
 
 
 def console(b: Builder) -> Piece:
-    """Narrow, against a wall."""
     w, d, h = b.size(0.8, 1.2, 0.1), b.pick(0.3, 0.36), b.pick(0.78, 0.85)
     b.shadow(w, (0, d))
     b.box(b.wood, w, (0, d - 0.02), (h - 0.13, h))
@@ -172,7 +156,7 @@ def console(b: Builder) -> Piece:
 
 
 def _screen(b: Builder, x: float) -> None:
-    """Monitor or laptop with a keyboard on a desk at height 0.75, for somebody at +y."""
+    """Add a monitor or laptop with a keyboard to a desk of height 0.75 m, for a person at +y."""
     if b.chance(0.65):
         b.box("black", 0.22, (0.1, 0.25), (0.75, 0.762), x, seen=True)
         b.box("black", 0.05, (0.13, 0.16), (0.762, 0.88), x, seen=True)
@@ -186,7 +170,7 @@ def _screen(b: Builder, x: float) -> None:
 
 
 def _desk(b: Builder) -> Piece:
-    """A desk with a place for the box of office supplies at its right end (as somebody sits)."""
+    """A desk with a place for the box of office supplies at the right of the person who sits at it."""
     w, d, h = (b.pick(1.4, 1.5, 1.6), b.pick(1.2, 1.3), 1.0)[min(b.smaller, 2)], b.pick(0.6, 0.66), 0.75
     form, side = b.pick("panels", "pedestal", "legs"), -1
     b.shadow(w, (0, d))
@@ -214,7 +198,6 @@ def _desk(b: Builder) -> Piece:
 
 
 def desk(b: Builder) -> Piece:
-    """A desk with its chair, and room to sit down."""
     base = _desk(Builder("desk", b.rng, b.look, b.smaller))
     chair = seats.office_chair(Builder("office_chair", b.rng, b.look))
     w, d, _ = base.size
@@ -226,7 +209,6 @@ def desk(b: Builder) -> Piece:
 
 
 def dressing_table(b: Builder) -> Piece:
-    """With a mirror and a stool under it."""
     w, d, h = b.size(0.8, 1.0), 0.42, 0.74
     paint = b.pick(b.wood, "white", b.front)
     b.shadow(w, (0, d))
@@ -248,7 +230,6 @@ def dressing_table(b: Builder) -> Piece:
 
 
 def bar_table(b: Builder) -> Piece:
-    """High, with two bar stools; it stands against a wall."""
     w, d, h = b.size(1.0, 1.4, 0.1), b.pick(0.45, 0.55), 1.02
     b.shadow(w, (0, d))
     b.box(b.pick(b.wood, "stone"), w, (0, d), (h - 0.04, h))
@@ -261,17 +242,3 @@ def bar_table(b: Builder) -> Piece:
         stool = seats.bar_stool(Builder("bar_stool", type(b.rng)(type(b.rng.bit_generator)(state)), b.look))
         members.append((stool, side * w / 4, d + 0.28, math.pi))
     return group(b.kind, [(base, 0, 0, 0), *members], use=())
-
-
-KINDS = (
-    dining,
-    table,
-    round_table,
-    pendant_lamp,
-    coffee_table,
-    side_table,
-    console,
-    desk,
-    dressing_table,
-    bar_table,
-)

@@ -1,1 +1,1 @@
-"""Import of houses: scenes of other simulators become a house that `mjsim check` accepts (docs/import.md)."""
+"""Import of houses from scenes of other simulators (docs/import.md)."""

@@ -1,4 +1,4 @@
-"""Places for the bins of the catalogue: backs to a wall, room to stand before them, and every way stays open."""
+"""Placement of bins in an imported house: backs to a wall, with free floor in front, and without blocking a way."""
 
 import math
 from collections.abc import Sequence
@@ -12,18 +12,18 @@ from mjsim.formats.scene.source_scene import Bin
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue, Receptacle
 from mjsim.house.validation.checked_model import Compiled, compile_model
-from mjsim.importing.house.plan import BODY, CELL, Mask, Plan, clearance
+from mjsim.importing.house.floor_grid import BODY, CELL, FloorGrid, Mask, clearance
 from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
-AREA = 5.0  # m^2 of walkable floor for each bin
-_STAND = 0.8  # m of free floor before a bin
-_ASIDE = 0.05  # m of air at the sides
-_WALL = 0.15  # m behind a bin within which the wall is
-_WIDE = 0.4  # m, radius at which ways stay as connected as they were
-_TRIES = 300  # places that are tried for a bin, for each room
-_LOST = 1.0  # m^2 of floor that may no longer be walked on, beyond the bin and its surroundings
-# Bins by importance, and rooms in which people would look for them.
+AREA = 5.0  # walkable floor for each bin, m^2
+_STAND = 0.8  # depth of free floor in front of a bin, m
+_ASIDE = 0.05  # free width at the sides, m
+_WALL = 0.15  # greatest distance to the wall behind, m
+_WIDE = 0.4  # radius for which ways must stay connected, m
+_TRIES = 300  # poses that are tried for a bin in each room
+_LOST = 1.0  # walkable floor that may be lost in addition to the bin and its surroundings, m^2
+# Bins by importance, with the rooms where people would look for them.
 _HOMES = {
     "dish_bin": ("kitchen", "living_kitchen", "dining_room"),
     "toy_box": ("bedroom", "living_room"),
@@ -32,33 +32,33 @@ _HOMES = {
     "office_box": ("office", "bedroom", "living_room"),
     "bookshelf": ("living_room", "living_kitchen", "office"),
 }
-# Turns about z and the way that the back then points.
+# Yaw, and the resulting direction of the back.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
 
 
-Span = tuple[int, int]  # cells from, to, the end not included
+Span = tuple[int, int]  # first cell and end cell, which is not included
 
 
 @dataclass(frozen=True)
 class _Size:
-    """Extent of a receptacle in its own frame, m: its sides and the middle of its base."""
+    """Size and position of a receptacle in its own frame, m."""
 
     width: float
     depth: float
-    middle: tuple[float, float]
+    middle: tuple[float, float]  # of its base
 
 
-def place_bins(plan: Plan, rooms: Rooms, catalogue: Catalogue, seed: int = 0) -> tuple[Bin, ...]:
-    """As many bins as the floor is for, at most all of the catalogue; `AssetError` where none finds a place."""
+def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue, seed: int = 0) -> tuple[Bin, ...]:
+    """Place as many bins as the floor area allows. Raise `AssetError` if none fits."""
     rng = np.random.default_rng(seed)
     wanted = [key for key in _HOMES if key in catalogue.receptacles]
-    wanted = wanted[: max(1, int(plan.area / AREA))]
+    wanted = wanted[: max(1, int(grid.area / AREA))]
     bins: list[Bin] = []
     for key in wanted:
         size = _size(catalogue.receptacles[key])
-        found = _placed(plan, rooms, key, size, [b.room for b in bins], rng)
+        found = _placed(grid, rooms, key, size, [b.room for b in bins], rng)
         if found is not None:
-            place, plan = found
+            place, grid = found
             bins.append(place)
     if not bins:
         raise AssetError(
@@ -78,9 +78,12 @@ def _size(receptacle: Receptacle) -> _Size:
 
 
 def _placed(
-    plan: Plan, rooms: Rooms, key: str, size: _Size, taken: Sequence[str], rng: np.random.Generator
-) -> tuple[Bin, Plan] | None:
-    """A place for a bin and the plan with it; by preference in a room that is for it, else in one with few bins."""
+    grid: FloorGrid, rooms: Rooms, key: str, size: _Size, taken: Sequence[str], rng: np.random.Generator
+) -> tuple[Bin, FloorGrid] | None:
+    """Place a bin. Return it with the new grid, or None if it does not fit.
+
+    It is put into a room where people would look for it, or else into a room with few bins.
+    """
     numbers = list(range(1, len(rooms.names) + 1))
     homes = _HOMES[key]
 
@@ -88,32 +91,32 @@ def _placed(
         name = rooms.names[number - 1][0]
         kind = name.rstrip("0123456789").rstrip("_")
         home = homes.index(kind) if kind in homes else len(homes)
-        area = float((plan.walkable & (rooms.labels == number)).sum())
+        area = float((grid.walkable & (rooms.labels == number)).sum())
         return taken.count(name) + (home == len(homes)), home, -area
 
     for number in sorted(numbers, key=rank):
-        for turn in _choices(plan, rooms.labels == number, size, rng):
-            if (after := _with_bin(plan, rooms, size, turn)) is not None:
-                x, y, yaw = _origin(plan, size, turn)
+        for turn in _choices(grid, rooms.labels == number, size, rng):
+            if (after := _with_bin(grid, rooms, size, turn)) is not None:
+                x, y, yaw = _origin(grid, size, turn)
                 return Bin(key, rooms.names[number - 1][0], x, y, yaw), after
     return None
 
 
 @dataclass(frozen=True)
 class _Choice:
-    """A bin on the grid: its cells, and those before it."""
+    """A possible bin on the grid: its cells, and the cells in front of it."""
 
     cells: tuple[slice, slice]
     before: tuple[slice, slice]
     yaw: float
-    back: tuple[int, int]  # which way its back points
+    back: tuple[int, int]  # direction of its back
 
 
-def _choices(plan: Plan, room: Mask, size: _Size, rng: np.random.Generator) -> list[_Choice]:
-    """Places in a room with the back to a wall, in random order."""
-    free = plan.free & room
-    standing = plan.walkable & room
-    walls = (plan.walls & ~plan.doors) | ~plan.indoors  # where the shell closes it
+def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator) -> list[_Choice]:
+    """Poses in a room with the back to a wall, in random order."""
+    free = grid.free & room
+    standing = grid.walkable & room
+    walls = (grid.walls & ~grid.doors) | ~grid.indoors  # outside is closed by the shell
     ahead = round(_STAND / CELL)
     found: list[_Choice] = []
     for yaw, back in _TURNS:
@@ -123,7 +126,7 @@ def _choices(plan: Plan, room: Mask, size: _Size, rng: np.random.Generator) -> l
         before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
         behind = np.zeros_like(walls)
         for step in range(1, round(_WALL / CELL) + 1):
-            behind |= _shifted(walls, back, step)  # cells with a wall that near behind them
+            behind |= _shifted(walls, back, step)  # cells with a wall that close behind them
         fits = _all(free, spans) & _all(behind, edge) & _all(free, before) & (_count(standing, before) > 0)
         found += [
             _Choice(_at(spans, place), _at(before, place), yaw, back) for place in np.argwhere(fits).tolist()
@@ -133,49 +136,49 @@ def _choices(plan: Plan, room: Mask, size: _Size, rng: np.random.Generator) -> l
 
 
 def _last(span: Span, way: int) -> Span:
-    """The last cell of a span on a way, up or down; all of it across."""
+    """The last cell of a span in direction `way` (1 or -1); the whole span for 0."""
     start, stop = span
     return {1: (stop - 1, stop), 0: span, -1: (start, start + 1)}[way]
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """So many cells beyond a span on a way, up or down; the span itself across."""
+    """A number of cells beyond a span in direction `way` (1 or -1); the span itself for 0."""
     start, stop = span
     return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
 
 
 def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
-    """Spans as cells of the grid, seen from a place."""
+    """Spans relative to `place` as slices of the grid."""
     x, y = (slice(at + start, at + stop) for at, (start, stop) in zip(place, spans, strict=True))
     return x, y
 
 
-def _with_bin(plan: Plan, rooms: Rooms, size: _Size, choice: _Choice) -> Plan | None:
-    """The plan with a bin; None where it would be in the way."""
-    blocked = plan.blocked.copy()
+def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> FloorGrid | None:
+    """The grid with a bin; None if the bin would be in the way."""
+    blocked = grid.blocked.copy()
     blocked[choice.cells] = True
-    after = replace(plan, blocked=blocked)
+    after = replace(grid, blocked=blocked)
     lost = (size.width + 2 * _WIDE) * (size.depth + 2 * _WIDE) + _LOST
-    if plan.area - after.area > lost or not after.walkable[choice.before].any():
+    if grid.area - after.area > lost or not after.walkable[choice.before].any():
         return None
     for radius in (BODY, _WIDE):
-        if _parts(after, radius) > _parts(plan, radius):
+        if _parts(after, radius) > _parts(grid, radius):
             return None
     numbers = range(1, len(rooms.names) + 1)
     area = [(after.walkable & (rooms.labels == n)).sum() * CELL**2 for n in numbers]
     return after if min(area) > 0.4 else None
 
 
-def _parts(plan: Plan, radius: float) -> int:
-    """Into how many parts of more than 0.2 m^2 the floor falls for a body of a radius, m."""
-    parts, _ = label(clearance(plan.free) > radius)
+def _parts(grid: FloorGrid, radius: float) -> int:
+    """Number of connected parts of the floor above 0.2 m^2, for a body of a radius, m."""
+    parts, _ = label(clearance(grid.free) > radius)
     return int((np.bincount(parts.ravel())[1:] * CELL**2 > 0.2).sum())
 
 
-def _origin(plan: Plan, size: _Size, choice: _Choice) -> tuple[float, float, float]:
-    """Where the receptacle's frame is: x, y, m, and yaw, rad; its back ends with its cells."""
-    low = plan.origin + CELL * np.array([choice.cells[0].start, choice.cells[1].start])
-    high = plan.origin + CELL * np.array([choice.cells[0].stop, choice.cells[1].stop])
+def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float, float]:
+    """Pose of the receptacle's frame: x, y, m, and yaw, rad. Its back is flush with its cells."""
+    low = grid.origin + CELL * np.array([choice.cells[0].start, choice.cells[1].start])
+    high = grid.origin + CELL * np.array([choice.cells[0].stop, choice.cells[1].stop])
     back = np.array(choice.back, float)
     middle: Floats = (low + high) / 2
     reach = float(np.abs(back) @ (high - low)) / 2 - size.depth / 2
@@ -186,7 +189,7 @@ def _origin(plan: Plan, size: _Size, choice: _Choice) -> tuple[float, float, flo
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """How many cells of a mask are within two spans, seen from each cell."""
+    """For each cell, the number of cells of a mask within two spans relative to it."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]
@@ -196,11 +199,11 @@ def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
 
 
 def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
-    """Cells from which all cells within two spans are in a mask."""
+    """Cells for which all cells within two spans relative to them are in a mask."""
     (a, b), (c, d) = spans
     return np.asarray(_count(mask, spans) == (b - a) * (d - c))
 
 
 def _shifted(mask: Mask, by: tuple[int, int], steps: int) -> Mask:
-    """Cells whose neighbour, so many steps in a direction, is in a mask."""
+    """Cells whose neighbour a number of steps away is in a mask."""
     return np.roll(mask, (-by[0] * steps, -by[1] * steps), (0, 1))

@@ -1,4 +1,4 @@
-"""From a scene of another simulator to a house, with every decision on the way."""
+"""Import of a house from a scene of another simulator, with a report of all decisions."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from mjsim.formats.scene.mesh_files import SCENE_SUFFIXES as MESHES
 from mjsim.formats.scene.source_scene import (
     HouseOptions,
     ImportDecision,
-    Piece,
+    ScenePiece,
     SourceScene,
     left_out,
     moved,
@@ -34,8 +34,8 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.check import CheckReport, check_house_name
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.importing.house.bins import place_bins
-from mjsim.importing.house.look import make_looks
-from mjsim.importing.house.plan import Plan, make_plan, too_large
+from mjsim.importing.house.drawn_meshes import make_drawn_meshes
+from mjsim.importing.house.floor_grid import FloorGrid, make_floor_grid, too_large
 from mjsim.importing.house.rooms import find_rooms, read_rooms
 from mjsim.importing.house.solids import HIGH, LOW, Solids, make_solids
 from mjsim.importing.house.storey import FAR, counted, floor_and_ceiling, near_pieces, of_one_storey
@@ -46,19 +46,19 @@ from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError
 
 REPORT, PICTURE = "report.json", "preview.png"
-_FLOOR_SEEN = 0.8  # share of the floor that the source must draw itself
-_FEW = 4  # things that stand about, fewer than which are no house where there are no walls
-_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # m: thickness at most, width and height of a door leaf
+_FLOOR_SEEN = 0.8  # share of the floor drawn by the source from which no other floor is added
+_FEW = 4  # least number of obstacles in a house without walls
+_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # greatest thickness, and ranges of width and height of a door leaf, m
 
 
 def import_house(
     source: Path, out: Path, options: HouseOptions, *, label: str | None = None, force: bool = False
 ) -> tuple[tuple[ImportDecision, ...], CheckReport]:
-    """Make a house of a scene, in a new folder; returns what was decided and the report of the check.
+    """Import a scene as a house, in a new folder. Return the decisions and the report of the check.
 
     Raises:
-        AssetError: The scene cannot be read, is no house or has errors in the check, or the folder is there already;
-            nothing is written.
+        AssetError: The scene cannot be read, is not a house or fails the check, or the folder exists. Nothing is
+            written.
     """
     if out.exists() and not force:
         raise AssetError(f"{out} is already there; choose another --out, or use --force to replace it")
@@ -78,7 +78,7 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
-        if fits < POINTS:  # the house says for how many it is meant; a few less, for other packings
+        if fits < POINTS:  # a little fewer than fit, since other samples pack them less densely
             points = max(fits - 2, 1)
             set_points(path, points)
             report = check_house_name(str(path))
@@ -96,27 +96,27 @@ def import_house(
 
 
 def _without(scene: SourceScene) -> str:
-    """What may be why a house cannot be made: what the scene lacks."""
+    """Text about missing files, which may be why the import failed."""
     lacking = [note for note in scene.notes if note.choice.endswith(" missing")]
     return "".join(f"{note.choice} ({note.reason}), and what is left " for note in lacking)
 
 
 def _refusal(found: Sequence[Finding]) -> str:
-    """Why a house that was made of a scene cannot be used, without the names of its files."""
+    """Message about the first error in a house made of a scene, without file names."""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     subject = "" if found[0].subject == "house" else f"{found[0].subject} "
     return f"the house made of it cannot be used: {subject}{found[0].message}{more}; correct the source"
 
 
 def read_scene(source: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene by the kind of its file; `AssetError` where it is of no known kind or cannot be read."""
+    """Read a scene by the suffix of its file. Raise `AssetError` if it is unknown or the file cannot be read."""
     if not source.is_file():
         raise AssetError(f"there is no file {source}")
     for endings, read in _READERS:
         if source.name.lower().endswith(endings):
             return read(source, options)
     known = ", ".join(ending for endings, _ in _READERS for ending in endings)
-    raise AssetError(f"{source} is of no kind that can be read; give {known}")
+    raise AssetError(f"cannot read {source}: unknown kind of file; use {known}")
 
 
 _READERS: tuple[tuple[tuple[str, ...], Callable[[Path, HouseOptions], SourceScene]], ...] = (
@@ -155,31 +155,31 @@ def _converted(
         solids = make_solids(still)
         decisions.append(ImportDecision("solid", "what is seen", "what the source lets collide is no house"))
     if not solids.solids:
-        raise AssetError("has no walls and no furniture: nothing that one could bump into; is it a house?")
+        raise AssetError("has no walls and no furniture; is it a house?")
     floor = _floor(still)
     leaves = make_solids(doors)
-    plan = make_plan(solids.solids, leaves.solids, floor)
-    opened = {leaf.name for leaf in leaves.solids if _between_rooms(plan, leaf.outline)}
+    grid = make_floor_grid(solids.solids, leaves.solids, floor)
+    opened = {leaf.name for leaf in leaves.solids if _between_rooms(grid, leaf.outline)}
     kept = [leaf for leaf in leaves.solids if leaf.name not in opened]
     solids = Solids((*solids.solids, *kept), solids.boxes, solids.hulls, solids.voxels, solids.pitch)
-    plan = make_plan(solids.solids, [leaf for leaf in leaves.solids if leaf.name in opened], floor)
-    if not plan.enclosed and len(solids.solids) < _FEW:
-        raise AssetError(f"has neither walls nor furniture, only {len(solids.solids)} things to bump into")
+    grid = make_floor_grid(solids.solids, [leaf for leaf in leaves.solids if leaf.name in opened], floor)
+    if not grid.enclosed and len(solids.solids) < _FEW:
+        raise AssetError(f"has no walls and only {len(solids.solids)} obstacles; is it a house?")
     drawn = [piece for piece in pieces if piece.name not in opened]
     given = read_rooms(options.rooms) if options.rooms is not None else scene.rooms
-    rooms = find_rooms(plan, given, drawn)
+    rooms = find_rooms(grid, given, drawn)
     catalogue = Catalogue.load()
     given_bins = tuple(replace(b, z=b.z - level) for b in scene.bins)
     kept_bins = all(b.key in catalogue.receptacles and b.room in dict(rooms.names) for b in given_bins)
-    bins = given_bins if given_bins and kept_bins else place_bins(plan, rooms, catalogue)
+    bins = given_bins if given_bins and kept_bins else place_bins(grid, rooms, catalogue)
     if lost := [room.label for room in given if room.key not in dict(rooms.names)]:
-        decisions.append(left_out(", ".join(lost), "nobody gets there, or nobody fits in"))
-    looks = make_looks(drawn, partial(plan.on, rooms.floor))
-    seen = float((plan.floor & rooms.floor).sum() / rooms.floor.sum())
+        decisions.append(left_out(", ".join(lost), "unreachable, or too small for a person"))
+    looks = make_drawn_meshes(drawn, partial(grid.on, rooms.floor))
+    seen = float((grid.floor & rooms.floor).sum() / rooms.floor.sum())
     name = label or source.name.split(".")[0].replace("_", " ").strip().capitalize()
-    house = ImportedHouse(name, source.name, solids.solids, looks, plan, rooms, bins, seen >= _FLOOR_SEEN)
-    triangles = sum(len(mesh.look.faces) for mesh in looks)
-    pictures = len({id(mesh.look.picture) for mesh in looks if mesh.look.picture is not None})
+    house = ImportedHouse(name, source.name, solids.solids, looks, grid, rooms, bins, seen >= _FLOOR_SEEN)
+    triangles = sum(len(mesh.visual.faces) for mesh in looks)
+    pictures = len({id(mesh.visual.picture) for mesh in looks if mesh.visual.picture is not None})
     if doors:
         choice = f"{len(opened)} open" if opened else "as they are"
         decisions.append(ImportDecision("doors", choice, ", ".join(sorted(opened)[:6])))
@@ -191,8 +191,8 @@ def _converted(
         ),
         ImportDecision(
             "outline",
-            "closed by its walls" if plan.enclosed else "a rectangle",
-            f"{plan.area:.0f} m2 can be walked on" if plan.enclosed else "no outer wall encloses a floor",
+            "closed by its walls" if grid.enclosed else "a rectangle",
+            f"{grid.area:.0f} m2 can be walked on" if grid.enclosed else "no outer wall encloses a floor",
         ),
         ImportDecision("rooms", ", ".join(text for _, text in rooms.names), rooms.reason),
         ImportDecision(
@@ -210,8 +210,8 @@ def _converted(
     return house, decisions
 
 
-def _check_span(pieces: Sequence[Piece]) -> None:
-    """`AssetError` where what stands there is far larger than a house: in voxels it would not fit the memory."""
+def _check_span(pieces: Sequence[ScenePiece]) -> None:
+    """Raise `AssetError` if the scene is far larger than a house, since its voxels would not fit into memory."""
     standing = [p.surface.corners.reshape(-1, 3) for p in pieces if p.solid]
     high = [corners for corners in standing if corners[:, 2].max() > LOW and corners[:, 2].min() < HIGH]
     sides = np.ptp(np.concatenate(high)[:, :2], axis=0) if high else np.zeros(2)
@@ -219,8 +219,8 @@ def _check_span(pieces: Sequence[Piece]) -> None:
         raise too_large(sides)
 
 
-def _is_door(piece: Piece) -> bool:
-    """Whether a piece is a door leaf, by its name and shape."""
+def _is_door(piece: ScenePiece) -> bool:
+    """True if name and shape of a piece are those of a door leaf."""
     if not {"door", "doors"} & set(words_of(piece.name)):
         return False
     x, y, height = np.ptp(piece.surface.corners.reshape(-1, 3), axis=0)
@@ -228,17 +228,17 @@ def _is_door(piece: Piece) -> bool:
     return bool(min(x, y) <= thickness and narrow <= max(x, y) <= wide and low <= height <= high)
 
 
-def _between_rooms(plan: Plan, outline: Floats) -> bool:
-    """Whether both sides of a door are indoors."""
+def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
+    """True if both sides of a door are indoors."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle, across = (low + high) / 2, int(np.argmin(high - low))
     offset = np.zeros(2)
     offset[across] = 0.5
-    return all(plan.indoors[plan.cell(middle + sign * offset)] for sign in (-1, 1))
+    return all(grid.indoors[grid.cell(middle + sign * offset)] for sign in (-1, 1))
 
 
-def _floor(pieces: Sequence[Piece]) -> Floats:
-    """Triangles at floor height from above, m, (n, 3, 2)."""
+def _floor(pieces: Sequence[ScenePiece]) -> Floats:
+    """Triangles at floor height, from above, m, (n, 3, 2)."""
     found = [
         p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces if p.seen
     ]
@@ -246,7 +246,7 @@ def _floor(pieces: Sequence[Piece]) -> Floats:
 
 
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
-    """Draw the house from above; without OpenGL there is no picture, and the note says so."""
+    """Draw the house from above. Return a note if that fails, such as without OpenGL."""
     from mjsim.house.compiled.house import compiled_house
     from mjsim.render.pictures import render_house_map
 

@@ -1,4 +1,4 @@
-"""Rooms of a floor plan: as the source or the user names them, else parted where the way is narrow."""
+"""Rooms of an imported house: named by the source or the user, or else separated at narrow passages."""
 
 import re
 import tomllib
@@ -13,20 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, label
 
-from mjsim.formats.scene.source_scene import NamedRoom, Piece, merged_rectangles, words_of
+from mjsim.formats.scene.source_scene import NamedRoom, ScenePiece, merged_rectangles, words_of
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.house.plan import CELL, Mask, Plan, clearance
+from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
-_NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)  # m, half of the way that parts two rooms; the wider ones part halls
-_HALL = 45.0  # m^2, floor of a room that is rather parted at wider openings
-_HALL_PART = 5.0  # m^2, at least, of each part
-_MIN_AREA = 1.5  # m^2 of floor; smaller ones belong to their neighbours
-_MIN_WALK = 0.5  # m^2 that can be walked on
-_COARSE = 2  # cells along the side of the grid of a room's rectangles
-_LARGE = 0.5  # m; smaller things say nothing about the use of a room
-# Names of furniture say what a room is; the first that fits counts.
+_NARROW = (
+    0.65,
+    0.9,
+    1.2,
+    1.5,
+    1.8,
+)  # half width of passages that separate rooms, m; wider ones only for halls
+_HALL = 45.0  # floor area from which a room is divided at wider passages, m^2
+_HALL_PART = 5.0  # least area of such a part, m^2
+_MIN_AREA = 1.5  # least floor area of a room, m^2; smaller ones are merged with their neighbours
+_MIN_WALK = 0.5  # least walkable area of a room, m^2
+_COARSE = 2  # cells along each side of a block, in which rectangles of rooms are measured
+_LARGE = 0.5  # least size of furniture that determines the use of a room, m
+# Key, label, and words in names of furniture, of which a room needs one from each group. The first match counts.
 _USES = (
     ("living_kitchen", "Living room with kitchen", ("kitchen fridge refrigerator", "sofa couch")),
     (
@@ -46,14 +52,14 @@ Labels = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Rooms:
-    """Rooms on the grid of a plan."""
+    """Rooms on a floor grid."""
 
     names: tuple[tuple[str, str], ...]  # key and label of room 1, 2, ...
-    labels: Labels  # number of the room of each cell, 0 off all rooms, (nx, ny)
-    floor: Mask  # cells of rooms, without those in their walls, (nx, ny)
+    labels: Labels  # number of each cell's room, 0 for none, (nx, ny)
+    floor: Mask  # cells of rooms without their walls, (nx, ny)
     reason: str  # how they were found
 
-    def rectangles(self, plan: Plan) -> list[tuple[str, Floats, Floats]]:
+    def rectangles(self, grid: FloorGrid) -> list[tuple[str, Floats, Floats]]:
         """Rectangles that cover the rooms: key, lower and upper corner, m, (2,) each."""
         found = []
         nx, ny = (np.array(self.labels.shape) // _COARSE).tolist()
@@ -62,25 +68,22 @@ class Rooms:
         step = CELL * _COARSE
         for number, (key, _) in enumerate(self.names, 1):
             for a, b, c, d in merged_rectangles(coarse == number):
-                found.append(
-                    (key, plan.origin + step * np.array([a, c]), plan.origin + step * np.array([b, d]))
-                )
+                low, high = grid.origin + step * np.array([a, c]), grid.origin + step * np.array([b, d])
+                found.append((key, low, high))
         return found
 
-    def shell(self, plan: Plan) -> list[tuple[Floats, Floats]]:
-        """Boxes that close everything off the rooms: lower and upper corner, m, (2,) each."""
+    def shell(self, grid: FloorGrid) -> list[tuple[Floats, Floats]]:
+        """Boxes that close off everything outside the rooms: lower and upper corner, m, (2,) each."""
         inside = binary_dilation(self.labels > 0)
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
-        edge = 4
+        across, along = (slice(max(at[0] - 4, 0), at[-1] + 5) for at in (rows, columns))
         window = np.zeros_like(inside)
-        window[
-            max(rows[0] - edge, 0) : rows[-1] + edge + 1, max(columns[0] - edge, 0) : columns[-1] + edge + 1
-        ] = True
+        window[across, along] = True
         parts, _ = label(window & ~inside)
-        solid = plan.walls & ~plan.doors
+        solid = grid.walls & ~grid.doors
         needed = np.isin(parts, np.setdiff1d(np.unique(parts[~solid]), [0]))
         return [
-            (plan.origin + CELL * np.array([a, c]), plan.origin + CELL * np.array([b, d]))
+            (grid.origin + CELL * np.array([a, c]), grid.origin + CELL * np.array([b, d]))
             for a, b, c, d in merged_rectangles(needed)
         ]
 
@@ -91,7 +94,7 @@ class _RoomTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
-    """Rooms of a TOML file, `AssetError` where it has none that can be read."""
+    """Read rooms from a TOML file. Raise `AssetError` if it has no valid rooms."""
     try:
         tables = tomllib.loads(read_text(path))
         rooms = msgspec.convert(tables.get("rooms", {}), dict[str, _RoomTable])
@@ -106,37 +109,33 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
     return tuple(NamedRoom(key, room.label, tuple(room.boxes)) for key, room in rooms.items())
 
 
-def find_rooms(plan: Plan, given: Sequence[NamedRoom], pieces: Sequence[Piece]) -> Rooms:
-    """Rooms that cover all floor that can be reached; `AssetError` where given ones cover none."""
+def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[ScenePiece]) -> Rooms:
+    """Rooms that cover all reachable floor. Raise `AssetError` if given rooms cover none."""
     if given:
-        seeds, reason = _seeds_of(plan, given), "given"
+        seeds, reason = _seeds_of(grid, given), "given"
         names = [(room.key, room.label) for room in given]
     else:
-        open_floor = plan.indoors & ~plan.walls
+        open_floor = grid.indoors & ~grid.walls
         seeds = _parted(open_floor)
-        names, reason = (
-            [],
-            f"parted where the way is at most {2 * _NARROW[0]} m wide, halls where it is wider",
-        )
-    grown = _grown(seeds, plan.indoors & ~(plan.walls & ~plan.doors))
+        names = []
+        reason = f"separated where the way is at most {2 * _NARROW[0]} m wide, halls where it is wider"
+    grown = _grown(seeds, grid.indoors & ~(grid.walls & ~grid.doors))
     kept = [
         n
         for n in range(1, int(grown.max()) + 1)
-        if (plan.walkable & (grown == n)).sum() * CELL**2 >= _MIN_WALK
+        if (grid.walkable & (grown == n)).sum() * CELL**2 >= _MIN_WALK
         and (bool(given) or (grown == n).sum() * CELL**2 >= _MIN_AREA)
     ]
     if not kept and given:
-        raise AssetError(
-            "no room that is given has floor that can be walked on; boxes are in m of the source"
-        )
-    if not kept:  # nowhere as wide as a room
-        seeds, kept, reason = plan.walkable.astype(np.int32), [1], "one room"
+        raise AssetError("no given room has walkable floor; boxes are in the source's coordinates, in m")
+    if not kept:  # no part is as wide as a room
+        seeds, kept, reason = grid.walkable.astype(np.int32), [1], "one room"
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
-    region = plan.indoors & ~(plan.walls & ~plan.doors)
+    region = grid.indoors & ~(grid.walls & ~grid.doors)
     floor = _grown(numbered[seeds], region)
     labels = _within_walls(floor)
-    names = [names[n - 1] for n in kept] if given else _names(labels, len(kept), plan, pieces)
+    names = [names[n - 1] for n in kept] if given else _names(labels, len(kept), grid, pieces)
     return Rooms(tuple(names), labels, floor > 0, reason)
 
 
@@ -149,18 +148,12 @@ def _parted(floor: Mask) -> Labels:
         region, level = waiting.pop()
         seeds, count = label(region & (distance > _NARROW[level]))
         parts = seeds
-        for depth in np.arange(
-            _NARROW[level], -CELL, -CELL
-        ):  # wide places first, so that rooms meet where it is narrow
+        # Grow through wide places first, so that rooms meet where it is narrow.
+        for depth in np.arange(_NARROW[level], -CELL, -CELL):
             parts = _grown(parts, region & (distance > depth))
         sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:] * CELL**2
         if level and (sizes > _HALL_PART).sum() < 2:
-            seeds, parts, sizes, count = (
-                region,
-                region.astype(np.int32),
-                np.array([region.sum() * CELL**2]),
-                1,
-            )
+            parts, sizes, count = region.astype(np.int32), np.array([region.sum() * CELL**2]), 1
         for number in range(1, count + 1):
             part = parts == number
             if sizes[number - 1] > _HALL and level + 1 < len(_NARROW):
@@ -170,17 +163,17 @@ def _parted(floor: Mask) -> Labels:
     return labels
 
 
-def _seeds_of(plan: Plan, given: Sequence[NamedRoom]) -> Labels:
-    seeds = np.zeros(plan.free.shape, np.int32)
+def _seeds_of(grid: FloorGrid, given: Sequence[NamedRoom]) -> Labels:
+    seeds = np.zeros(grid.free.shape, np.int32)
     for number, room in enumerate(given, 1):
         for xmin, ymin, xmax, ymax in room.boxes:
-            (a, c), (b, d) = plan.cell((xmin, ymin)), plan.cell((xmax, ymax))
+            (a, c), (b, d) = grid.cell((xmin, ymin)), grid.cell((xmax, ymax))
             seeds[a : b + 1, c : d + 1] = number
-    return np.where(plan.indoors & ~plan.walls, seeds, 0).astype(np.int32)
+    return np.where(grid.indoors & ~grid.walls, seeds, 0).astype(np.int32)
 
 
 def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
-    """Seeds spread over a region, around corners, not through what is off it."""
+    """Grow labels over a region, around corners but not across cells outside it."""
     labels = np.where(region, seeds, 0).astype(np.int32)
     while True:
         fresh = np.where(region & (labels == 0), _spread(labels, cv2.MORPH_CROSS), labels)
@@ -190,20 +183,22 @@ def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
 
 
 def _within_walls(labels: Labels) -> Labels:
-    """Rooms two cells farther, into their walls."""
+    """Extend each room by two cells so that it reaches into its walls."""
     for _ in range(2):
         labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
     return labels
 
 
-def _names(labels: Labels, count: int, plan: Plan, pieces: Sequence[Piece]) -> list[tuple[str, str]]:
-    """Keys and labels by the furniture of each room."""
+def _names(
+    labels: Labels, count: int, grid: FloorGrid, pieces: Sequence[ScenePiece]
+) -> list[tuple[str, str]]:
+    """Keys and labels of rooms by their furniture."""
     words: list[set[str]] = [set() for _ in range(count + 1)]
     for piece in pieces:
         points = piece.surface.corners.reshape(-1, 3)
         if np.ptp(points, axis=0).max() >= _LARGE:
             middle = (points.min(axis=0) + points.max(axis=0)) / 2
-            words[labels[plan.cell(middle)]] |= set(words_of(piece.name))
+            words[labels[grid.cell(middle)]] |= set(words_of(piece.name))
     names: list[tuple[str, str]] = []
     for number in range(1, count + 1):
         found = words[number]

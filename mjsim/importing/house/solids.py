@@ -1,4 +1,4 @@
-"""What one bumps into: boxes, convex hulls, and boxes of merged voxels where neither fits, within a budget."""
+"""Collision geometry of an imported house: boxes, convex hulls, or boxes of merged voxels, within a budget."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,37 +10,39 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_fill_holes
 from scipy.spatial import QhullError
 
-from mjsim.formats.scene.source_scene import Piece, merged_rectangles
+from mjsim.formats.scene.source_scene import ScenePiece, merged_rectangles
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import _few_vertices
 
-BUDGET = 1500  # geoms that collide
-LOW, HIGH = 0.051, 1.9  # m; what ends below is walked over, what begins above is only seen
-_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # m, sides of voxels, the first within the budget
-_BOX = 0.95  # share of its bounding box that the hull of a box fills
-_CONVEX = 0.85  # share of its hull that a convex thing fills
-_SMALL = 0.5  # m; smaller things collide as their hulls
-_HANGING = 1.6  # m; lamps and pictures that begin above are only seen
-_OVERHEAD = 0.8  # m; what begins above is a box: as a hull it would seem to fill the free floor below
-_FURNITURE = 1.5  # m, sides of furniture that is taken for filled where it is closed
-_ROOM = (2.0, 2.0, 1.8)  # m; a closed mesh that is larger is a room, not a block: people are inside
-_FEW = 30  # boxes of voxels of a piece of furniture
-_MAX_PARTS = 60  # connected parts of a piece that are looked at one by one
-_THIN = 0.01  # m, least thickness of what collides
+BUDGET = 1500  # colliding geoms
+LOW, HIGH = 0.051, 1.9  # people walk over what is lower, and do not reach what begins higher, m
+_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # sides of voxels, m, of which the first within the budget is used
+_BOX = 0.95  # least share of its bounding box that the hull of a box fills
+_CONVEX = 0.85  # least share of its hull that a convex mesh fills
+_SMALL = 0.5  # size below which a mesh becomes its hull, m
+_HANGING = 1.6  # height from which lamps and pictures do not collide, m
+_OVERHEAD = (
+    0.8  # height from which furniture becomes a box, whose hull would seem to cover the floor below, m
+)
+_FURNITURE = 1.5  # largest side of furniture, which counts as filled if it is closed, m
+_ROOM = (2.0, 2.0, 1.8)  # a larger closed mesh is a room with people inside, not a block, m
+_FEW = 30  # most boxes of voxels for a piece of furniture
+_MAX_PARTS = 60  # most connected parts of a piece that are treated separately
+_THIN = 0.01  # least thickness of colliding geoms, m
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A convex thing that collides."""
+    """A convex part that collides."""
 
-    name: str  # of its piece
+    name: str  # name of its piece
     low: Floats  # lower corner, m, (3,)
     high: Floats  # upper corner
     hull: Floats | None = None  # vertices (k, 3), m; None for a box
 
     @property
     def outline(self) -> Floats:
-        """Points (k, 2), m, whose hull is its outline from above."""
+        """Points (k, 2), m, whose hull is the outline from above."""
         if self.hull is not None:
             return self.hull[:, :2]
         (a, b), (c, d) = self.low[:2], self.high[:2]
@@ -49,16 +51,16 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """All that collides."""
+    """All collision geometry."""
 
     solids: tuple[Solid, ...]
-    boxes: int  # pieces that are boxes
-    hulls: int  # pieces that collide as their hulls
-    voxels: int  # boxes of merged voxels
-    pitch: float  # m, side of a voxel
+    boxes: int  # number of boxes
+    hulls: int  # number of hulls
+    voxels: int  # number of boxes of merged voxels
+    pitch: float  # side of a voxel, m
 
 
-def make_solids(pieces: Iterable[Piece]) -> Solids:
+def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
     """Convex parts of all solid pieces at the heights of a person."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
@@ -84,7 +86,7 @@ def make_solids(pieces: Iterable[Piece]) -> Solids:
     return Solids((*simple, *boxes), len(simple) - hulls, hulls, len(boxes), pitch)
 
 
-def _parts(piece: Piece) -> Iterator[trimesh.Trimesh]:
+def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
     """Connected parts of a piece that a person can bump into."""
     mesh = piece.surface.mesh()
     count = mesh.body_count
@@ -97,14 +99,14 @@ def _parts(piece: Piece) -> Iterator[trimesh.Trimesh]:
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Parts of a thing; furniture of many, such as the keys of a keyboard, is one."""
+    """Parts of a thing, joined if it is furniture with many of them, such as the keys of a keyboard."""
     if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
         return meshes
     return [trimesh.util.concatenate(meshes)]
 
 
 def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
-    """A box or a hull where that is what it is, or it is small; else None."""
+    """A box or a hull if the mesh is close to one or small, otherwise None."""
     low, high = mesh.bounds
     extents = high - low
     if (extents > _ROOM).all():
@@ -128,7 +130,7 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Vertices (k, 3) of a thing, with others beside them where all lie on a slanted plane or line."""
+    """Vertices (k, 3), with copies beside them if all are on a plane or line."""
     for axis in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][::-1][:2]:
         if np.ptp(points @ axis) < _THIN:
             points = np.concatenate([points - axis * _THIN / 2, points + axis * _THIN / 2])
@@ -136,7 +138,7 @@ def _thickened(points: Floats) -> Floats:
 
 
 def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:
-    """Whether a mesh is about its hull: by its volume where it is closed, else by its area."""
+    """True if a mesh is close to its hull: by volume if it is closed, otherwise by area."""
     if mesh.is_watertight:
         return bool(abs(mesh.volume) > _CONVEX * hull.volume)
     return bool(abs(mesh.area - hull.area) < (1 - _CONVEX) * hull.area and _compact(mesh.extents))
@@ -144,17 +146,16 @@ def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:
 
 def _box(name: str, low: Floats, high: Floats) -> Solid:
     grow = np.maximum(_THIN - (high - low), 0.0) / 2
-    low, high = low - grow, high + grow
-    return Solid(name, low, high)
+    return Solid(name, low - grow, high + grow)
 
 
 def _compact(extents: Floats) -> bool:
-    """Whether a thing of these extents is furniture, not walls: what it encloses is filled."""
+    """True for the extents of furniture rather than walls. The inside of furniture counts as filled."""
     return bool(extents[:2].max() < _FURNITURE)
 
 
 def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
-    """Boxes of voxels of this side, or of larger ones where furniture would need too many."""
+    """Boxes of voxels with sides of `pitch`, or larger ones for furniture that would need too many."""
     boxes: list[Solid] = []
     for side in (p for p in _PITCHES if p >= pitch):
         boxes = list(_voxels(name, mesh, side))
@@ -164,12 +165,14 @@ def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
 
 
 def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
-    """Boxes of merged voxels around a surface, each drawn in to what it holds of the surface."""
+    """Boxes of merged voxels around a surface, each shrunk to the part of the surface in it."""
     samples = _samples(np.asarray(mesh.triangles), pitch / 2)
     samples = samples[samples[:, 2] < HIGH + pitch]
     if not len(samples):
         return
-    origin = samples.min(axis=0) - 0.3 * pitch  # walls are often multiples of 5 cm thick: no face on a border
+    origin = (
+        samples.min(axis=0) - 0.3 * pitch
+    )  # no face on a cell border, since walls are often multiples of 5 cm thick
     cells = np.floor((samples - origin) / pitch).astype(int)
     grid = np.zeros(cells.max(axis=0) + 1, bool)
     grid[tuple(cells.T)] = True
@@ -186,7 +189,7 @@ def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
 
 
 def _samples(corners: Floats, step: float) -> Floats:
-    """Points (k, 3) at most about a step, m, apart on triangles (n, 3, 3)."""
+    """Points (k, 3) on triangles (n, 3, 3), at most about `step`, m, apart."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first, count = lengths.argmax(axis=1), np.arange(len(corners))
     a, b, c = (corners[count, (first + k) % 3] for k in range(3))
@@ -202,9 +205,9 @@ def _samples(corners: Floats, step: float) -> Floats:
 
 
 def merged_boxes(grid: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int, int], tuple[int, int, int]]]:
-    """Boxes that cover the cells of a grid (nx, ny, nz) once, as first and last cell, the last not included.
+    """Boxes (first cell, end cell) that cover each cell of a grid (nx, ny, nz) once; ends are exclusive.
 
-    Columns of the same profile are merged into rectangles, so walls and tables give few.
+    Columns with the same profile are merged into rectangles, so walls and tables give few boxes.
     """
     packed = np.packbits(grid, axis=2)
     profiles, index = np.unique(packed.reshape(-1, packed.shape[2]), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""An imported house as files: house.xml, catalogue.toml, meshes and pictures; the same house gives the same bytes."""
+"""Files of an imported house: house.xml, catalogue.toml, meshes and images, the same bytes for the same house."""
 
 import json
 import re
@@ -14,36 +14,36 @@ from mjsim.formats.scene.source_scene import Bin
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.catalogue.house_ref import CATALOGUE, models_root
-from mjsim.importing.house.look import DrawnMesh, picture_key
-from mjsim.importing.house.plan import Plan
+from mjsim.importing.house.drawn_meshes import DrawnMesh, picture_key
+from mjsim.importing.house.floor_grid import FloorGrid
 from mjsim.importing.house.rooms import Rooms
 from mjsim.importing.house.solids import Solid
-from mjsim.importing.object.model_writer import comment, look_lines, write_png
+from mjsim.importing.object.model_writer import comment, obj_lines, write_png
 
 MODEL = "house.xml"
 MESHES = "meshes"
-_HEIGHT = 2.5  # m, of what closes the shell
-_DEPTH = 0.1  # m, of the floor that collides
-_UNDER = 0.002  # m, of the drawn floor below z = 0, so that rugs and floors of the source are seen
+_HEIGHT = 2.5  # height of the closing shell, m
+_DEPTH = 0.1  # thickness of the colliding floor, m
+_UNDER = 0.002  # depth of the added drawn floor below z = 0, so that it does not hide rugs and floors of the source, m
 _LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2 0.5 1", 0.3))
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedHouse:
-    """All that is written."""
+    """Everything that is written."""
 
-    label: str  # shown to the person
-    source: str  # name of the file that it is made of
+    label: str  # shown to participants
+    source: str  # name of the source file
     solids: Sequence[Solid]
     looks: Sequence[DrawnMesh]
-    plan: Plan
+    grid: FloorGrid
     rooms: Rooms
     bins: Sequence[Bin]
-    floor_seen: bool  # whether the source's own floor is drawn
+    floor_seen: bool  # the source draws a floor
 
 
 def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Path:
-    """Write a house into an existing folder, with categories of a catalogue; returns its catalogue file."""
+    """Write a house into an existing folder, with categories of a catalogue. Return its catalogue file."""
     (folder / MESHES).mkdir()
     lines = [
         f"<mujoco model={quoteattr(_name(house.label))}>",
@@ -72,17 +72,17 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
 
 
 def set_points(catalogue: Path, points: int) -> None:
-    """Say in a catalogue that was written for how many points the house is meant."""
+    """Set the number of points in a catalogue that was written before."""
     text = catalogue.read_text(encoding="utf-8")
     catalogue.write_text(text.replace("[house]\n", f"[house]\npoints = {points}\n", 1), encoding="utf-8")
 
 
 def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
-    """Meshes, pictures and materials; writes their files."""
+    """Yield meshes, textures and materials, and write their files."""
     known: set[str] = set()
     for number, mesh in enumerate(house.looks):
-        look, name = mesh.look, f"look_{number}"
-        (folder / f"{name}.obj").write_text("\n".join(look_lines(look)) + "\n", encoding="utf-8")
+        look, name = mesh.visual, f"look_{number}"
+        (folder / f"{name}.obj").write_text("\n".join(obj_lines(look)) + "\n", encoding="utf-8")
         yield f'<mesh name="{name}" file="{name}.obj" inertia="shell"/>'
         material = _material(mesh)
         if material in known:
@@ -107,7 +107,9 @@ def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
 
 
 def _material(mesh: DrawnMesh) -> str:
-    return f"material_{picture_key(mesh.look)}_" + "_".join(f"{round(255 * c):02x}" for c in mesh.look.colour)
+    return f"material_{picture_key(mesh.visual)}_" + "_".join(
+        f"{round(255 * c):02x}" for c in mesh.visual.colour
+    )
 
 
 def _lights() -> Iterator[str]:
@@ -116,8 +118,8 @@ def _lights() -> Iterator[str]:
 
 
 def _structure(house: ImportedHouse) -> Iterator[str]:
-    """The floor, and what closes the house."""
-    corners = np.array([edge for _, *edges in house.rooms.rectangles(house.plan) for edge in edges])
+    """The floor, and boxes that close the house."""
+    corners = np.array([edge for _, *edges in house.rooms.rectangles(house.grid) for edge in edges])
     low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
     (x, y), (a, b) = (low + high) / 2, (high - low) / 2
     yield f'<geom class="solid" name="floor" pos="{x:.4f} {y:.4f} {-_DEPTH / 2}" size="{a:.4f} {b:.4f} {_DEPTH / 2}"/>'
@@ -126,7 +128,7 @@ def _structure(house: ImportedHouse) -> Iterator[str]:
             f'<geom class="seen" type="box" name="floor_seen" pos="{x:.4f} {y:.4f} {-_UNDER - 0.01}" '
             f'size="{a:.4f} {b:.4f} 0.01" rgba="0.72 0.62 0.5 1"/>'
         )
-    for number, (low, high) in enumerate(house.rooms.shell(house.plan)):
+    for number, (low, high) in enumerate(house.rooms.shell(house.grid)):
         yield _box(f"shell_{number}", np.array([*low, 0.0]), np.array([*high, _HEIGHT]))
 
 
@@ -145,7 +147,7 @@ def _geoms(house: ImportedHouse) -> Iterator[str]:
 
 def _sites(house: ImportedHouse) -> Iterator[str]:
     counts: dict[str, int] = {}
-    for key, low, high in house.rooms.rectangles(house.plan):
+    for key, low, high in house.rooms.rectangles(house.grid):
         counts[key] = counts.get(key, -1) + 1
         (x, y), (a, b) = (low + high) / 2, (high - low) / 2
         yield f'<site name="room:{key}:{counts[key]}" pos="{x:.4f} {y:.4f} 1" size="{a:.4f} {b:.4f} 1"/>'
@@ -159,7 +161,7 @@ def _box(name: str, low: Floats, high: Floats) -> str:
 
 
 def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
-    """Lines of catalogue.toml: what of the other catalogue belongs into the bins."""
+    """Lines of catalogue.toml: the parts of the other catalogue that belong to the bins."""
     bins = {place.key: place for place in house.bins}
     categories = [c for c in catalogue.categories.values() if c.receptacle in bins]
     objects = [key for category in categories for key in category.objects]
@@ -173,13 +175,8 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
     ]
     for key, found in bins.items():
         known = catalogue.receptacles[key]
-        entry: dict[str, object] = {
-            "label": known.label,
-            "place": found.place,
-            "room": found.room,
-            "model": _relative(known.path),
-        }
-        tables.append((f"receptacles.{key}", entry))
+        place = {"place": found.place, "room": found.room}
+        tables.append((f"receptacles.{key}", {"label": known.label, **place, "model": _relative(known.path)}))
     for key in objects:
         item = catalogue.objects[key]
         tables.append((f"objects.{key}", {"label": item.label, "model": _relative(item.path)}))
@@ -190,7 +187,7 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
 
 
 def _relative(path: Path) -> str:
-    """A model as a catalogue names it: those of the package from their folder."""
+    """Path of a model for a catalogue: relative to the package's models if it is one of them."""
     root = models_root().resolve()
     resolved = path.resolve()
     return str(resolved.relative_to(root)) if resolved.is_relative_to(root) else str(resolved)

@@ -1,1 +1,1 @@
-"""Import of objects: a mesh file becomes an object of a house's catalogue."""
+"""Import of objects from mesh files into a house's catalogue."""

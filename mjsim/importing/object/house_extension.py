@@ -1,4 +1,4 @@
-"""A catalogue that extends a house by imported objects, each in a folder of its own: written whole or not at all."""
+"""A catalogue that extends a house by imported objects, each in its own folder and written atomically."""
 
 import json
 import os
@@ -21,28 +21,26 @@ from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 
-HELD = 4  # objects of a kind that a bin has room for, by their boxes
-_SLOTS = (
-    2  # places along each side of a bin where a hand puts things beside each other (mjsim.world.body.slots)
-)
+HELD = 4  # objects of a kind that a bin must hold, by their bounding boxes
+_SLOTS = 2  # slots along each side of a bin (mjsim.world.body.slots)
 MAX_LABEL = 40
-_UNNAMED = ".unnamed"  # file in the folder of an object that the catalogue does not name yet
-_WALL_GAP = 0.02  # m, between an object and the walls of its bin
+_UNNAMED = ".unnamed"  # marks the folder of an object that is not yet in the catalogue
+_WALL_GAP = 0.02  # distance between an object and the walls of its bin, m
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
 _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """How a catalogue names an object."""
 
     key: str  # its key and the name of its folder
-    label: str  # name shown to the person
+    label: str  # name shown to participants
     category: str  # category key
 
     @classmethod
-    def named(cls, name: str, category: str) -> "Entry":
-        """An entry for a name such as `Toy robot`, from which the key is made; `AssetError` where it cannot be."""
+    def named(cls, name: str, category: str) -> "CatalogueEntry":
+        """Make an entry, and its key, from a name such as `Toy robot`. Raise `AssetError` if that is not possible."""
         label = " ".join(name.replace("_", " ").split())
         plain = unicodedata.normalize("NFKD", label.lower()).encode("ascii", "ignore").decode()
         key = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
@@ -57,35 +55,30 @@ class HouseExtension:
     """A folder, which need not exist, with a catalogue and the objects that it adds to a house."""
 
     def __init__(self, folder: Path, house: str | None = None) -> None:
-        """Open a folder, or plan one; it extends the same house as before, or `apartment`, unless one is given.
+        """Open a folder, or plan a new one, which extends `house` (the same as before, or `apartment`, if None).
 
-        `AssetError` where it is no folder, or its catalogue is unusable or extends another house.
+        Raise `AssetError` if it is not a folder, or its catalogue is invalid or extends another house.
         """
         self.folder = folder
-        self._file = folder / CATALOGUE
+        self.path = folder / CATALOGUE
         if folder.exists() and not folder.is_dir():
             raise AssetError(f"{folder} is not a folder; choose another --out")
-        if self._file.exists():
-            self.catalogue = load_catalogue(str(self._file))
-            self._text = read_text(self._file)
+        if self.path.exists():
+            self.catalogue = load_catalogue(str(self.path))
+            self._text = read_text(self.path)
             extended = tomllib.loads(self._text).get("extends")
             if house is not None and extended != _reference(house, folder):
                 owner = extended or self.catalogue.label
-                raise AssetError(f"{self._file} belongs to {owner!r}, not to {house!r}; choose another --out")
+                raise AssetError(f"{self.path} belongs to {owner!r}, not to {house!r}; choose another --out")
         else:
             self.catalogue = load_catalogue(house or "apartment")
             self._text = _HEADER.format(json.dumps(_reference(house or "apartment", folder)))
 
-    @property
-    def path(self) -> Path:
-        """The catalogue file."""
-        return self._file
-
-    def check(self, entry: Entry, *, force: bool) -> None:
-        """Whether an object can be added, before anything is computed.
+    def check(self, entry: CatalogueEntry, *, force: bool) -> None:
+        """Check whether an object can be added, before anything is computed.
 
         Raises:
-            AssetError: The category is unknown, or the key is taken.
+            AssetError: The category is unknown, or the key is in use.
         """
         if entry.category not in self.catalogue.categories:
             raise AssetError(
@@ -97,16 +90,16 @@ class HouseExtension:
             raise AssetError(
                 f"the house already has an object {entry.key!r} ({known.label}); choose another --name"
             )
-        abandoned = known is None and (mine / _UNNAMED).exists()  # an import was killed
+        abandoned = known is None and (mine / _UNNAMED).exists()  # left by an interrupted import
         if (known is not None or mine.exists()) and not (force or abandoned):
             raise AssetError(f"{mine} is already there; choose another --name, or use --force to replace it")
         if mine.exists() and not (mine / MODEL).is_file():
             raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
 
-    def fit(self, entry: Entry, size: Floats) -> ImportDecision:
-        """How an object with extents (3,), m, fits into the bin of its category.
+    def fit(self, entry: CatalogueEntry, size: Floats) -> ImportDecision:
+        """Report how an object with extents (3,), m, fits into the bin of its category.
 
-        `AssetError` where it does not, or so many of them would not that a clean-up could fail.
+        Raise `AssetError` if so few of them fit that a clean-up could be impossible.
         """
         receptacle = self.catalogue.receptacles[self.catalogue.categories[entry.category].receptacle]
         room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
@@ -115,15 +108,15 @@ class HouseExtension:
         if held_in(room, size) < HELD:
             factor = next(f for f in np.arange(0.99, 0.0, -0.01) if held_in(room, f * size) >= HELD)
             raise AssetError(
-                f"it measures {sides} m, and {HELD} of that do not fit into {receptacle.label!r} ({inside} m); "
-                f"use --scale {factor:.2f} on top of the present one, or choose another category"
+                f"it measures {sides} m, and {HELD} of these do not fit into {receptacle.label!r} ({inside} m); "
+                f"use --scale {factor:.2f} times the present one, or choose another category"
             )
         return ImportDecision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
 
-    def add(self, entry: Entry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
-        """Add an object whose files `write` puts into a folder, or replace one with `force`; a failure changes nothing.
+    def add(self, entry: CatalogueEntry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
+        """Add an object whose files `write` puts into a folder, or replace one with `force`. A failure changes nothing.
 
-        `AssetError` as for `check`.
+        Raise `AssetError` as `check` does.
         """
         self.check(entry, force=force)
         created = not self.folder.exists()
@@ -138,49 +131,48 @@ class HouseExtension:
             if created and not any(self.folder.iterdir()):
                 self.folder.rmdir()
 
-    def _install(self, entry: Entry, new: Path) -> Catalogue:
-        """Put a folder into its place and name it in the catalogue; undo both on failure."""
+    def _install(self, entry: CatalogueEntry, new: Path) -> Catalogue:
+        """Move a folder to its place and add it to the catalogue. Undo both on failure."""
         place = self.folder / entry.key
-        before = self._text if self._file.exists() else None
+        before = self._text if self.path.exists() else None
         swap = exchange if place.exists() else Path.rename
         (new / _UNNAMED).touch()
         swap(new, place)
         try:
-            write_text_atomically(self._file, self._with(entry))
-            catalogue = load_catalogue(str(self._file))
+            write_text_atomically(self.path, self._with(entry))
+            catalogue = load_catalogue(str(self.path))
         except BaseException:
             swap(place, new)
             if before is None:
-                self._file.unlink(missing_ok=True)
+                self.path.unlink(missing_ok=True)
             else:
-                write_text_atomically(self._file, before)
+                write_text_atomically(self.path, before)
             raise
         (place / _UNNAMED).unlink()
         return catalogue
 
-    def _with(self, entry: Entry) -> str:
-        """The catalogue's text with an entry; one of the same key is replaced, all else stays as it is."""
+    def _with(self, entry: CatalogueEntry) -> str:
+        """The catalogue's text with an entry, which replaces one of the same key."""
         values = {"label": entry.label, "category": entry.category, "model": f"{entry.key}/{MODEL}"}
-        block = _ENTRY.format(
-            key=entry.key, **{k: json.dumps(v, ensure_ascii=False) for k, v in values.items()}
-        )
+        encoded = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
+        block = _ENTRY.format(key=entry.key, **encoded)
         table = rf"^\[objects\.{entry.key}\][^\n]*\n(?:(?!\[).*\n?)*"
         kept = re.sub(table, "", self._text, flags=re.MULTILINE)
         return kept.rstrip("\n") + "\n" + block
 
 
 def held_in(room: Floats, size: Floats) -> int:
-    """How many objects with extents (3,), m, a bin with a room of (3,), m, holds at least, from whichever side.
+    """Number of objects with extents (3,), m, that a bin with inner sides (3,), m, holds at least, from any side.
 
-    They stand upright, side by side where people put them, in layers; the centre of each is inside.
+    They stand upright in layers, side by side where people put them, with their centres inside the bin.
     """
     layers = int(room[2] / size[2] + 0.5)
-    turned = (size[:2], size[1::-1])  # a person holds an object along the direction from which they come
+    turned = (size[:2], size[1::-1])  # a carried object is turned with the person
     beside = [np.minimum((room[:2] - 2 * _WALL_GAP) // across, _SLOTS).prod() for across in turned]
     return int(min(beside)) * layers
 
 
 def _reference(house: str, folder: Path) -> str:
-    """A house as a catalogue in a folder names it: a name, or a path from there."""
+    """A house as a catalogue in a folder refers to it: by its name, or by the path from there."""
     named = parse_house(house)
     return os.path.relpath(Path(named.name).resolve(), folder.resolve()) if named.is_path else named.name

@@ -1,4 +1,4 @@
-"""The whole way from a mesh file to an object in a house's catalogue, with a picture of it, its parts and grips."""
+"""Import of a mesh file as an object in a house's catalogue, with a picture of its mesh, parts and grips."""
 
 import json
 from dataclasses import asdict
@@ -14,13 +14,13 @@ from mjsim.house.catalogue.model_files import read_model
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_object
 from mjsim.importing.object.grip import MAX_OFFSET
-from mjsim.importing.object.house_extension import Entry, HouseExtension
+from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension
 from mjsim.importing.object.model_writer import write_model, write_png
 from mjsim.importing.object.object_import import ImportedObject, import_object
 from mjsim.render.pictures import draw_picture
 from mjsim.values.errors import AssetError, RenderError
 
-_PREVIEW_SIDE = 420  # px
+_PREVIEW_SIDE = 420  # pixels
 _COLOURS = (
     (0.90, 0.45, 0.13), (0.20, 0.55, 0.80), (0.30, 0.65, 0.30), (0.80, 0.30, 0.45), (0.55, 0.40, 0.75),
     (0.75, 0.65, 0.15), (0.45, 0.45, 0.45),
@@ -32,7 +32,9 @@ PREVIEW, REPORT = "preview.png", "report.json"
 
 
 def write_preview(model: Path, out: Path) -> None:
-    """Draw an object's MJCF file, look and parts side by side; the arrows are the grips' x axes, ahead of the hand."""
+    """Draw an object's MJCF file, visual mesh and parts side by side. Arrows are the grips' x axes, ahead of
+    the hand.
+    """
     pictures = []
     for shown in (_LOOK, _PART):
         spec = read_model(model, body="object")
@@ -46,7 +48,7 @@ def write_preview(model: Path, out: Path) -> None:
 
 
 def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
-    """Show only the look or only the parts, in colours of their own, and the grips."""
+    """Show only the visual mesh, or only the parts in colours of their own, and the grips."""
     body = spec.body("object")
     parts = [geom for geom in body.geoms if geom.contype]
     for geom in body.geoms:
@@ -58,7 +60,7 @@ def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
 
 
 def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
-    """A rod from a site along its x axis."""
+    """Add a rod from a site along its x axis."""
     turn = np.zeros(4)
     if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER:
         turn[:] = np.cos(site.alt.euler[2] / 2), 0.0, 0.0, np.sin(site.alt.euler[2] / 2)
@@ -79,18 +81,23 @@ def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
 
 
 def _on_white(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A picture (h, w, 4) as RGB (h, w, 3) on white."""
+    """An RGBA image (h, w, 4) as RGB (h, w, 3) on white."""
     alpha = rgba[..., 3:].astype(np.float64) / 255
     return np.asarray(np.round(rgba[..., :3] * alpha + 255 * (1 - alpha)), dtype=np.uint8)
 
 
 def add_mesh(
-    path: Path, extension: HouseExtension, entry: Entry, options: ImportOptions, *, force: bool = False
+    path: Path,
+    extension: HouseExtension,
+    entry: CatalogueEntry,
+    options: ImportOptions,
+    *,
+    force: bool = False,
 ) -> tuple[ImportDecision, ...]:
-    """Import a mesh file into a catalogue; returns the report, which is also kept beside the object.
+    """Import a mesh file into a catalogue. Return the report, which is also stored with the object.
 
-    Without OpenGL there is no preview, and the report says so. The catalogue is as before on `AssetError` (the file,
-    the entry or the object is unusable) and `OSError`; of an object that cannot be held there is a picture.
+    Without OpenGL there is no preview, and the report says so. The catalogue is unchanged on `AssetError` (the file,
+    entry or object is unusable) and `OSError`. If the object cannot be held, a picture of it is kept.
     """
     extension.check(entry, force=force)
     item = import_object(path, options)
@@ -113,7 +120,7 @@ def add_mesh(
 
 
 def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
-    """Why an object cannot be held; empty where it can."""
+    """Why an object cannot be held; empty if it can."""
     if found := errors(findings):
         return found[0].message
     if item.grip.offset <= MAX_OFFSET:
@@ -125,7 +132,7 @@ def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
 
 
 def _keep_picture(folder: Path, target: Path) -> str:
-    """Keep the preview in a folder under another name; says where, if there is one."""
+    """Keep the preview under another name. Return a text that says where, if there is one."""
     if not (folder / PREVIEW).exists():
         return ""
     (folder / PREVIEW).replace(target)

@@ -1,4 +1,4 @@
-"""An imported object as files: MJCF, OBJ meshes, a PNG picture; the same object gives the same bytes."""
+"""Files of an imported object: MJCF, OBJ meshes and a PNG texture, the same bytes for the same object."""
 
 import math
 from collections.abc import Iterator
@@ -10,8 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from mjsim.formats.scene.surface import Floats
-from mjsim.importing.object.look import Look
 from mjsim.importing.object.object_import import ImportedObject
+from mjsim.importing.object.visual_mesh import VisualMesh
 from mjsim.values.errors import AssetError
 
 MODEL = "object.xml"
@@ -46,10 +46,10 @@ _MJCF = """\
 
 
 def write_model(item: ImportedObject, folder: Path, *, key: str, label: str, source: str) -> Path:
-    """Write an object into an existing folder; returns its MJCF file."""
-    (folder / "look.obj").write_text("\n".join(look_lines(item.look)) + "\n", encoding="utf-8")
-    if item.look.picture is not None:
-        write_png(folder / "look.png", item.look.picture)
+    """Write an object into an existing folder. Return its MJCF file."""
+    (folder / "look.obj").write_text("\n".join(obj_lines(item.visual)) + "\n", encoding="utf-8")
+    if item.visual.picture is not None:
+        write_png(folder / "look.png", item.visual.picture)
     for number, points in enumerate(item.hulls):
         text = trimesh.convex.convex_hull(points).export(file_type="obj", digits=6, header=None)
         (folder / f"part_{number}.obj").write_text(text, encoding="utf-8")
@@ -82,8 +82,8 @@ def _assets(item: ImportedObject, key: str) -> Iterator[str]:
     for number in range(len(item.hulls)):
         yield f'<mesh name="{key}_part_{number}" file="part_{number}.obj"/>'
     shine = 'specular="0.2" shininess="0.3"'
-    if item.look.picture is None:
-        red, green, blue = item.look.colour
+    if item.visual.picture is None:
+        red, green, blue = item.visual.colour
         yield f'<material name="{key}_look" rgba="{red:g} {green:g} {blue:g} 1" {shine}/>'
     else:
         yield f'<texture name="{key}_look" type="2d" file="look.png"/>'
@@ -91,31 +91,31 @@ def _assets(item: ImportedObject, key: str) -> Iterator[str]:
 
 
 def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
-    """The parts; their masses are shares of the whole by volume, for what looks at parts alone."""
+    """The parts. Their masses are shares of the whole by volume, for tools that read only parts."""
     volumes = [trimesh.convex.convex_hull(points).volume for points in item.hulls]
     for number, volume in enumerate(volumes):
         mass = item.weight.mass * volume / sum(volumes)
         yield f'<geom class="part" type="mesh" mesh="{key}_part_{number}" mass="{mass:.6g}"/>'
 
 
-def look_lines(look: Look) -> Iterator[str]:
+def obj_lines(mesh: VisualMesh) -> Iterator[str]:
     """Lines of an OBJ file."""
-    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(look.vertices, 6) + 0.0)
-    columns = [look.faces + 1]
-    if look.uv is not None:
-        places, corner = np.unique(np.round(look.uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
+    yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(mesh.vertices, 6) + 0.0)
+    columns = [mesh.faces + 1]
+    if mesh.uv is not None:
+        places, corner = np.unique(np.round(mesh.uv.reshape(-1, 2), 5), axis=0, return_inverse=True)
         yield from (f"vt {u:.5f} {v:.5f}" for u, v in places)
         columns.append(corner.reshape(-1, 3) + 1)
-    normals, corner = np.unique(np.round(look.normals.reshape(-1, 3), 3) + 0.0, axis=0, return_inverse=True)
+    normals, corner = np.unique(np.round(mesh.normals.reshape(-1, 3), 3) + 0.0, axis=0, return_inverse=True)
     yield from (f"vn {x:.3f} {y:.3f} {z:.3f}" for x, y, z in normals)
     columns.append(corner.reshape(-1, 3) + 1)
-    join = "//" if look.uv is None else "/"
+    join = "//" if mesh.uv is None else "/"
     for face in np.stack(columns, axis=-1).tolist():
         yield "f " + " ".join(join.join(map(str, corner)) for corner in face)
 
 
 def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
-    """Write a picture, RGB, shape (height, width, 3)."""
+    """Write an RGB image, shape (height, width, 3)."""
     done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 4])
     if not done:
         raise AssetError(f"the picture {path} cannot be encoded as PNG")
@@ -127,5 +127,5 @@ def _numbers(values: Floats) -> str:
 
 
 def comment(text: str) -> str:
-    """Text as it may stand in an XML comment."""
+    """Text made safe for an XML comment."""
     return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

@@ -1,4 +1,4 @@
-"""From a mesh file to an object of the simulator, with every decision on the way."""
+"""Import of a mesh file as an object, with a report of all decisions."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,40 +11,39 @@ from mjsim.formats.scene.mesh_files import missing_colours, read_surface
 from mjsim.formats.scene.source_scene import ImportDecision, ImportOptions
 from mjsim.formats.scene.surface import Floats, Surface, cleaned
 from mjsim.house.validation.object_rules import SIZE
+from mjsim.importing.object.closed_body import MAX_TRIANGLES, ClosedBody, Weight, close, simplified, weigh
 from mjsim.importing.object.grip import Grip, find_grip
-from mjsim.importing.object.look import Look, make_look
 from mjsim.importing.object.parts import Parts, convex_parts
 from mjsim.importing.object.resting import STEADY, RestingPose, foot, resting_pose
 from mjsim.importing.object.scaling import Scaling, scaling
-from mjsim.importing.object.solid import MAX_TRIANGLES, Solid, close, simplified
-from mjsim.importing.object.weight import Weight, weigh
+from mjsim.importing.object.visual_mesh import VisualMesh, make_visual_mesh
 from mjsim.values.errors import AssetError
 
-_COARSE = 0.005  # of the longest side, greatest distance between numbers of 32 bits
-_FAR = 10.0  # longest sides from the origin, from where on the report says so
+_COARSE = 0.005  # greatest spacing of 32-bit floats, as a share of the longest side
+_FAR = 10.0  # distance from the origin that is reported, in longest sides
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedObject:
     """An object in its own frame: z up, on the floor at z = 0, the middle of its footprint at the origin."""
 
-    look: Look  # what is drawn
-    hulls: tuple[Floats, ...]  # vertices of the convex parts that it collides with, m, (k, 3) each
-    weight: Weight  # mass, centre of mass, inertia
-    grip: Grip  # where a hand takes it from above
-    rolls: bool  # whether it is round, so that it stands on a foot and rolls badly
+    visual: VisualMesh
+    hulls: tuple[Floats, ...]  # vertices of the convex parts that collide, m, (k, 3) each
+    weight: Weight
+    grip: Grip
+    rolls: bool  # round, so that it gets a foot and rolling friction
     decisions: tuple[ImportDecision, ...]  # the report
 
     @property
     def size(self) -> Floats:
-        """Extents of what collides, m, shape (3,)."""
+        """Extents of the colliding parts, m, shape (3,)."""
         return np.asarray(np.ptp(np.concatenate(self.hulls), axis=0))
 
 
 def import_object(path: Path, options: ImportOptions) -> ImportedObject:
-    """Make an object of a mesh file; the same file and options give the same object to the last bit.
+    """Make an object of a mesh file, bit-identical for the same file and options.
 
-    `AssetError` where it cannot be read, or is nothing that a hand carries; its one line says what to do.
+    Raise `AssetError` if the file cannot be read, or a hand cannot carry the object.
     """
     _check_options(options)
     raw = read_surface(path)
@@ -81,7 +80,7 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
     hulls = tuple(points + transform[:3, 3] for points in hulls)
     _check_size(np.concatenate(hulls))
     standing, weight = _on_the_floor(surface, transform), weight.moved(transform)
-    look, grip = make_look(*standing), find_grip(standing[1], weight.centre)
+    look, grip = make_visual_mesh(*standing), find_grip(standing[1], weight.centre)
     decisions = (
         *_origin(path, found, raw, dropped),
         *_moved(middle, longest),
@@ -96,9 +95,9 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
 
 
 def _extent(surface: Surface) -> tuple[float, Floats]:
-    """Longest side and middle (3,) of the bounding box, in the file's numbers.
+    """Longest side and middle (3,) of the bounding box, in the file's unit.
 
-    `AssetError` without finite points or an extent, or where the points are too far from the origin to have a shape.
+    Raise `AssetError` if it has no finite extent, or is too far from the origin for the precision of its numbers.
     """
     points = surface.corners.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
@@ -107,10 +106,8 @@ def _extent(surface: Surface) -> tuple[float, Floats]:
         raise AssetError("all its points coincide or are not finite numbers; export it again")
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     farthest = np.abs(points).max()
-    if (
-        np.array_equal(points, points.astype(np.float32))
-        and np.spacing(np.float32(farthest)) > _COARSE * longest
-    ):
+    is_single = np.array_equal(points, points.astype(np.float32))
+    if is_single and np.spacing(np.float32(farthest)) > _COARSE * longest:
         raise AssetError(
             f"it lies {np.linalg.norm(middle):.3g} from the origin, in the file's unit, where numbers of 32 bits are "
             f"too coarse for a side of {longest:.3g}; move it to the origin and export it again"
@@ -119,7 +116,7 @@ def _extent(surface: Surface) -> tuple[float, Floats]:
 
 
 def _into_place(rotation: Floats, points: Floats) -> Floats:
-    """Transform (4, 4) that turns, and moves the middle of the footprint of points (n, 3) to the origin."""
+    """Transform (4, 4) that rotates points (n, 3), and moves the middle of their footprint to the origin."""
     low, high = points.min(axis=0), points.max(axis=0)
     transform = np.eye(4)
     transform[:3, :3] = rotation
@@ -128,7 +125,7 @@ def _into_place(rotation: Floats, points: Floats) -> Floats:
 
 
 def _on_the_floor(surface: Surface, transform: Floats) -> tuple[Surface, trimesh.Trimesh]:
-    """The surface in its place, its lowest point on the floor; thickened parts may reach farther down than it."""
+    """The surface in its place, lowered to the floor, because thickened parts may extend farther down."""
     placed = surface.moved(transform)
     down = np.eye(4)
     down[2, 3] = -placed.corners[..., 2].min()
@@ -141,12 +138,10 @@ def _check_size(points: Floats) -> None:
     if size.max() > SIZE[1] + 1e-3:
         text = " x ".join(f"{side:.2f}" for side in size)
         raise AssetError(
-            f"as it lies it measures {text} m, and a hand carries {SIZE[1]} m; use --scale {SIZE[1] / size.max():.2g}"
+            f"it measures {text} m, and a hand carries {SIZE[1]} m; use --scale {SIZE[1] / size.max():.2g}"
         )
     if size.max() < SIZE[0] - 1e-3:
-        raise AssetError(
-            f"as it lies its longest side is {size.max():.3f} m, less than {SIZE[0]} m; use --scale"
-        )
+        raise AssetError(f"its longest side is {size.max():.3f} m, less than {SIZE[0]} m; use --scale")
 
 
 def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -> tuple[ImportDecision, ...]:
@@ -159,13 +154,13 @@ def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -
 
 
 def _moved(middle: Floats, longest: float) -> tuple[ImportDecision, ...]:
-    """Said of what lies far from the origin."""
+    """Report of an object that is far from the origin."""
     away = float(np.linalg.norm(middle))
     reason = f"it lies {away:.3g} from the file's origin, in the file's unit"
     return (ImportDecision("place", "moved to the origin", reason),) if away > _FAR * longest else ()
 
 
-def _body(solid: Solid, faces: int) -> ImportDecision:
+def _body(solid: ClosedBody, faces: int) -> ImportDecision:
     notes = [f"simplified from {faces} triangles"] if faces > MAX_TRIANGLES else []
     if solid.flat:
         return ImportDecision("body", "flat sheet", "given a thickness of 1 mm")
@@ -189,9 +184,8 @@ def _rest(pose: RestingPose, rolls: bool) -> ImportDecision:
         return ImportDecision("rests", "as in the file, on a foot", "it is round and would roll away")
     degrees = f"tips over at {np.degrees(pose.tilt):.0f} degrees"
     if pose.turned:
-        return ImportDecision(
-            "rests", "turned", f"on its steadiest side: {degrees}; in the file's pose it falls over"
-        )
+        reason = f"on its steadiest side: {degrees}; in the file's pose it falls over"
+        return ImportDecision("rests", "turned", reason)
     return ImportDecision("rests", "as in the file", degrees)
 
 
@@ -202,7 +196,7 @@ def _grip(grip: Grip) -> ImportDecision:
     return ImportDecision("grips", aside, "the nearest place at its top that is there")
 
 
-def _appearance(path: Path, look: Look, faces: int) -> tuple[ImportDecision, ...]:
+def _appearance(path: Path, look: VisualMesh, faces: int) -> tuple[ImportDecision, ...]:
     how = "picture of all colours" if look.picture is not None else "one colour"
     notes = [f"simplified from {faces} triangles"] if len(look.faces) < faces else []
     notes += ["open: drawn from both sides"] if look.doubled else []

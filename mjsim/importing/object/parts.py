@@ -1,4 +1,4 @@
-"""Convex parts that an object collides with: few, made by CoACD, and none so thin that physics steps through it."""
+"""Convex parts with which an object collides: few, made by CoACD, and thick enough for the physics time step."""
 
 from dataclasses import dataclass
 
@@ -9,29 +9,27 @@ import trimesh
 
 from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import THIN
-from mjsim.importing.object.solid import Solid, simplified
+from mjsim.importing.object.closed_body import ClosedBody, simplified
 
 MAX_PARTS = 6
-MAX_VERTICES = 64  # of a part
+MAX_VERTICES = 64  # per part
 MIN_WIDTH = THIN  # of every part in every direction
-_WALL = 0.008  # m; parts thinner than this are walls, and an object of walls collides as its hull
-_CONVEX = 0.9  # share of its convex hull that a convex body fills
-_TRIANGLES = 1000  # of what is decomposed
-_CONCAVITY, _COARSE = (
-    0.12,
-    0.35,
-)  # CoACD's threshold; for bodies that would take minutes: of many pieces, or cut by themselves
+_WALL = 0.008  # width below which a part is a wall, m; an object of walls collides as its hull
+_CONVEX = 0.9  # least share of its convex hull that a convex body fills
+_TRIANGLES = 1000  # to which a body is simplified before decomposition
+_CONCAVITY = 0.12  # CoACD's threshold
+_COARSE = 0.35  # the same for bodies that would take minutes: with many pieces, or intersecting themselves
 _MANY = 8  # pieces
-_CUT = 1e-6  # share of an edge, and of a triangle's sides, by which they cross at least
+_CUT = 1e-6  # least overlap of an intersecting edge and triangle, as a share of their sides
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What an object collides with."""
+    """The convex parts of an object."""
 
-    hulls: tuple[Floats, ...]  # vertices of each convex part, m, (k, 3) each
-    reason: str  # how they came about
-    thickened: int  # how many were made thicker
+    hulls: tuple[Floats, ...]  # vertices of each part, m, (k, 3) each
+    reason: str  # how they were made
+    thickened: int  # number of parts that were thickened
 
     @property
     def points(self) -> Floats:
@@ -39,8 +37,7 @@ class Parts:
         return np.concatenate(self.hulls)
 
 
-def convex_parts(solid: Solid) -> Parts:
-    """The parts of a body."""
+def convex_parts(solid: ClosedBody) -> Parts:
     hull = solid.mesh.convex_hull
     hulls, reason = [np.asarray(hull.vertices)], "convex: its own hull"
     filled = solid.mesh.volume / hull.volume
@@ -63,7 +60,7 @@ def width(points: Floats) -> float:
     return _narrowest(points)[1]
 
 
-def _decomposed(solid: Solid) -> list[Floats]:
+def _decomposed(solid: ClosedBody) -> list[Floats]:
     """Vertices of the convex parts of a body, largest part first (CoACD, Wei et al. 2022; seed 0)."""
     coarse = simplified(solid.mesh, _TRIANGLES)
     coacd.set_log_level("error")
@@ -82,7 +79,7 @@ def _decomposed(solid: Solid) -> list[Floats]:
 
 
 def cuts_itself(mesh: trimesh.Trimesh) -> bool:
-    """Whether an edge of a surface goes through one of its triangles."""
+    """True if an edge of a surface intersects one of its triangles."""
     vertices, edges = np.asarray(mesh.vertices), mesh.edges_unique
     start = vertices[edges[:, 0]]
     along = vertices[edges[:, 1]] - start
@@ -90,7 +87,7 @@ def cuts_itself(mesh: trimesh.Trimesh) -> bool:
         corner, *others = vertices[face]
         one, two = others - corner
         normal = np.cross(one, two)
-        with np.errstate(all="ignore"):  # edges in the plane of the triangle give no number
+        with np.errstate(all="ignore"):  # edges in the plane of the triangle give NaN
             share = (corner - start) @ normal / (along @ normal)
             there = start + share[:, None] * along - corner
             u, v = (np.cross(there, two) @ normal, np.cross(one, there) @ normal) / (normal @ normal)
@@ -109,7 +106,7 @@ def _few_vertices(points: Floats) -> Floats:
         coarse = hull.simplify_quadric_decimation(face_count=faces).convex_hull
         if len(coarse.vertices) <= MAX_VERTICES:
             break
-    else:  # nothing to collapse: the farthest vertices in evenly spread directions
+    else:  # no edge can be collapsed, so take the farthest vertices in evenly spread directions
         turn = np.arange(MAX_VERTICES) + 0.5
         z, angle = 1 - 2 * turn / MAX_VERTICES, np.pi * (1 + 5**0.5) * turn
         level = np.sqrt(1 - z * z)
@@ -121,7 +118,7 @@ def _few_vertices(points: Floats) -> Floats:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Points (n, 3) whose hull is at least `MIN_WIDTH` wide, grown alike to both sides where it was not."""
+    """Points (n, 3) whose hull is at least `MIN_WIDTH` wide, extended symmetrically if necessary."""
     for _ in range(4):
         direction, across = _narrowest(points)
         if across > MIN_WIDTH - 1e-6:

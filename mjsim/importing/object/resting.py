@@ -10,27 +10,25 @@ import trimesh
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import MIN_WIDTH
 
-STEADY = math.radians(12.0)  # an object that tips over when tilted by less does not stand
-_CONTACT = 0.0005  # m above the lowest point that touches the floor
-_FOOT_SLOPE = 0.45  # half width of a foot over the height of the centre of mass
+STEADY = math.radians(12.0)  # least tilt that a stable object withstands
+_CONTACT = 0.0005  # height above the lowest point up to which points touch the floor, m
+_FOOT_SLOPE = 0.45  # half width of a foot divided by the height of the centre of mass
 _MAX_FACES = 300  # faces of the hull that are tried
-_LOWER = (
-    1.2  # times as high above the floor as on the best side, its centre of mass may be in the file's pose
-)
-_SMALLER = 0.95  # share of the footprint's bounding box by which turning has to shrink it
+_LOWER = 1.2  # height of the centre of mass up to which the file's pose is kept, by that on the best side
+_SMALLER = 0.95  # factor by which a rotation has to shrink the footprint's bounding box
 
 
 @dataclass(frozen=True, eq=False)
 class RestingPose:
-    """How an object lies."""
+    """A pose of an object on the floor."""
 
     rotation: Floats  # from the file's axes to the object's, (3, 3)
     tilt: float  # tilt at which it tips over, rad
-    turned: bool  # whether it was laid on another side than it stands on in the file
+    turned: bool  # on another side than in the file
 
 
 def resting_pose(points: Floats, centre: Floats) -> RestingPose:
-    """The pose of the file if points (n, 3), m, with this centre of mass stand in it, else the steadiest one."""
+    """The file's pose if points (n, 3), m, with this centre of mass are stable in it, otherwise the most stable one."""
     down = np.array([0.0, 0.0, -1.0])
     as_it_is = tilt(points, centre, down)
     if as_it_is >= STEADY:
@@ -40,7 +38,7 @@ def resting_pose(points: Floats, centre: Floats) -> RestingPose:
     sides = normals[first[np.linspace(0, len(first) - 1, min(len(first), _MAX_FACES)).astype(int)]]
     tilts = [tilt(points, centre, side) for side in sides]
     best = int(np.argmax(tilts))
-    if tilts[best] < STEADY:  # round: it gets a foot, on the side on which it lies lowest
+    if tilts[best] < STEADY:  # a round object gets a foot, on the side where it is lowest
         heights = (points @ sides.T).max(axis=0) - sides @ centre
         best = int(np.argmin(heights.round(4)))
         if centre[2] - points[:, 2].min() < _LOWER * heights[best]:
@@ -59,7 +57,7 @@ def tilt(points: Floats, centre: Floats, down: Floats) -> float:
 
 
 def foot(points: Floats, centre: Floats) -> Floats:
-    """Corners (8, 3), m, of a low block below points (n, 3) that would roll away on their own."""
+    """Corners (8, 3), m, of a low block below points (n, 3) that would otherwise roll away."""
     low, high = points.min(axis=0), points.max(axis=0)
     reach = np.minimum(centre[:2] - low[:2], high[:2] - centre[:2])
     half = np.clip(_FOOT_SLOPE * (centre[2] - low[2]), MIN_WIDTH / 2, np.maximum(0.8 * reach, MIN_WIDTH / 2))
@@ -69,7 +67,7 @@ def foot(points: Floats, centre: Floats) -> Floats:
 
 
 def _distance_inside(polygon: Floats, point: Floats) -> float:
-    """How far inside of the convex hull of points (n, 2) a point (2,) lies, m; negative outside."""
+    """Distance of a point (2,) to the outline of the convex hull of points (n, 2), m; negative outside."""
     try:
         sides = scipy.spatial.ConvexHull(polygon).equations
     except (scipy.spatial.QhullError, ValueError):  # a point or a line
@@ -78,7 +76,7 @@ def _distance_inside(polygon: Floats, point: Floats) -> float:
 
 
 def _squared(points: Floats) -> Floats:
-    """Rotation (3, 3) about the vertical that makes the footprint's box small, if that is worth it."""
+    """Rotation (3, 3) about the vertical that minimizes the footprint's bounding box, if it shrinks noticeably."""
     flat = points[:, :2]
     to_box, extents = trimesh.bounds.oriented_bounds_2D(flat)
     rotation = np.eye(3)

@@ -1,4 +1,4 @@
-"""Unit and upward axis of a mesh file: as given, as the format defines it, or guessed."""
+"""Unit and vertical axis of a mesh file: given, defined by the format, or guessed."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0
 
 @dataclass(frozen=True)
 class Scaling:
-    """How the numbers of a file become metres, z up."""
+    """Conversion of a file's numbers to metres, z up."""
 
     unit: str  # key of `UNITS`
     up: str  # `y` or `z`
-    factor: float  # metres per number of the file, `--scale` included
-    unit_reason: str  # where the unit comes from
-    up_reason: str  # where the axis comes from
+    factor: float  # metres per unit of the file, including `--scale`
+    unit_reason: str
+    up_reason: str
 
     @property
     def transform(self) -> Floats:
@@ -31,9 +31,9 @@ class Scaling:
 
 
 def scaling(suffix: str, longest: float, *, units: str | None, up: str | None, scale: float) -> Scaling:
-    """Find the unit and the axis of a file by its suffix and its longest side; `units` and `up` are None unless given.
+    """Determine unit and axis of a file from its suffix and longest side, unless they are given.
 
-    `AssetError` where no unit gives a size that a hand carries.
+    Raise `AssetError` if no unit gives a size that a hand carries.
     """
     unit, unit_reason = (units, "given") if units else _unit(suffix, longest * scale)
     size = longest * scale * UNITS[unit]
@@ -56,15 +56,13 @@ def _unit(suffix: str, longest: float) -> tuple[str, str]:
 def _axis(suffix: str) -> tuple[str, str]:
     if suffix == ".glb":
         return "y", "glTF has y up"
-    axis = "y" if suffix == ".obj" else "z"
-    convention = (
-        "most programs write OBJ with y up" if axis == "y" else f"most {suffix[1:].upper()} files have z up"
-    )
-    return axis, f"guessed: {convention}; if not, use --up {'z' if axis == 'y' else 'y'}"
+    if suffix == ".obj":
+        return "y", "guessed: most programs write OBJ with y up; if not, use --up z"
+    return "z", f"guessed: most {suffix[1:].upper()} files have z up; if not, use --up y"
 
 
 def _advice(longest: float, unit: str, reason: str) -> str:
-    """One line: how large it is, and what would make it fit."""
+    """Message with the size, and with units or a scale that would fit."""
     limits = f"a hand carries {MIN_SIDE:g} to {MAX_SIDE:g} m"
     as_unit = "in any unit" if reason == "no unit fits" else f"in {unit} ({reason})"
     size = f"its longest side is {longest:.4g}, which {as_unit} is too {{}}: {limits}"

@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from houses_cases import BINS, PALETTE, flat, studio
 
-from mjsim.generator.furnish import Home, furnish, furnished
+from mjsim.generator.furnish import FurnishedHome, furnish, furnish_home
 from mjsim.generator.furniture.piece import flattened, moved
 from mjsim.generator.space import Space
-from mjsim.generator.values import FloorPlan, Placement, Rectangle
+from mjsim.generator.values import HomePlan, Placement, Rectangle
 from mjsim.values.errors import HouseError
 
 CASES = [(flat(), BINS, seed) for seed in range(4)] + [(studio(), BINS[:3], seed) for seed in range(2)]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: f"{len(case[0].rooms)}-{case[2]}")
-def home(request: pytest.FixtureRequest) -> Home:
+def home(request: pytest.FixtureRequest) -> FurnishedHome:
     plan, bins, seed = request.param
-    return furnished(plan, bins, PALETTE, seed)
+    return furnish_home(plan, bins, PALETTE, seed)
 
 
 def boxes(space: Space) -> Iterator[list[Rectangle]]:
@@ -27,7 +27,7 @@ def boxes(space: Space) -> Iterator[list[Rectangle]]:
             yield [Rectangle(*moved(part.spot, place.x, place.y, place.yaw)) for part in piece.parts]
 
 
-def test_pieces_stand_in_their_rooms_and_not_in_one_another(home: Home) -> None:
+def test_pieces_stand_in_their_rooms_and_not_in_one_another(home: FurnishedHome) -> None:
     for space in home.spaces:
         stood = list(boxes(space))
         for box in itertools.chain(*stood):
@@ -37,7 +37,7 @@ def test_pieces_stand_in_their_rooms_and_not_in_one_another(home: Home) -> None:
             assert not any(a.overlaps(b, 0.001) for a, b in itertools.product(one, other))
 
 
-def test_nothing_stands_in_doorways_or_where_somebody_has_to_stand(home: Home) -> None:
+def test_nothing_stands_in_doorways_or_where_somebody_has_to_stand(home: FurnishedHome) -> None:
     for space in home.spaces:
         free = [Rectangle(*spot) for spot in (*space.keep, *space.use)]
         for piece, place in space.stood:
@@ -48,12 +48,12 @@ def test_nothing_stands_in_doorways_or_where_somebody_has_to_stand(home: Home) -
                     assert not any(box.overlaps(zone, 0.002) for zone in free if zone not in own), piece.kind
 
 
-def test_all_places_of_use_can_be_reached(home: Home) -> None:
+def test_all_places_of_use_can_be_reached(home: FurnishedHome) -> None:
     for space in home.spaces:
         assert space.connected(())
 
 
-def test_nothing_higher_than_a_sill_stands_before_a_window(home: Home) -> None:
+def test_nothing_higher_than_a_sill_stands_before_a_window(home: FurnishedHome) -> None:
     for space in home.spaces:
         for window in home.plan.windows_of(space.room.key):
             half = window.width / 2
@@ -62,7 +62,7 @@ def test_nothing_higher_than_a_sill_stands_before_a_window(home: Home) -> None:
                 assert top <= window.sill or not Rectangle(x0, y0, x1, y1).overlaps(zone, 0.001)
 
 
-def test_a_home_has_what_it_must_have(home: Home) -> None:
+def test_a_home_has_what_it_must_have(home: FurnishedHome) -> None:
     kinds = [
         p.kind for space in home.spaces for piece, _ in space.stood for p, *_ in (*flattened(piece), (piece,))
     ]
@@ -81,7 +81,7 @@ def test_a_home_has_what_it_must_have(home: Home) -> None:
     assert all(space.stood for space in home.spaces)
 
 
-def test_a_quarter_to_a_half_of_the_floor_is_furnished(home: Home) -> None:
+def test_a_quarter_to_a_half_of_the_floor_is_furnished(home: FurnishedHome) -> None:
     share = sum(space.area for space in home.spaces) / home.plan.area
     assert 0.25 < share < 0.45
 
@@ -111,7 +111,7 @@ def test_placements_name_each_asset_they_need() -> None:
 
 def test_a_home_without_space_is_refused() -> None:
     plan = studio()
-    tiny = FloorPlan((plan.rooms[1],), plan.doors[:0], ())
+    tiny = HomePlan((plan.rooms[1],), plan.doors[:0], ())
     with pytest.raises(HouseError, match="no place for a kitchen"):
         furnish(tiny, BINS, PALETTE, 0)
 

@@ -3,19 +3,19 @@ import numpy as np
 import pytest
 from houses_cases import PALETTE, compiled
 
+from mjsim.generator.furniture.appearance import Appearance, draw_appearance
 from mjsim.generator.furniture.catalogue import KINDS
-from mjsim.generator.furniture.look import Look, draw_look
 from mjsim.generator.furniture.piece import Piece
 
 SLACK = 0.03  # m
 
 
 @pytest.fixture(scope="module")
-def look() -> Look:
-    return draw_look(PALETTE, np.random.default_rng(0))
+def look() -> Appearance:
+    return draw_appearance(PALETTE, np.random.default_rng(0))
 
 
-def make(kind: str, look: Look, seed: int, smaller: int = 0) -> Piece:
+def make(kind: str, look: Appearance, seed: int, smaller: int = 0) -> Piece:
     return KINDS[kind].make(np.random.default_rng(seed), look, smaller=smaller)
 
 
@@ -40,7 +40,7 @@ def test_there_are_sixty_kinds() -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Look) -> None:
+def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Appearance) -> None:
     for seed in range(4):
         piece = make(kind, look, seed, smaller=seed % 3)
         low, high = extents(compiled(piece, look))
@@ -59,7 +59,7 @@ def test_a_piece_compiles_and_stays_within_its_size(kind: str, look: Look) -> No
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_what_collides_is_within_the_parts(kind: str, look: Look) -> None:
+def test_what_collides_is_within_the_parts(kind: str, look: Appearance) -> None:
     """Ways are looked for around the parts: nothing that stands in a way may be outside of them."""
     for seed in range(4):
         piece = make(kind, look, seed)
@@ -80,7 +80,7 @@ def test_what_collides_is_within_the_parts(kind: str, look: Look) -> None:
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_seed_gives_the_same_piece_and_another_seed_another(kind: str, look: Look) -> None:
+def test_a_seed_gives_the_same_piece_and_another_seed_another(kind: str, look: Appearance) -> None:
     pieces = [make(kind, look, seed) for seed in (1, 1, 2, 3, 4, 5, 6)]
     assert pieces[0] == pieces[1]
     assert len({repr(piece) for piece in pieces[1:]}) >= 3

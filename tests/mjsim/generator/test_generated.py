@@ -9,7 +9,8 @@ import pytest
 from experiments.cli.main import main
 from experiments.errors import ConfigError
 from experiments.trials.design import read_design
-from mjsim.generator.generated import generate, house_files
+from mjsim.generator.files import house_files
+from mjsim.generator.generated import generate
 from mjsim.generator.home_cache import load_catalogue
 from mjsim.generator.recipe import read_recipe
 from mjsim.house.catalogue.generated_names import VERSION, generated_names, parse_name, split_of

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjsim.generator.openings import open_up, portions
+from mjsim.generator.openings import add_openings, wall_stretches
 from mjsim.generator.plan import draw_rooms
 from mjsim.generator.programme import NEEDS, draw_programme
-from mjsim.generator.values import SIDES, WALL, FloorPlan, Rectangle
+from mjsim.generator.values import SIDES, WALL, HomePlan, Rectangle
 from mjsim.house.catalogue.generated_names import ROOMS
 from mjsim.values.errors import HouseError
 
@@ -18,12 +18,12 @@ CASES = given(seed=st.integers(0, 10**6), rooms=st.integers(1, 7))
 FEW = settings(max_examples=12, deadline=None, derandomize=True)
 
 
-def plan_of(seed: int, rooms: int) -> FloorPlan:
+def plan_of(seed: int, rooms: int) -> HomePlan:
     programme, found = draw_rooms(seed, rooms)
-    return open_up(seed, programme, found)
+    return add_openings(seed, programme, found)
 
 
-def cells(plan: FloorPlan) -> list[Rectangle]:
+def cells(plan: HomePlan) -> list[Rectangle]:
     return [room.floor.grown(WALL / 2) for room in plan.rooms]
 
 
@@ -82,7 +82,7 @@ def test_openings_of_a_wall_do_not_meet(seed: int, rooms: int) -> None:
         windows = [w for w in plan.windows_of(room.key) if w.side == side]
         holes = sorted((o.center - o.width / 2, o.center + o.width / 2) for o in (*doors, *windows))
         assert all(a[1] <= b[0] for a, b in itertools.pairwise(holes))
-        outside = [(a, b) for a, b, is_outside in portions(room, side, plan.rooms) if is_outside]
+        outside = [(a, b) for a, b, is_outside in wall_stretches(room, side, plan.rooms) if is_outside]
         for window in windows:
             half = window.width / 2
             assert any(a < window.center - half and window.center + half < b for a, b in outside)

@@ -126,7 +126,7 @@ def test_a_damaged_or_hostile_pickle_is_refused_in_one_line(tmp_path, data):
         ("a.json", {"objs_pos": [[0, 0, 0]]}, "do not fit 3 places and 3 objects"),
         ("a.json", {"end_matrix": [[1, 0, 0]]}, "do not fit"),
         ("a.json", {"recs_pos": "here"}, "array"),
-        ("a.txt", {}, "no kind that can be read"),
+        ("a.txt", {}, "unknown kind of file"),
     ],
 )
 def test_damaged_episodes_of_housekeep_are_refused_by_their_cause(tmp_path, name, change, reason):

@@ -26,7 +26,7 @@ from mjsim.formats.gltf.store import GZIP, SCENE
 from mjsim.formats.gltf.surfaces import drawn_scene
 from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
-from mjsim.importing.object.house_extension import Entry, HouseExtension
+from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension
 from mjsim.importing.object.mesh_import import add_mesh
 from mjsim.support.kernels import UNUSED
 from mjsim.values.errors import AssetError
@@ -219,7 +219,7 @@ def test_a_house_of_ones_own_with_imported_objects(tmp_path, validated):
         mesh = MESHES[key]
         own = next(iter(Catalogue.load(str(path)).categories))
         extension = HouseExtension(tmp_path / "house", str(path))
-        add_mesh(mesh.write(tmp_path, key), extension, Entry.named(key, own), mesh.options)
+        add_mesh(mesh.write(tmp_path, key), extension, CatalogueEntry.named(key, own), mesh.options)
     found = export_scene(Catalogue.load(str(tmp_path / "house")))
     assert File(found["objects/textured_box.glb"]).parts()[0].image is not None
     colours = File(found["objects/vertex_colours.glb"]).parts()

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from glb_files import File, cast
 
-from mjsim.formats.gltf.glb import UPRIGHT, Glb
-from mjsim.formats.gltf.lights import lights_of
-from mjsim.formats.gltf.surfaces import drawn_scene, surfaces
-from mjsim.formats.gltf.textures import Images
+from mjsim.formats.gltf.glb import UPRIGHT, Glb, texture_encoder
+from mjsim.formats.gltf.surfaces import drawn_scene, lights_of, surfaces
 from mjsim.render.cameras import ViewVolume, look_rotation
 from mjsim.render.profiles import RenderProfile
 from mjsim.render.rasteriser import Rasteriser
@@ -77,7 +75,7 @@ def exported(model):
     """The file that holds all of a model, and its state."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    glb = Glb(Images(model))
+    glb = Glb(texture_encoder(model))
     mesh = glb.mesh("all", surfaces(model, data, drawn_scene(model, data)))
     return File(glb.content(glb.node("root", [mesh], rotation=UPRIGHT))), data
 

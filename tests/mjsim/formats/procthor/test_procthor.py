@@ -42,14 +42,14 @@ def test_rooms_walls_and_openings_are_read(tmp_path):
     ("changes", "problem"),
     [
         ({"rooms": []}, "has no rooms"),
-        ({"rooms": 3}, "is no house of ProcTHOR: Expected `array`"),
+        ({"rooms": 3}, "as a house of ProcTHOR: Expected `array`"),
         ({"rooms": [{"id": "room|1", "floorPolygon": [{"x": 1}, {"x": 2}]}]}, "'room|1' has no floor"),
         (
             {"rooms": [{"id": "room|1", "floorPolygon": [{}, {"x": 99}, {"z": 99}]}]},
             "'room|1' spans more than 60 m",
         ),
         ({"walls": [{"id": "wall|1", "polygon": []}]}, "'wall|1' has no lower edge"),
-        ({"objects": [{"id": "Bed|1", "position": {"x": 1e9}}]}, "is no house of ProcTHOR: Expected `float`"),
+        ({"objects": [{"id": "Bed|1", "position": {"x": 1e9}}]}, "as a house of ProcTHOR: Expected `float`"),
         ({"doors": [{"id": "door|1|2", "wall0": "wall|9"}]}, "'door|1|2' has no hole in a wall"),
     ],
 )
@@ -72,7 +72,7 @@ def test_a_house_is_imported_with_furniture_of_ours_in_the_size_of_the_source(tm
     said = {decision.what: f"{decision.choice}: {decision.reason}" for decision in decisions}
     assert said["plan"].startswith("4 rooms, 3 doors, 1 windows")
     assert said["furniture"].startswith("6 of our kinds")
-    assert said["boxes"] == "1: no kind of ours is near: 1 garbagecan"
+    assert said["boxes"] == "1: no kind of ours is similar: 1 garbagecan"
     house = compiled_house(Catalogue.load(str(tmp_path / "out")))
     assert [house.rooms.room_at(p) for p in ((2, 2), (2, 5), (7, 3), (2, 8), (7, 8))] == [
         "kitchen", "living_room", "living_room", "bedroom", "bathroom",
@@ -125,4 +125,4 @@ def test_our_plans_are_imported_with_the_same_rooms(tmp_path):
 
 def test_a_house_without_a_plan_is_refused(tmp_path, capsys):
     assert cli.main(["house", "export", "--format", "procthor", "--out", str(tmp_path / "plan.json")]) == 2
-    assert "no floor plan beside it" in capsys.readouterr().err
+    assert "has no recipe.json" in capsys.readouterr().err

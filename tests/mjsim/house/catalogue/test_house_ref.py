@@ -91,5 +91,5 @@ def test_catalogues_that_extend_each_other_are_refused(folder: Path) -> None:
 
 def test_an_unreadable_recipe_is_refused(folder: Path) -> None:
     (folder / "recipe.json").write_text("[]")
-    with pytest.raises(HouseError, match="is no recipe of a house"):
+    with pytest.raises(HouseError, match="cannot read recipe"):
         load_catalogue("recipe.json")

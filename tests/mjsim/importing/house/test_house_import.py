@@ -305,7 +305,7 @@ def test_a_folder_that_is_there_is_kept(tmp_path):
         (write_habitat, lambda text: text.replace("stages/flat", "stages/none"), "stage 'none'"),
         (write_habitat, lambda text: text.replace("[2, 0.45, -1]", "[2, -1]"), "3 numbers"),
         (write_habitat, lambda text: text[:-5], "cannot read"),
-        (write_habitat, lambda _: "[]", "no JSON object"),
+        (write_habitat, lambda _: "[]", "not a JSON object"),
         (write_robocasa, lambda _: "room: [", "cannot read"),
         (write_robocasa, lambda _: "kitchen: 1", "without a room"),
         (write_robocasa, lambda text: text.replace("type: oven", "type: forge"), "'oven': its type 'forge'"),

@@ -24,13 +24,13 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.house.compiled.house import compiled_house
 from mjsim.house.validation.object_rules import check_object
 from mjsim.importing.object import house_extension
-from mjsim.importing.object.house_extension import Entry, HouseExtension, held_in
-from mjsim.importing.object.look import SIDE, Atlas
+from mjsim.importing.object.closed_body import weigh
+from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension, held_in
 from mjsim.importing.object.mesh_import import add_mesh
 from mjsim.importing.object.object_import import import_object
 from mjsim.importing.object.parts import MAX_PARTS, MAX_VERTICES, MIN_WIDTH, cuts_itself, width
 from mjsim.importing.object.resting import STEADY, resting_pose
-from mjsim.importing.object.weight import weigh
+from mjsim.importing.object.visual_mesh import SIDE, Atlas
 from mjsim.support.files import remove_leftovers
 from mjsim.values.errors import AssetError, RenderError
 from mjsim.values.options import WorldOptions
@@ -45,7 +45,7 @@ def imported(tmp_path_factory):
     reports = {}
     for name, mesh in MESHES.items():
         extension = HouseExtension(folder / "house")
-        entry = Entry.named(name, mesh.category)
+        entry = CatalogueEntry.named(name, mesh.category)
         reports[name] = add_mesh(mesh.write(folder, name), extension, entry, mesh.options)
     return HouseExtension(folder / "house"), reports
 
@@ -242,7 +242,7 @@ def test_the_pose_is_steady_or_the_file_s_own(seed):
 @pytest.mark.parametrize("name", HOLLOW)
 def test_grips_are_on_something_at_the_top(tmp_path, name):
     item = take(tmp_path, HOLLOW[name]())
-    look = trimesh.Trimesh(item.look.vertices, item.look.faces)
+    look = trimesh.Trimesh(item.visual.vertices, item.visual.faces)
     points, _ = trimesh.sample.sample_surface(look, 100_000, seed=1)
     gaps = np.linalg.norm(points - item.grip.point, axis=1)
     assert gaps.min() < 0.003
@@ -293,19 +293,19 @@ def test_parts_cover_the_body(tmp_path):
 def test_a_ball_in_a_wire_ring_stays_and_collides(tmp_path):
     pieces = [MAKE.torus(0.11, 0.004), MAKE.icosphere(2, 0.04)]
     item = take(tmp_path, trimesh.util.concatenate(pieces))
-    assert np.ptp(item.look.vertices[:, 2]) == pytest.approx(0.08, abs=0.002)
+    assert np.ptp(item.visual.vertices[:, 2]) == pytest.approx(0.08, abs=0.002)
     assert item.size[2] > 0.078
 
 
 def test_one_colour_stays_a_colour_and_is_shown_as_gltf_means_it(tmp_path):
     item = take(tmp_path, plain(MAKE.box((0.1, 0.1, 0.1)), 0.2159, 0.0, 1.0), ".glb")
-    assert item.look.picture is None
-    assert item.look.colour == pytest.approx((0.5, 0.0, 1.0), abs=0.005)  # linear 0.2159 is sRGB 0.5
+    assert item.visual.picture is None
+    assert item.visual.colour == pytest.approx((0.5, 0.0, 1.0), abs=0.005)  # linear 0.2159 is sRGB 0.5
 
 
 def test_a_texture_lands_where_it_was(tmp_path):
     item = take(tmp_path, MESHES["textured_box"].build(), ".glb")
-    look = item.look
+    look = item.visual
     assert look.picture is not None and look.uv is not None
     corners = look.vertices[look.faces]
     up = np.flatnonzero(np.all(corners[..., 2] > item.size[2] - 1e-4, axis=1))
@@ -343,7 +343,7 @@ def test_the_same_file_gives_the_same_bytes(tmp_path, name):
     path = mesh.write(tmp_path, name)
     made = []
     for folder in (tmp_path / "a", tmp_path / "b"):
-        add_mesh(path, HouseExtension(folder), Entry.named(name, mesh.category), mesh.options)
+        add_mesh(path, HouseExtension(folder), CatalogueEntry.named(name, mesh.category), mesh.options)
         made.append({path.relative_to(folder): content for path, content in contents(folder).items()})
     assert made[0] == made[1]
 
@@ -354,7 +354,7 @@ def brick(tmp_path):
 
 def add(tmp_path, own, label="brick", category="toys", *, force=False, **options):
     """Import a brick into a house extension; the decisions."""
-    extension, entry = HouseExtension(own), Entry.named(label, category)
+    extension, entry = HouseExtension(own), CatalogueEntry.named(label, category)
     return add_mesh(brick(tmp_path), extension, entry, ImportOptions(**options), force=force)
 
 
@@ -413,7 +413,7 @@ def test_four_that_fit_by_volume_but_not_beside_each_other_are_refused(tmp_path,
     words = (tmp_path / "long.stl", "--category", "office", "--out", tmp_path / "own")
     assert run(*words) == 2
     line = capsys.readouterr().err
-    assert "4 of that do not fit into 'Office supply box'" in line
+    assert "4 of these do not fit into 'Office supply box'" in line
     assert run(*words, "--scale", re.search(r"--scale ([\d.]+)", line)[1]) == 0
 
 
@@ -434,7 +434,12 @@ def test_a_bin_holds_as_many_as_were_counted(size, tmp_path):
     room = 2 * compiled_house(catalogue).receptacles["office_box"].half_size
     count = held_in(room, np.array(size))
     assert count >= 4
-    add_mesh(tmp_path / "box.stl", HouseExtension(own), Entry.named("box", "office"), ImportOptions(mass=0.3))
+    add_mesh(
+        tmp_path / "box.stl",
+        HouseExtension(own),
+        CatalogueEntry.named("box", "office"),
+        ImportOptions(mass=0.3),
+    )
     house = House.load(str(own / "catalogue.toml"))
     episode = arrange(house, 0, house.catalogue.categories["office"], ["box"] * 6, np.random.default_rng(0))
     placements = run_episode(house, episode, WorldOptions(fidelity="event"))
@@ -466,7 +471,11 @@ def test_a_failure_while_installing_leaves_all_as_it_was(tmp_path, monkeypatch, 
     monkeypatch.setattr("mjsim.importing.object.house_extension.load_catalogue", fail)
     with pytest.raises(OSError, match="disk full"):
         add_mesh(
-            brick(tmp_path), extension, Entry.named("brick", "toys"), ImportOptions(mass=0.4), force=force
+            brick(tmp_path),
+            extension,
+            CatalogueEntry.named("brick", "toys"),
+            ImportOptions(mass=0.4),
+            force=force,
         )
     assert contents(own) == before
 
@@ -520,7 +529,7 @@ def test_without_the_extra_the_command_says_what_to_install(tmp_path, monkeypatc
 def test_a_catalogue_extends_one_that_extends_another(tmp_path):
     add(tmp_path, tmp_path / "a", "Red brick")
     second = HouseExtension(tmp_path / "b", str(tmp_path / "a" / "catalogue.toml"))
-    found = add_mesh(brick(tmp_path), second, Entry.named("Green brick", "books"), ImportOptions())
+    found = add_mesh(brick(tmp_path), second, CatalogueEntry.named("Green brick", "books"), ImportOptions())
     assert report(found, "file").startswith("brick.stl")
     catalogue = Catalogue.load(str(tmp_path / "b" / "catalogue.toml"))
     assert catalogue.objects["red_brick"].label == "Red brick"

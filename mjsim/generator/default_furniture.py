@@ -1,8 +1,8 @@
-"""What rooms have, by their use: first what they must have, then what they usually have."""
+"""Furniture and bins by the use of a room: required, default, and at most how much."""
 
 Options = tuple[str, ...]
 
-MUSTS: dict[str, tuple[Options, ...]] = {  # one of each
+REQUIRED: dict[str, tuple[Options, ...]] = {  # one kind of each tuple
     "bedroom": (("double_bed", "double_bed"),),
     "child": (("single_bed", "bunk_bed"),),
     "studio": (("double_bed", "single_bed"),),
@@ -11,7 +11,8 @@ MUSTS: dict[str, tuple[Options, ...]] = {  # one of each
 }
 PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
-USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this chance, while there is room
+# One kind of each tuple, with this probability, while there is space.
+DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
     "bedroom": (
         (("chest_of_drawers", "dressing_table"), 1.0),
         (("standing_mirror", "armchair", "pouf", "bench"), 0.7),
@@ -80,18 +81,39 @@ USUAL: dict[str, tuple[tuple[Options, float], ...]] = {  # one of each with this
         (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
     ),
 }
-LITTLE: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")  # where nothing else fits
-MOST_PLANTS = 3  # in one room
-ROUNDS = 3  # through these lists
-OFTEN = {
+FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")  # if nothing else fits
+MAX_PLANTS = 3  # per room
+ROUNDS = 3  # how often these lists are gone through
+MAX_OF_KIND = {
     "armchair": 2,
     "bush": 2,
     "bookcase": 2,
     "low_bookcase": 2,
     "sideboard": 2,
-}  # in one room
-SHARES = {  # of the floor that is furnished
-    "hall": (0.15, 0.25),
-    "living_room": (0.31, 0.38),
-    "studio": (0.33, 0.4),
+}  # per room; 1 for others
+FURNISHED_SHARES = {"hall": (0.15, 0.25), "living_room": (0.31, 0.38), "studio": (0.33, 0.4)}  # of the floor
+# Uses of rooms for a kitchen, a table and a desk, the best first; "child" is the bedroom of a child.
+COOKING: Options = ("kitchen", "living_room", "studio", "dining_room")
+DINING: Options = ("dining_room", "kitchen", "living_room", "studio")
+WORKING: Options = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
+BIN_SIZES = {  # width, depth and height, m, of bins that stand on the floor
+    "recycling_bin": (0.48, 0.42, 0.5),
+    "laundry_hamper": (0.51, 0.51, 0.55),
+    "toy_box": (0.62, 0.47, 0.4),
+    "bookshelf": (0.9, 0.34, 0.75),
+}
+BIN_ROOMS: dict[str, Options] = {  # uses of rooms, the best first
+    "recycling_bin": ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
+    "laundry_hamper": ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio"),
+    "toy_box": ("child", "bedroom", "living_room", "studio", "hall", "office", "dining_room"),
+    "bookshelf": ("living_room", "studio", "office", "dining_room", "hall", "bedroom", "child"),
+}
+SHOWN_NAMES = {  # of kinds, where descriptions of places use another word
+    "lounge": "sofa",
+    "dining": "dining table",
+    "straight_kitchen": "kitchen counter",
+    "corner_kitchen": "kitchen counter",
+    "kitchenette": "kitchen counter",
+    "double_bed": "bed",
+    "single_bed": "bed",
 }

@@ -1,4 +1,4 @@
-"""The floor of a scene on a grid: what is blocked, what is indoors, where one can walk, and which rooms there are."""
+"""The floor of a scene as a grid: obstacles, walls, the indoor area, and where a person can walk."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,44 +15,45 @@ from mjsim.importing.house.solids import Solid
 from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m
-BODY = 0.27  # m, radius of a person with a little air
-_MAX_AREA = 1500.0  # m^2 that can be walked on
-_BAND = (0.05, 1.8)  # m, heights at which a person bumps into things
-_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # m; what is at all these heights is a wall
-_GAP = 0.6  # m, half of the widest opening of the outer wall that is closed
-_PAD = 2 * _GAP + 0.3  # m around all things
-_DRAWN = 10.0  # times that a drawn floor counts
-_LEAST_SHARE = 0.15  # of the whole floor; less is a closet of a house that is open elsewhere
-_MIN_AREA = 3.0  # m^2 that walls must enclose to be those of a house
+BODY = 0.27  # radius of a person, with a margin, m
+_MAX_AREA = 1500.0  # largest walkable area, m^2
+_BAND = (0.05, 1.8)  # heights at which a person bumps into things, m
+_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # a wall has something at all these heights, m
+_GAP = 0.6  # half width of openings in the outer wall that count as closed, m
+_PAD = 2 * _GAP + 0.3  # margin of the grid, m
+_DRAWN = 10.0  # weight of cells with a drawn floor
+_LEAST_SHARE = (
+    0.15  # of the whole floor; a smaller enclosed area is a closet of a house that is open elsewhere
+)
+_MIN_AREA = 3.0  # least area enclosed by the walls of a house, m^2
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
-    """Grids of the floor; the first axis is x. All masks have the shape (nx, ny)."""
+class FloorGrid:
+    """Grids of the floor. The first axis is x, and all masks have the shape (nx, ny)."""
 
     origin: Floats  # lower corner of cell (0, 0), m, (2,)
-    blocked: Mask  # where something stands
-    walls: Mask  # where it is a wall; doors that are open count
-    doors: Mask  # where doors were that are open now
-    indoors: Mask  # what the outer walls enclose, walls included
-    floor: Mask  # where the source draws a floor
-    enclosed: bool  # whether there are such walls; else it is a rectangle
+    blocked: Mask  # obstacles
+    walls: Mask  # including open doors
+    doors: Mask  # open doors
+    indoors: Mask  # enclosed by the outer walls, including these
+    floor: Mask  # floor drawn by the source
+    enclosed: bool  # False if no outer walls enclose a floor, so that `indoors` is a rectangle
 
     @cached_property
     def free(self) -> Mask:
-        """Floor with nothing on it."""
         return self.indoors & ~self.blocked
 
     @cached_property
     def clearance(self) -> Floats:
-        """Distance from each cell to what stands there, m."""
+        """Distance from each cell to the nearest obstacle, m."""
         return clearance(self.free)
 
     @cached_property
     def walkable(self) -> Mask:
-        """Where a person's middle can be: the largest connected part, those with a drawn floor before others."""
+        """Cells where a person's middle can be: the largest connected part, above all of those with a drawn floor."""
         parts, count = label(self.clearance > BODY)
         if not count:
             return np.zeros_like(self.free)
@@ -61,31 +62,31 @@ class Plan:
 
     @property
     def area(self) -> float:
-        """Of the walkable floor, m^2."""
+        """Area of the walkable floor, m^2."""
         return float(self.walkable.sum()) * CELL**2
 
     def cell(self, point: Sequence[float] | Floats) -> tuple[int, int]:
-        """Cell that holds a point (x, y), m; the nearest one off the grid."""
+        """Cell that contains a point (x, y), m, or the nearest one if it is off the grid."""
         found = np.floor((np.asarray(point)[:2] - self.origin) / CELL).astype(int)
         x, y = np.clip(found, 0, np.array(self.free.shape) - 1).tolist()
         return x, y
 
     def on(self, mask: Mask, points: Floats) -> Mask:
-        """Whether points (k, 2), m, lie on cells of a mask, shape (k,)."""
+        """Mask (k,) of the points (k, 2), m, that are on cells of a mask."""
         cells = np.clip(np.floor((points - self.origin) / CELL).astype(int), 0, np.array(mask.shape) - 1)
         return np.asarray(mask[cells[:, 0], cells[:, 1]])
 
 
-def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) -> Plan:
-    """The plan of a house.
+def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) -> FloorGrid:
+    """Make the floor grid of a house.
 
     Args:
-        solids: All that collides.
-        doors: Doors that stand open, not among the solids.
+        solids: Everything that collides.
+        doors: Open doors, which are not among the solids.
         floor: Triangles at floor height, m, (n, 3, 2).
 
     Raises:
-        AssetError: There is neither a wall nor a floor, the scene is too large, or nobody can stand in it.
+        AssetError: The scene has neither walls nor a floor, is too large, or leaves no room for a person.
     """
     corners = [np.array([s.low[:2], s.high[:2]]) for s in (*solids, *doors)]
     ground = floor.reshape(-1, 2)
@@ -103,33 +104,33 @@ def make_plan(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) ->
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
     standing = _box(shape, origin, solids)  # a ground plane reaches far beyond the house
-    for count in (len(_WALL), len(_WALL) - 1):  # walls as high as eyes, else lower ones
+    for count in (len(_WALL), len(_WALL) - 1):  # walls up to eye level, or else lower ones
         walls = np.logical_and.reduce(levels[:count]) | shut
-        # Windows have sills: what is low closes the outside off, too.
+        # Low parts count as closed, too, because of windows with sills.
         indoors = _enclosed(walls | levels[0])
-        plan = Plan(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
-        whole = replace(plan, indoors=_rectangle(drawn), enclosed=False)
+        grid = FloorGrid(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
+        whole = replace(grid, indoors=_rectangle(drawn), enclosed=False)
         near = replace(whole, indoors=whole.indoors & standing)
-        if plan.area >= max(_MIN_AREA, _LEAST_SHARE * near.area):
+        if grid.area >= max(_MIN_AREA, _LEAST_SHARE * near.area):
             break
     else:
-        plan = whole
-    if not plan.walls.any():  # none is as high as eyes: those that one bumps into
-        plan = replace(plan, walls=levels[0] | shut)
-    if plan.area > _MAX_AREA:
+        grid = whole
+    if not grid.walls.any():  # none is that high, so use everything that people bump into
+        grid = replace(grid, walls=levels[0] | shut)
+    if grid.area > _MAX_AREA:
         raise AssetError(
-            f"has {plan.area:.0f} m2 that can be walked on, houses at most {_MAX_AREA:.0f} m2; give a part"
+            f"has {grid.area:.0f} m2 that can be walked on, houses at most {_MAX_AREA:.0f} m2; give a part"
         )
-    if plan.area < 1.0:
+    if grid.area < 1.0:
         raise AssetError(
             f"leaves nowhere to walk on {_metres(high - low)}: its walls enclose no floor, or what stands there fills "
             "it; is the size right (--units, --scale), and which way is up (--up)?"
         )
-    return plan
+    return grid
 
 
 def too_large(sides: Floats) -> AssetError:
-    """The error about a scene with such sides (2,), m, with the unit in which it would be a house."""
+    """The error for a scene with these sides (2,), m. It names the unit in which the scene would be a house."""
     unit = unit_of(float(sides.max()))
     advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
     return AssetError(f"spans {_metres(sides)}, and houses have at most {MAX_SIDE:g} m; {advice}")
@@ -140,13 +141,13 @@ def _metres(sides: Floats) -> str:
 
 
 def clearance(free: Mask) -> Floats:
-    """Distance from each cell to the nearest one that is not free, or to the border, m."""
+    """Distance from each cell to the nearest cell that is not free, or to the border, m."""
     padded = np.pad(free, 1)
     return np.asarray(distance_transform_edt(padded)[1:-1, 1:-1] * CELL)
 
 
 def _enclosed(walls: Mask) -> Mask:
-    """What walls enclose, walls included, once openings up to twice `_GAP` are closed."""
+    """Area enclosed by walls, including the walls. Openings up to twice `_GAP` count as closed."""
     distance = distance_transform_edt(~walls) * CELL if walls.any() else np.full(walls.shape, np.inf)
     parts, _ = label(distance > _GAP)
     border = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
@@ -158,7 +159,7 @@ def _enclosed(walls: Mask) -> Mask:
 
 
 def _rectangle(floor: Mask) -> Mask:
-    """The rectangle of a floor, or of all that stands there."""
+    """The bounding rectangle of a floor, or of the whole scene if no floor is drawn."""
     edge = round(_PAD / CELL)
     inside = np.zeros_like(floor)
     x, y = np.nonzero(floor)
@@ -170,7 +171,7 @@ def _rectangle(floor: Mask) -> Mask:
 
 
 def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mask:
-    """The rectangle around all that stands."""
+    """The bounding rectangle of all solids."""
     points = np.concatenate([solid.outline for solid in solids] or [np.zeros((1, 2))])
     (xmin, ymin), (xmax, ymax) = points.min(axis=0), points.max(axis=0)
     return _raster(shape, origin, [np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])])
@@ -179,7 +180,7 @@ def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mas
 def _at_heights(
     shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid], band: tuple[float, float]
 ) -> Mask:
-    """Cells with something between two heights, m."""
+    """Cells with a solid between two heights, m."""
     low, high = band
     return _raster(shape, origin, [s.outline for s in solids if s.low[2] < high and s.high[2] > low])
 

@@ -1,4 +1,4 @@
-"""What is drawn of a scene: meshes of one material each, with their pictures, within a budget of triangles."""
+"""Meshes that an imported house shows: one material each, with their images, within a budget of triangles."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
@@ -8,31 +8,36 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
-from mjsim.formats.scene.source_scene import Piece
+from mjsim.formats.scene.source_scene import ScenePiece
 from mjsim.formats.scene.surface import Floats, Surface, cleaned, joined
-from mjsim.importing.house.plan import Mask
-from mjsim.importing.object.look import Look, corner_normals
-from mjsim.importing.object.solid import is_closed
+from mjsim.importing.house.floor_grid import Mask
+from mjsim.importing.object.closed_body import is_closed
+from mjsim.importing.object.visual_mesh import VisualMesh, corner_normals
 
 BUDGET = 150_000  # triangles of a house
 _LEAST = 100  # triangles that every mesh keeps
-_LEAST_VERTICES = 4  # that MuJoCo asks of a mesh
-_SMALL, _FEW = 0.3, 1000  # m; triangles that are kept of smaller things
-CEILING = 2.2  # m; what is above is left out of views from above
-_SAME = 8  # of 255, colours that differ by less are one
+_LEAST_VERTICES = 4  # required by MuJoCo
+_SMALL, _FEW = 0.3, 1000  # size of small things, m, and triangles that they keep
+CEILING = 2.2  # height above which geoms are omitted from views from above, m
+_SAME = 8  # of 255; colours that differ by less are merged
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnMesh:
     """A mesh of one material."""
 
-    name: str  # of its piece
-    look: Look
-    high: bool  # whether it is above `CEILING` and not a wall
+    name: str  # name of its piece
+    visual: VisualMesh
+    high: bool  # above `CEILING` and not a wall
 
 
-def make_looks(pieces: Iterable[Piece], over_floor: Callable[[Floats], Mask]) -> tuple[DrawnMesh, ...]:
-    """Meshes of all that is seen; `over_floor` tells points (k, 2), m, over rooms from those over walls."""
+def make_drawn_meshes(
+    pieces: Iterable[ScenePiece], over_floor: Callable[[Floats], Mask]
+) -> tuple[DrawnMesh, ...]:
+    """Meshes of all visible pieces.
+
+    `over_floor` returns which points (k, 2), m, are over rooms and not over walls.
+    """
     parts = []
     for name, surface in _by_name(pieces):
         surface, _ = cleaned(surface)
@@ -47,24 +52,24 @@ def make_looks(pieces: Iterable[Piece], over_floor: Callable[[Floats], Mask]) ->
     found = []
     for name, surface, high in materials:
         small = np.ptp(surface.corners.reshape(-1, 3), axis=0).max() < _SMALL
-        found.append(DrawnMesh(name, _look(_reduced(surface, _FEW if small else limit)), high))
-    return tuple(mesh for mesh in found if len(mesh.look.vertices) >= _LEAST_VERTICES)
+        found.append(DrawnMesh(name, _visual_mesh(_reduced(surface, _FEW if small else limit)), high))
+    return tuple(mesh for mesh in found if len(mesh.visual.vertices) >= _LEAST_VERTICES)
 
 
 def _over(surface: Surface, over_floor: Callable[[Floats], Mask]) -> Mask:
-    """Triangles (n,) that are over a room at their middle or halfway to a corner."""
+    """Mask (n,) of the triangles that are over a room at their centre or halfway to a corner."""
     middle = surface.corners.mean(axis=1)[:, :2]
     halfway = (middle[:, None] + surface.corners[:, :, :2]) / 2
     return np.asarray(over_floor(middle) | over_floor(halfway.reshape(-1, 2)).reshape(-1, 3).any(axis=1))
 
 
-def picture_key(look: Look) -> str:
-    """A name for the picture of a look, the same for equal ones."""
-    return "" if look.picture is None else hashlib.sha256(look.picture.tobytes()).hexdigest()[:12]
+def picture_key(mesh: VisualMesh) -> str:
+    """A hash of a mesh's image; empty without one."""
+    return "" if mesh.picture is None else hashlib.sha256(mesh.picture.tobytes()).hexdigest()[:12]
 
 
-def _by_name(pieces: Iterable[Piece]) -> Iterator[tuple[str, Surface]]:
-    """Everything seen of each name, as one surface."""
+def _by_name(pieces: Iterable[ScenePiece]) -> Iterator[tuple[str, Surface]]:
+    """All visible surfaces of each name, joined."""
     groups: dict[str, list[Surface]] = {}
     for piece in pieces:
         if piece.seen:
@@ -74,7 +79,7 @@ def _by_name(pieces: Iterable[Piece]) -> Iterator[tuple[str, Surface]]:
 
 
 def _by_material(surface: Surface) -> Iterator[Surface]:
-    """Parts of one picture, or of one colour."""
+    """Parts of one image, or of one colour."""
     colours = np.round(surface.colours.mean(axis=1) * 255 / _SAME).astype(int)
     keys = np.column_stack((surface.image, colours))
     kinds, number = np.unique(keys, axis=0, return_inverse=True)
@@ -83,8 +88,10 @@ def _by_material(surface: Surface) -> Iterator[Surface]:
 
 
 def _reduced(surface: Surface, count: int) -> Surface:
-    """A surface of one material with about so many triangles at most; each takes the place in the picture of the
-    nearest one that it replaces."""
+    """A surface of one material with at most about `count` triangles.
+
+    Each triangle gets the texture coordinates of the nearest triangle that it replaces.
+    """
     if len(surface) <= count:
         return surface
     mesh = surface.mesh()
@@ -100,7 +107,7 @@ def _reduced(surface: Surface, count: int) -> Surface:
     return replace(surface.select(nearest), corners=corners, uv=uv)
 
 
-def _look(surface: Surface) -> Look:
+def _visual_mesh(surface: Surface) -> VisualMesh:
     mesh = surface.mesh()
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     normals = corner_normals(vertices, faces)
@@ -108,16 +115,9 @@ def _look(surface: Surface) -> Look:
     picture = None if image < 0 else np.round(255 * surface.images[image]).astype(np.uint8)
     uv: Floats | None = None if picture is None else surface.uv
     red, green, blue = np.clip(surface.colours.mean(axis=(0, 1)), 0.0, 1.0).round(4).tolist()
-    look = Look(vertices, faces, normals, uv, picture, (red, green, blue), doubled=False)
-    return look if is_closed(mesh) else both_sides(look)
-
-
-def both_sides(look: Look) -> Look:
-    """A look that is drawn from both sides of its faces."""
-    return replace(
-        look,
-        faces=np.concatenate((look.faces, look.faces[:, ::-1])),
-        normals=np.concatenate((look.normals, -look.normals[:, ::-1])),
-        uv=None if look.uv is None else np.concatenate((look.uv, look.uv[:, ::-1])),
-        doubled=True,
-    )
+    doubled = not is_closed(mesh)
+    if doubled:
+        faces = np.concatenate((faces, faces[:, ::-1]))
+        normals = np.concatenate((normals, -normals[:, ::-1]))
+        uv = None if uv is None else np.concatenate((uv, uv[:, ::-1]))
+    return VisualMesh(vertices, faces, normals, uv, picture, (red, green, blue), doubled)

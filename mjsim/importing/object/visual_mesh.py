@@ -1,4 +1,4 @@
-"""What is drawn of an object: a coarse surface with a picture on it, baked from whatever colours the file had."""
+"""The mesh that shows an object: a simplified surface with a texture, baked from the colours of the file."""
 
 import math
 from dataclasses import dataclass
@@ -11,27 +11,27 @@ import trimesh
 from numpy.typing import NDArray
 
 from mjsim.formats.scene.surface import Floats, Ints, Surface
-from mjsim.importing.object.solid import is_closed, simplified
+from mjsim.importing.object.closed_body import is_closed, simplified
 
-SIDE = 512  # px
-_GUTTER = 2  # px around a triangle, so that neighbours do not bleed in
-_SHRINK = 0.93  # of the scale, until all triangles fit
-_MIN_SIDE = 2  # px across a triangle
+SIDE = 512  # side of the image, in pixels
+_GUTTER = 2  # pixels around a triangle, so that its neighbours do not bleed in
+_SHRINK = 0.93  # factor on the scale until all triangles fit
+_MIN_SIDE = 2  # least width of a triangle, in pixels
 MAX_TRIANGLES = 1400
-_SAMPLES = 200_000  # points of the file's surface among which the nearest is looked for
-_FACING = 0.01  # m; a triangle that faces away counts as this much farther off
+_SAMPLES = 200_000  # points of the file's surface from which colours are taken
+_FACING = 0.01  # distance that a triangle facing the other way counts as, m
 _CREASE = math.radians(40.0)
-_SHEET = 2e-4  # m, between both sides of an open surface
-_PLAIN = 3 / 255  # colours that differ by less are one
+_SHEET = 2e-4  # distance between the two sides of an open surface, m
+_PLAIN = 3 / 255  # colours that differ by less are equal
 _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the R2 sequence (Roberts 2018)
 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Where the triangles lie."""
+    """Layout of triangles in an image."""
 
-    shapes: Floats  # corners of each triangle in its own block, px, from the block's upper left, (n, 3, 2)
-    blocks: Ints  # left, upper, width and height of each block, px, (n, 4)
+    shapes: Floats  # corners of each triangle, in pixels from the upper left of its block, (n, 3, 2)
+    blocks: Ints  # left, top, width and height of each block, in pixels, (n, 4)
 
     @classmethod
     def pack(cls, corners: Floats) -> Self:
@@ -44,12 +44,12 @@ class Atlas:
 
     @property
     def uv(self) -> Floats:
-        """Places of the corners, from 0 to 1 from the lower left, shape (n, 3, 2)."""
+        """Texture coordinates of the corners, from 0 to 1 from the lower left, shape (n, 3, 2)."""
         places = (self.shapes + self.blocks[:, None, :2]) / SIDE
         return np.asarray(np.stack((places[..., 0], 1.0 - places[..., 1]), axis=-1))
 
     def texels(self) -> tuple[Ints, Floats]:
-        """Triangle (k,) and weights of its corners (k, 3) for all pixels of all blocks, block by block."""
+        """Triangle (k,) and barycentric weights (k, 3) of all pixels of all blocks, block by block."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
         a, b, c = (self.shapes[faces, k] for k in range(3))
@@ -59,7 +59,7 @@ class Atlas:
         return faces, weights / weights.sum(axis=1, keepdims=True)
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
-        """The picture, shape (SIDE, SIDE, 3), of colours (k, 3) of all `texels`, RGB from 0 to 1."""
+        """The image, shape (SIDE, SIDE, 3), for colours (k, 3) of all `texels`, RGB from 0 to 1."""
         picture = np.empty((SIDE, SIDE, 3), np.uint8)
         picture[:] = np.round(255 * np.clip(colours.mean(axis=0), 0, 1))
         across, down = self._pixels().T
@@ -76,7 +76,7 @@ class Atlas:
 
 
 def _flattened(corners: Floats) -> Floats:
-    """Triangles (n, 3, 3) in the plane, the longest side along x, m, shape (n, 3, 2); corners stay in order."""
+    """Triangles (n, 3, 3) in the plane, longest side along x, m, shape (n, 3, 2). The corners stay in order."""
     count = np.arange(len(corners))
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -91,7 +91,7 @@ def _flattened(corners: Floats) -> Floats:
 
 
 def _drawn(flat: Floats, scale: float) -> Floats:
-    """Flat triangles (n, 3, 2), m, in pixels; slivers are drawn wider."""
+    """Flat triangles (n, 3, 2), m, in pixels, with slivers widened."""
     size = np.ptp(flat, axis=1, keepdims=True)
     return np.asarray(flat * np.maximum(scale, _MIN_SIDE / np.maximum(size, 1e-12)))
 
@@ -119,21 +119,20 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """A surface to draw."""
+class VisualMesh:
+    """A surface with normals, and a texture or a colour."""
 
     vertices: Floats  # m, (n, 3)
     faces: Ints  # shape (m, 3)
     normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, (m, 3, 3)
-    # Places of the corners in the picture, from 0 to 1 from the lower left, (m, 3, 2); None without one.
-    uv: Floats | None
-    picture: NDArray[np.uint8] | None  # RGB, (height, width, 3), or None
-    colour: tuple[float, float, float]  # RGB from 0 to 1, where there is no picture
-    doubled: bool  # whether every face is there twice, since the surface is open and seen from both sides
+    uv: Floats | None  # texture coordinates of the corners, from 0 to 1 from the lower left, (m, 3, 2)
+    picture: NDArray[np.uint8] | None  # RGB, (height, width, 3)
+    colour: tuple[float, float, float]  # RGB from 0 to 1, without a picture
+    doubled: bool  # every face is there twice, because the surface is open and visible from both sides
 
 
-def make_look(surface: Surface, mesh: trimesh.Trimesh) -> Look:
-    """Simplify a surface, given also as a joined mesh, and bake its colours."""
+def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
+    """Simplify a surface, also given as a joined mesh, and bake its colours."""
     closed = is_closed(mesh)
     coarse = simplified(mesh, MAX_TRIANGLES if closed else MAX_TRIANGLES // 2)
     closed = closed and is_closed(coarse)
@@ -147,13 +146,13 @@ def make_look(surface: Surface, mesh: trimesh.Trimesh) -> Look:
         vertices = np.concatenate((vertices, vertices - _SHEET * coarse.vertex_normals))
         normals = np.concatenate((normals, -normals[:, ::-1]))
         uv = None if uv is None else np.concatenate((uv, uv[:, ::-1]))
-    return Look(vertices, faces, normals, uv, picture, colour, doubled=not closed)
+    return VisualMesh(vertices, faces, normals, uv, picture, colour, doubled=not closed)
 
 
 def _painted(
     surface: Surface, corners: Floats
 ) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
-    """Colour, or places and picture, for triangles with these corners (m, 3, 3)."""
+    """Colour, texture coordinates and image of triangles with these corners (m, 3, 3)."""
     triangles, weights = _sampled(surface)
     colours = surface.colours_at(triangles, weights)
     red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
@@ -170,7 +169,7 @@ def _painted(
 
 
 def _sampled(surface: Surface) -> tuple[Ints, Floats]:
-    """Points spread evenly over a surface: their triangles (k,) and weights of the corners (k, 3)."""
+    """Points spread evenly over a surface: their triangles (k,) and barycentric weights (k, 3)."""
     edges = np.diff(surface.corners, axis=1)
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     count = np.ceil(_SAMPLES * area / area.sum()).astype(int)
@@ -182,13 +181,13 @@ def _sampled(surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
-    """Positions and directions of points of a surface, m, shape (k, 6)."""
+    """Positions and scaled normals of points on a surface, m, shape (k, 6)."""
     points = np.einsum("kc,kcd->kd", weights, surface.corners[triangles])
     return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
 
 
 def corner_normals(vertices: Floats, faces: Ints) -> Floats:
-    """Normal at every corner of every face, shape (m, 3, 3): mean of the faces there that bend less than `_CREASE`."""
+    """Normal at every corner of every face, (m, 3, 3): the mean of adjacent faces at less than the angle `_CREASE`."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     units = _normals(corners)
@@ -210,7 +209,7 @@ def _normals(corners: Floats) -> Floats:
 
 
 def _projected(corners: Floats, points: Floats) -> Floats:
-    """Weights (k, 3) of the corners (k, 3, 3) for the points (k, 3), drawn into the triangles."""
+    """Weights (k, 3) of the corners (k, 3, 3) for the points (k, 3), clamped to the triangles."""
     weights = trimesh.triangles.points_to_barycentric(corners, points)
     weights = np.clip(np.nan_to_num(weights, nan=1 / 3), 0.0, 1.0)
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))

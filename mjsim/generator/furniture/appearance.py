@@ -1,4 +1,4 @@
-"""The materials of a home's furniture, by role, so that pieces of one home go together."""
+"""The materials of a home's furniture by role, so that the pieces of a home match."""
 
 import colorsys
 import re
@@ -22,11 +22,11 @@ _MATERIAL = re.compile(r'material="([^"]+)"')
 
 
 @dataclass(frozen=True)
-class Look:
-    """Materials of a home's furniture; builders pick from these roles, the frequent ones first."""
+class Appearance:
+    """Materials of a home's furniture. Pieces pick from these roles, in which frequent materials are repeated."""
 
-    assets: dict[str, Asset]  # role -> material
-    colours: tuple[Rgb, ...]  # of rugs and pictures
+    assets: dict[str, Asset]  # by material
+    colours: tuple[Rgb, ...]  # for rugs and pictures
     woods: tuple[str, ...] = ("wood_a", "wood_a", "wood_a", "wood_b", "wood_b", "wood_c")
     fronts: tuple[str, ...] = ("front_a", "front_a", "front_b", "white")
     cloths: tuple[str, ...] = ("cloth_a", "cloth_a", "cloth_b", "cloth_c", "cloth_d")
@@ -34,15 +34,13 @@ class Look:
     quilts: tuple[str, ...] = ("quilt_a", "quilt_b", "quilt_c", "quilt_d")
     metals: tuple[str, ...] = ("metal_a", "metal_a", "chrome", "black")
 
-    def of(self, geoms: str) -> tuple[Asset, ...]:
-        """The materials that some geoms name; those of the apartment need none."""
-        return tuple(
-            self.assets[name] for name in sorted(set(_MATERIAL.findall(geoms))) if name in self.assets
-        )
+    def assets_of(self, geoms: str) -> tuple[Asset, ...]:
+        """The assets of the materials that some geoms name. Materials of the apartment need none."""
+        names = sorted(set(_MATERIAL.findall(geoms)))
+        return tuple(self.assets[name] for name in names if name in self.assets)
 
 
-def draw_look(palette: Palette, rng: np.random.Generator) -> Look:
-    """Materials of a home in its colours."""
+def draw_appearance(palette: Palette, rng: np.random.Generator) -> Appearance:
     assets = {name: Asset(name, f'<material name="{name}" {rest}/>') for name, rest in _ALWAYS}
     fabrics, accents, fronts = (
         [_muted(rgb) for rgb in of] for of in (palette.fabrics, palette.accents, palette.fronts)
@@ -77,15 +75,14 @@ def draw_look(palette: Palette, rng: np.random.Generator) -> Look:
     stones = drawn(_STONES)
     add("stone", stones[0], 'texture="marble"' if rng.random() < 0.5 else "")
     add("tile", stones[1], 'texture="metro_tiles" texuniform="true" texrepeat="2.4 2.4"')
-    light = np.array(palette.fabrics[int(rng.integers(len(palette.fabrics)))]) * 0.45 + 0.55 * np.array(
-        (0.97, 0.94, 0.88)
-    )
+    fabric = np.array(palette.fabrics[int(rng.integers(len(palette.fabrics)))])
+    light = fabric * 0.45 + 0.55 * np.array((0.97, 0.94, 0.88))
     add("curtain", (float(light[0]), float(light[1]), float(light[2])), 'texture="curtain"')
-    return Look(assets, (*fabrics, *accents))
+    return Appearance(assets, (*fabrics, *accents))
 
 
 def _muted(rgb: Rgb) -> Rgb:
-    """Vivid greens and purples are rare in homes: less of both."""
+    """A less saturated and darker colour, above all of greens and purples, which are rarely vivid in homes."""
     hue, saturation, value = colorsys.rgb_to_hsv(*rgb)
     loud = 0.19 < hue < 0.48 or 0.7 < hue < 0.9
     return colorsys.hsv_to_rgb(hue, saturation * (0.55 if loud else 0.9), value * (0.85 if loud else 1.0))
