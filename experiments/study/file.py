@@ -193,7 +193,6 @@ class _StudyFile(msgspec.Struct):
 
 
 def _of_a_person(trial: TrialConfig, phases: Sequence[str], story: Path | None) -> TrialConfig:
-    """Return a trial played by a person. `story` is used if the file names none."""
     before = [name for name in (STORY, FLYTHROUGH, TRAINING) if name in phases]
     settings: dict[str, Any] = {**trial.settings(), "user": HUMAN, "live": True, "behaviour": {}}
     if story is not None and trial.story is None:

@@ -82,11 +82,7 @@ class VisitFolder:
 
 
 class VisitFolders:
-    """Folders of all visits.
-
-    Attributes:
-        path: The folder that holds them.
-    """
+    """Folders of all visits."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
@@ -103,9 +99,6 @@ class VisitFolders:
 
         Args:
             name: Hash of the token of the participant's link.
-            phases: Played phases, in order.
-            trials: Settings of the trials, by phase.
-            ended: Phases before the first trial.
         """
         if (known := self.find(name)) is not None:
             return known

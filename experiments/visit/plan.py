@@ -63,9 +63,7 @@ class VisitPlan:
         optional: Phases that may be skipped.
         minutes: Expected duration of a visit.
         cells: Cells of the design. An assignment names one, and a place in it.
-        rule: How a cell is chosen for a participant.
         trials: Returns the settings of the trials of an assignment, by phase.
-        film: Film of the house, or None.
         headset: True if the page of a trial offers a headset.
         floor_plan: True if the run of the task gets a picture of its paths.
         rehearsal: True if all participants are simulated.

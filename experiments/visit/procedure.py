@@ -46,14 +46,7 @@ class PhaseState:
 
 
 class Procedure:
-    """Takes participants through the phases of a plan.
-
-    Args:
-        plan: Plan of the visits.
-        store: Records participants, their phases and answers.
-        folders: Folders of journals and runs.
-        rng: Random generator for assignments.
-    """
+    """Takes participants through the phases of a plan."""
 
     def __init__(
         self, plan: VisitPlan, store: Store, folders: VisitFolders, rng: np.random.Generator
@@ -222,7 +215,6 @@ class Procedure:
     async def _move_on(
         self, person: PersonRow, phase: str, answers: Answers, reason: str | None = None
     ) -> None:
-        """End a phase. Reaching the last phase finishes the participation."""
         names = self.names
         following = names[names.index(phase) + 1]
         status: Status | None = "finished" if following == names[-1] else None

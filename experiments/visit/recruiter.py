@@ -40,9 +40,7 @@ class WayBack:
     """How the last page leads back to the platform.
 
     Attributes:
-        url: URL on the platform, or empty.
         fields: Fields of a form that is posted there, or None for a plain link.
-        label: Name of the button's text.
         gives_back: True if the participant must return the task on the platform's page.
     """
 
@@ -82,7 +80,6 @@ class OpenLink:
 
     Args:
         platform: `link`, or `lab`, where the last page leads to the first one for the next participant.
-        code: Completion code, or empty.
         repeats: True if the link of a further visit names the earlier one.
     """
 

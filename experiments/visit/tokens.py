@@ -19,12 +19,7 @@ def token_hash(token: str) -> str:
 
 
 class Keys:
-    """Keys and tokens derived from a study's secret.
-
-    Args:
-        secret: The study's secret.
-        study: Name of the study.
-    """
+    """Keys and tokens derived from a study's secret."""
 
     def __init__(self, secret: bytes, study: str) -> None:
         self._secret, self._study = secret, study

@@ -101,7 +101,6 @@ def scene_route(folder: Path) -> Route:
 
 
 def _accepts_gzip(request: Request) -> bool:
-    """Return True if the Accept-Encoding header allows gzip."""
     for coding in request.headers.get("accept-encoding", "").lower().split(","):
         name, _, quality = coding.partition(";")
         if name.strip() in ("gzip", "*"):

@@ -132,7 +132,6 @@ def _move(
 
 
 def _gap(angle: float, start: float) -> float:
-    """Return the shorter turn from one heading to another, in radians."""
     return (angle - start + math.pi) % (2.0 * math.pi) - math.pi
 
 

@@ -104,14 +104,10 @@ class Display(WireMessage, frozen=True):
     """Quality of the display during the last 5 s, which is only logged.
 
     Attributes:
-        draw: Side that drew.
-        renderer: Name of the renderer.
         width: Width of the view, in CSS pixels. `height` likewise.
         pixel_ratio: Device pixels per CSS pixel.
-        frames_per_s: Pictures shown per second.
         frame_ms: Median time between two pictures.
         frame_ms_95: 95th percentile of the time between two pictures.
-        dropped: Number of pictures that were received but not shown.
         latency_ms: Median time from an input to its picture, or to the server's state with that input if the browser
             draws. None without inputs.
         field_of_view: Field of view of the picture if the person may choose it.
@@ -157,14 +153,8 @@ class Open(WireMessage, frozen=True):
     """Open a session in a worker.
 
     Attributes:
-        folder: Folder of the journal.
-        run: Run directory.
-        config: Settings of the trial.
-        before: Earlier phases of the visit.
         restarted: True if the previous worker died.
         as_inputs_come: True to take control steps as soon as their inputs are promised, as in a rehearsal.
-        floor_plan: True to draw a floor plan.
-        language: Language of the labels and the HUD.
         texts: Texts of the HUD that replace those of the language, or empty.
     """
 

@@ -103,8 +103,6 @@ class SceneMessage(WireMessage, frozen=True, tag="scene"):
     Attributes:
         path: URL path of the scene's files on this server. If None, the server draws.
         floor: File of the obstacles for `gait`, or None if walking cannot be predicted.
-        gait: Limits and servos of walking.
-        speeds: Speeds of the person.
         field_of_view: Horizontal field of view for any shape of the view, in radians.
         field_of_view_range: Limits of the person's choice of the field of view, or None.
         step_duration: Duration of a control step, in seconds.
@@ -125,8 +123,6 @@ class Snapshot(WireMessage, frozen=True):
     Attributes:
         step: Control step that starts with this state.
         input: Number of the last input that counts in it.
-        time: Simulated time, in seconds.
-        busy: True during a pick or place.
         body: Position, speeds, commands and servos of the body (docs/protocol.md).
         eye: Position in metres, heading and pitch in radians.
         hands: Positions of the left and right hand in the body's frame, in metres.
@@ -168,7 +164,7 @@ class Hud(WireMessage, frozen=True):
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """What the action key would do: the object, and the receptacle if the object would be placed.
+    """Effect of the action key: the object, and the receptacle if the object would be placed.
 
     `instance` is the object's instance name. `place` is the position of the object or the receptacle in metres. `at` is
     that position in the view, as shares of its width and height, or None if it is out of view.

@@ -91,7 +91,7 @@ def check_people(study: Study, people: Sequence[PersonRow]) -> None:
     simulated = sum(person.platform == REHEARSAL for person in people)
     if simulated and not study.rehearsal:
         raise RecordError(
-            f"{simulated} of {len(people)} people are those of a rehearsal: nobody, with answers drawn at random; "
+            f"{simulated} of {len(people)} people are simulated, with random answers; "
             "name the folder of people, or give `mjsim study collect` the option --rehearsal"
         )
     if study.rehearsal and simulated < len(people):
@@ -200,6 +200,5 @@ def _texts(
 
 
 def _complete(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Give every row all columns, in order of first appearance."""
     columns = dict.fromkeys(name for row in rows for name in row)
     return [{name: row.get(name) for name in columns} for row in rows]

@@ -25,10 +25,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     """Erase a participant from the study, and from its listed backups, tables and exports.
 
     Args:
-        store: Store of the study.
-        folder: Folder of the study, with the runs.
         name: Name of the participant in tables, such as `p00012`.
-        who: Name of the researcher, for the audit log.
 
     Returns:
         One line per copy that was changed or is missing.
@@ -47,7 +44,9 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
     visits = VisitFolders(folder / VISITS)
     played = any(row.person_id == person.id for row in await store.trials())
     if played and not person.delete_wanted and not (visits.path / person.token_hash).exists():
-        told.append(f"the runs of {name} are not here; delete {VISITS}/{person.token_hash} where they are")
+        told.append(
+            f"the runs of {name} are not on this machine; delete {VISITS}/{person.token_hash} where they are"
+        )
     await asyncio.to_thread(visits.remove, person.token_hash)
     if (visits.path / person.token_hash).exists():
         raise StoreError(f"{visits.path / person.token_hash} cannot be deleted; delete it, then erase again")
@@ -79,7 +78,7 @@ async def change_databases(
             if not path.exists():
                 told.append(_missing(copy, name))
             elif await change_database(path, study.name, work):
-                told.append(f"{_shown(copy)} was written anew without {name}")
+                told.append(f"{_shown(copy)} was rewritten without {name}")
     return told
 
 
@@ -103,20 +102,20 @@ def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
         elif copy.kind in ("table", "export"):
             told += remove_from_files(path, names) if path != folder.absolute() else []
             if _remove_from_tables(path, names):
-                told.append(f"{_shown(copy)} was written anew without {names[0]}")
+                told.append(f"{_shown(copy)} was rewritten without {names[0]}")
         elif not set(names).isdisjoint(Path(copy.source).parts) or any(
             name.encode() in file.read_bytes() for file in files for name in names
         ):
             for file in files:
                 file.unlink()
             deleted.add(copy.path)
-            told.append(f"{_shown(copy)} was deleted, as {names[0]} was in it: make it again")
+            told.append(f"{_shown(copy)} was deleted because it contained {names[0]}; make it again")
     forget_copies(folder, deleted)
     return told
 
 
 def _missing(copy: Copy, name: str) -> str:
-    return f"{_shown(copy)} is not there any more; where it was moved, delete {name} there, and in what was made of it"
+    return f"{_shown(copy)} is missing; if it was moved, delete {name} there and in files made from it"
 
 
 def _shown(copy: Copy) -> str:

@@ -71,13 +71,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Exported:
-    """Summary of an export.
-
-    Attributes:
-        people: Number of participants in the main table.
-        runs: Number of run directories.
-        collected: Main table, with the reasons why runs were left out.
-    """
+    """Summary of an export."""
 
     people: int
     runs: int
@@ -90,20 +84,13 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
     Participants are numbered. Platform ids, links, their hashes and addresses are left out, and so are participants who
     did not consent or asked for their data to be deleted.
 
-    Args:
-        study: The study.
-        store: Store of the study.
-        folder: Folder of the study, with the runs.
-        out: Folder to create.
-        replace: True if an earlier export may be replaced.
-
     Raises:
         RecordError: `out` exists and cannot be replaced, or no participant has finished the task.
     """
     check_export(out, replace=replace)
     found = await collect(study, store, folder)
     if not found.rows:
-        raise RecordError(f"nobody in {folder} has finished the task yet; there is nothing to export")
+        raise RecordError(f"no participant in {folder} has finished the task yet; there is nothing to export")
     people = {p.id: p for p in await store.people() if not p.delete_wanted and p.status != "no_consent"}
     trials = [
         row for row in await store.trials() if row.person_id in people and _name(row) not in found.unusable

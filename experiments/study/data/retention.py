@@ -43,11 +43,7 @@ async def forget_old(
     Participants with an unpaid payment are skipped. Listed backups are changed, too.
 
     Args:
-        store: Store of the study.
-        visits: Folder of visits in the study's folder.
-        keep_days: Days since the last activity.
         dry: Only report what would be deleted.
-        now: Current time, with a timezone.
     """
     before = (now or utc_now()) - datetime.timedelta(days=keep_days)
     owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}

@@ -30,15 +30,10 @@ class Sent:
 
 
 class Sender:
-    """Sends owed payments.
+    """Sends owed payments. The name of the study is part of their keys on the platform.
 
     Each attempt is recorded in the ledger before the platform is asked. If the outcome of an attempt is unknown, the
     platform is asked for it before the payment is sent again, but not until its lists are up to date.
-
-    Args:
-        study: Name of the study, part of the payment keys on the platform.
-        store: Store of the study.
-        payer: Client of the platform.
     """
 
     def __init__(self, study: str, store: Store, payer: Payer) -> None:
@@ -112,7 +107,6 @@ class Sender:
 
 
 async def _understood(answer: Awaitable[T]) -> T:
-    """Await a platform's answer. Raises UnsureError if it has an unknown form."""
     try:
         return await answer
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -120,7 +114,6 @@ async def _understood(answer: Awaitable[T]) -> T:
 
 
 def _without_ids(text: str, order: Order) -> str:
-    """Remove the participant's platform ids from a text."""
     for value in filter(None, order.identity.values()):
         text = text.replace(value, "...")
     return text

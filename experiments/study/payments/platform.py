@@ -97,8 +97,6 @@ class Api:
     """HTTP client of a platform's API.
 
     Args:
-        url: Base URL.
-        headers: Headers of all requests.
         timeout: Timeout for a complete response, in seconds.
     """
 
@@ -120,9 +118,9 @@ class Api:
             await asyncio.sleep(_pause(answer.headers.get("retry-after", "")))
         said = f"{answer.status_code} {' '.join(answer.text.split())[:MAX_TEXT]}".strip()
         if answer.status_code in (401, 403):
-            raise StoppedError(f"the platform lets nobody in with this secret: {said}")
+            raise StoppedError(f"the platform rejects this secret: {said}")
         if answer.is_server_error:
-            raise UnsureError(f"the platform is in trouble: {said}")
+            raise UnsureError(f"the platform failed: {said}")
         if not answer.is_success:
             raise DeclinedError(f"the platform says {said}")
         try:
@@ -148,10 +146,9 @@ def secret(name: str) -> str:
     if not (value := os.environ.get(name, "").strip()):
         raise ConfigError(f"{name} is not set in the environment; it holds the platform's secret for paying")
     if not (value.isascii() and value.isprintable()):
-        raise ConfigError(f"{name} has characters that no secret has; copy it again from the platform")
+        raise ConfigError(f"{name} has characters that a secret cannot have; copy it again from the platform")
     return value
 
 
 def _pause(text: str) -> float:
-    """Return the platform's requested delay, in seconds."""
     return min(LONGEST_WAIT, float(text)) if text.isdecimal() else 1.0

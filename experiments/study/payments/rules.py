@@ -16,13 +16,7 @@ from experiments.visit.store.values import PaymentKind
 
 @dataclass(frozen=True)
 class Due:
-    """A payment that follows from the rules.
-
-    Attributes:
-        key: Key of the payment in the ledger.
-        cents: Hundredths of the currency.
-        why: Reason, in words.
-    """
+    """A payment that follows from the rules."""
 
     person_id: int
     kind: PaymentKind

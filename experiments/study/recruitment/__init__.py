@@ -56,5 +56,5 @@ def payer(settings: StudySettings) -> Payer:
         case "external-question":
             return ExternalQuestionPayer(recruitment)
     raise ConfigError(
-        f"study.recruitment.platform is {recruitment.platform!r}, which pays nobody; pay by hand, and note it (--paid)"
+        f"study.recruitment.platform {recruitment.platform!r} makes no payments; pay by hand and record it (--paid)"
     )

@@ -20,11 +20,7 @@ _ID = re.compile(r"[0-9A-Za-z-]{4,64}")
 
 
 class Connect:
-    """Recruiter for one project of the platform.
-
-    Args:
-        settings: Settings with the project's completion code, which is part of the URL of the completion page.
-    """
+    """Recruiter for one project of the platform."""
 
     platform = "connect"
     parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)

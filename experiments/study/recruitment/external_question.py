@@ -24,11 +24,7 @@ _ID = re.compile(r"[0-9A-Za-z]{4,64}")
 
 
 class ExternalQuestion:
-    """Recruiter for one task (HIT) of a platform that embeds the study.
-
-    Args:
-        settings: Settings with the platform's sites.
-    """
+    """Recruiter for one task (HIT) of a platform that embeds the study."""
 
     platform = "external-question"
     parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)

@@ -17,11 +17,7 @@ _ID = re.compile(r"[0-9A-Za-z]{8,64}")
 
 
 class Prolific:
-    """Recruiter for one study of the platform.
-
-    Args:
-        settings: Settings with the completion codes of the platform's study.
-    """
+    """Recruiter for one study of the platform."""
 
     platform = "prolific"
     parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)

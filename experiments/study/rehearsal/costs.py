@@ -37,13 +37,7 @@ class TrialDurations:
 
 
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
-    """Run trials of simulated participants, and leave their runs in `folder`.
-
-    Args:
-        study: The study.
-        folder: An empty folder.
-        on_trial: Called before each trial with its name.
-    """
+    """Run trials of simulated participants, and leave their runs in `folder`."""
     trials = [_simulated(cell, study.path) for cell in study.cells]
     house = House.load(trials[0][0].house)
 
@@ -61,7 +55,6 @@ def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> Tri
 
 
 def _simulated(cell: Cell, path: Path) -> list[TrialConfig]:
-    """Return the first trials of a cell, with the file's simulated participants at the fastest settings."""
     wanted = {(trial.house_seed, trial.person_seed, trial.order_seed) for trial in cell.trials[:PEOPLE]}
     usual: dict[str, Any] = {"fidelity": "event", "regret": False, "phases": TASK}
     first = cell.trials[0]

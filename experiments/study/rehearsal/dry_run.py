@@ -42,12 +42,7 @@ Photograph = Callable[[str, str], Awaitable[None]]  # takes a name and a URL
 
 @dataclass
 class Walked:
-    """Result of a dry run.
-
-    Attributes:
-        faults: What does not work.
-        words: Number of words on the page of each phase.
-    """
+    """Result of a dry run."""
 
     faults: list[str] = field(default_factory=list)
     words: dict[str, int] = field(default_factory=dict)
@@ -112,8 +107,6 @@ def _ways(procedure: Procedure) -> Iterator[Planned]:
 
 
 class _Walk:
-    """Sends participants and compares the pages they get with the store."""
-
     def __init__(self, procedure: Procedure, around: Surroundings, photograph: Photograph) -> None:
         self._procedure, self._around, self._photograph = procedure, around, photograph
         self.walked = Walked()
@@ -147,7 +140,7 @@ class _Walk:
         wanted = STATUS[planned.leaves or "finished"]
         if person.status != wanted:
             gone.faults.append(
-                f"a participant should be {wanted.replace('_', ' ')} in {person.phase}, and is {person.status}"
+                f"a participant should be {wanted.replace('_', ' ')} in {person.phase}, but is {person.status}"
             )
             return
         page = await self._around.client.get(gone.link)
@@ -159,7 +152,6 @@ class _Walk:
 
 
 def _words_of(page: str) -> int:
-    """Count the visible words of an HTML page."""
     text = _Text()
     text.feed(page)
     return text.words

@@ -24,16 +24,7 @@ class LostError(Exception):
 
 
 class Link:
-    """A connection to a trial, made by `connected`.
-
-    Args:
-        socket: The connection.
-        player: Chooses the inputs.
-
-    Attributes:
-        decisions: Number of inputs sent.
-        refused: Texts of the server's `error` messages.
-    """
+    """A connection to a trial, made by `connected`. `decisions` counts the inputs sent."""
 
     def __init__(self, socket: ClientConnection, player: SimulatedPlayer) -> None:
         self._socket, self._player = socket, player
@@ -76,7 +67,6 @@ class Link:
         return True
 
     async def _decide(self, delay: float) -> None:
-        """Send an input, and wait for the state after its control steps."""
         player, step = self._player, self._player.step
         self._number += 1
         self.decisions += 1
@@ -140,15 +130,7 @@ class Link:
 async def connected(
     base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
 ) -> AsyncIterator[Link]:
-    """Connect a page to a trial, and disconnect it at the end.
-
-    Args:
-        base: URL of the server.
-        path: Path of the participant's pages.
-        trial: `training` or `task`.
-        tab: Name of the page.
-        player: Chooses the inputs.
-    """
+    """Connect a page to a trial, and disconnect it at the end."""
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:
         link = Link(socket, player)

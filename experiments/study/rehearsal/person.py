@@ -35,12 +35,9 @@ class Rehearsed:
     """Progress and outcome of a simulated person.
 
     Attributes:
-        number: Number in the plan.
         link: Path of the personal link, empty before the visit starts.
         outcome: `finished`, the way of leaving, or `stuck`. Empty during the visit.
         answers: Accepted forms, by phase.
-        faults: Descriptions of faults.
-        refused: Number of refused messages in trials.
     """
 
     number: int
@@ -167,7 +164,7 @@ class SimulatedPerson:
         if wrong is not None and (leaves == "fails" or careless):
             answer = await self._post(link, wrong)
             if answer.status_code == httpx.codes.SEE_OTHER and leaves != "fails":
-                self._fault(f"{phase.name} takes a form that it should refuse")
+                self._fault(f"{phase.name} accepts a form that it should refuse")
             return
         if leaves == "refuses":
             form = {"phase": phase.name, "agree": "no"}
@@ -178,7 +175,7 @@ class SimulatedPerson:
         if httpx.codes.SEE_OTHER in statuses:
             self.rehearsed.answers[phase.name] = form
         elif tries:
-            self._fault(f"the form of {phase.name} was not taken")
+            self._fault(f"the form of {phase.name} was not accepted")
 
     async def _leave(self, how: str) -> str:
         if how != "vanishes":
@@ -223,11 +220,10 @@ class SimulatedPerson:
             found = SHOWN.search(page.text)
             if found is None or found[2] != trial:
                 return True
-        self._fault(f"the {trial} does not go on")
+        self._fault(f"the {trial} does not continue")
         return True
 
     async def _break(self, link: Link, what: str, trial: str, tab: str) -> str:
-        """Interrupt a trial, and return the name of the page that continues it."""
         if what == "cut":
             link.cut()
             return tab

@@ -32,11 +32,7 @@ def browser() -> str | None:
 
 
 class Camera:
-    """Takes screenshots of pages into a folder.
-
-    Attributes:
-        taken: Names of the pages, in order.
-    """
+    """Takes screenshots of pages into a folder."""
 
     def __init__(self, socket: ClientConnection, folder: Path) -> None:
         self._socket, self._folder = socket, folder
@@ -65,7 +61,6 @@ class Camera:
         await self._ask("Page.navigate", url="about:blank")  # releases the session of a trial
 
     async def _settle(self) -> None:
-        """Wait until the page has loaded."""
         loop = asyncio.get_running_loop()
         until = loop.time() + LOADING
         await asyncio.sleep(SETTLE)

@@ -23,11 +23,8 @@ class Planned:
     """Planned behaviour of a simulated person.
 
     Attributes:
-        number: Number of the person, from 0.
-        seed: Seed of answers and actions.
         arrives: Time of arrival, in seconds of study time.
         leaves: Way of leaving the study early, or None.
-        leaves_in: Phase in which the person leaves.
         returns_in: Phase in which the person closes the page and later reopens the link, or None.
         reloads_in: Phase in which the person reloads the page, or None.
         bad: True if the connection is delayed and cut.
@@ -53,11 +50,8 @@ def plan_people(
     """Plan the people of a rehearsal, in order of arrival. The same seed gives the same people.
 
     Args:
-        phases: Phases of the study.
         people: Number of arrivals, a Poisson process.
-        seed: Seed of the plan.
         per_minute: Mean number of arrivals per minute of study time.
-        dropouts: Share of people who do not finish.
     """
     found, arrives = [], 0.0
     for number in range(people):

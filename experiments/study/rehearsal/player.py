@@ -24,10 +24,6 @@ class SimulatedPlayer:
     """Tidies up along shortest paths.
 
     It follows the display's goal. Without one, it walks to the nearest known object or bin, or else searches the house.
-
-    Args:
-        house: The house, known to people from the film.
-        rng: Random generator.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
@@ -117,7 +113,6 @@ class SimulatedPlayer:
         return self._unseen(here)
 
     def _unseen(self, here: tuple[float, float]) -> tuple[float, float]:
-        """Return the nearest viewpoint that was not visited."""
         places = [(float(x), float(y)) for group in self._house.viewpoints.values() for x, y in group]
         self._searched += [p for p in places if p not in self._searched and math.dist(p, here) < SEEN]
         left = [place for place in places if place not in self._searched]

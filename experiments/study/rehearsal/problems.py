@@ -19,7 +19,6 @@ class Problem:
 
     Attributes:
         key: Key in the file, such as `study.contact`.
-        text: Description and remedy.
     """
 
     key: str
@@ -34,11 +33,11 @@ def problems_of_file(study: Study) -> list[Problem]:
 def _found(study: Study) -> Iterator[tuple[str, str]]:
     settings, pay = study.settings, study.settings.pay
     if "@" not in settings.contact or any(word in settings.contact for word in EXAMPLES):
-        yield "contact", f"contact is {settings.contact!r}; people need an address at which somebody answers"
+        yield "contact", f"contact is {settings.contact!r}; participants need a working address"
     if any(word in settings.institution for word in EXAMPLES):
-        yield "institution", f"institution is {settings.institution!r}; name yours"
+        yield "institution", f"institution is {settings.institution!r}; name your institution"
     if CONSENT not in settings.phases:
-        yield "phases", "nobody is asked for consent; add the phase consent"
+        yield "phases", "participants are not asked for consent; add the phase consent"
     try:
         recruiter(settings.recruitment)
     except ConfigError as error:

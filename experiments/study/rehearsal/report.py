@@ -37,12 +37,8 @@ class RehearsalReport:
     """Result of a rehearsal.
 
     Attributes:
-        settings: Settings of the rehearsal.
-        passed: True if there are no faults.
-        outcomes: Number of people by outcome.
         cells: Number of finished people, by cell.
         owed: Sum of payments that would be due, in cents.
-        faults: Descriptions of faults.
     """
 
     settings: RehearsalSettings
@@ -67,7 +63,7 @@ async def report(
             faults.append(f"person {one.number} is not in the database")
         elif wanted is not None and person.status != wanted:
             faults.append(f"person {one.number} {one.outcome}, and is {person.status} in the database")
-    faults += [f"{name} is in the database, and nobody's of the plan" for name in known]
+    faults += [f"{name} is in the database but not in the plan" for name in known]
     payments = due(study, await store.people(), await store.trials())
     await decide(store, payments)
     if await decide(store, payments):
@@ -98,8 +94,6 @@ async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, 
     """Check that a rehearsal of this study file has passed, and record that in the audit log.
 
     Args:
-        store: Store with real participants.
-        study: The study.
         folder: Folder of a rehearsal, or None if the audit log has its success already.
         without: True to record instead that no rehearsal is wanted.
 

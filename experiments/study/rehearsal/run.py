@@ -48,9 +48,6 @@ async def rehearse(
     """Run all unfinished people. Return every result, in order.
 
     Args:
-        study: The study.
-        settings: Settings of the rehearsal.
-        out: Folder of the rehearsal.
         film: Film of the house, or None to let the server make it.
         on_person: Called for each finished person, including those of an earlier run.
 
@@ -98,7 +95,6 @@ def _keep(settings: RehearsalSettings, out: Path) -> None:
 async def _server(
     study: Study, settings: RehearsalSettings, out: Path, film: Path | None
 ) -> AsyncIterator[str]:
-    """Run the study's server in a subprocess, and yield its URL."""
     command = [sys.executable, "-m", "experiments.cli.main", "study", "serve", str(study.path)]
     command += ["--out", str(out / SERVED), "--rehearsal", str(settings.factor), "--port", "0", "--no-open"]
     command += [

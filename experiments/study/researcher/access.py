@@ -25,12 +25,7 @@ def may(who: Researcher, role: Role) -> bool:
 
 
 class Access:
-    """Logs researchers in and out.
-
-    Args:
-        researchers: Researchers of the store.
-        secure: True if the page is served by HTTPS.
-    """
+    """Logs researchers in and out."""
 
     def __init__(self, researchers: Researchers, *, secure: bool) -> None:
         self._researchers, self._secure = researchers, secure

@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
-from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
@@ -27,7 +25,7 @@ from experiments.visit.store import PersonRow, Researcher, Role, Store, StudySta
 from experiments.visit.texts import words_of
 from experiments.web.client_files import page, scene_route, static_routes, trial_texts
 from experiments.web.server.browser_socket import BrowserSocket
-from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
+from experiments.web.server.guards import Network, middleware, sent_form
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.sessions import Sessions
 from mjsim.formats.gltf.store import scenes_folder
@@ -57,7 +55,6 @@ class ResearcherServer:
     """Pages for researchers, health check and metrics.
 
     Args:
-        watched: Data to show.
         public: Public URL of the page behind a proxy, or None.
         proxies: Proxies whose X-Forwarded-For header is trusted.
     """
@@ -85,20 +82,15 @@ class ResearcherServer:
                 Route("/people/{number:int}/watch", self._for("viewer", self._watch_page)),
                 WebSocketRoute("/people/{number:int}/watch", self._watch),
                 Route("/audit", self._for("assistant", self._audit)),
-                Route("/pause", self._for("assistant", self._pause), methods=["POST"]),
-                Route("/continue", self._for("assistant", self._continue), methods=["POST"]),
-                Route("/stop", self._for("owner", self._stop), methods=["POST"]),
-                Route("/reopen", self._for("owner", self._reopen), methods=["POST"]),
+                Route("/pause", self._change("assistant", "open", "paused"), methods=["POST"]),
+                Route("/continue", self._change("assistant", "paused", "open"), methods=["POST"]),
+                Route("/stop", self._change("owner", None, "closed"), methods=["POST"]),
+                Route("/reopen", self._change("owner", "closed", "open"), methods=["POST"]),
                 Route("/quota", self._for("owner", self._set_quota), methods=["POST"]),
                 scene_route(scenes_folder()),
                 *static_routes(),
             ],
-            middleware=[
-                Middleware(
-                    TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, self._public), www_redirect=False
-                ),
-                Middleware(Guards, public=self._public, proxies=self._proxies),
-            ],
+            middleware=middleware(host, self._public, self._proxies),
             exception_handlers={404: self._unknown, StoreError: self._out_of_order},
             lifespan=self._lifespan,
         )
@@ -112,8 +104,6 @@ class ResearcherServer:
             logging.getLogger().removeHandler(self._watched.metrics.log)
 
     def _for(self, role: Role, handler: Handler) -> Callable[[Request], Awaitable[Response]]:
-        """Wrap a handler so that only researchers with at least this role reach it."""
-
         async def endpoint(request: Request) -> Response:
             who = await self._access.who(request)
             if who is None:
@@ -238,28 +228,20 @@ class ResearcherServer:
     async def _audit(self, request: Request, who: Researcher) -> Response:
         return self._page(request, who, "audit", rows=(await self._store.audit_log())[::-1])
 
-    async def _pause(self, request: Request, who: Researcher) -> Response:
-        return await self._set_state(request, who, "open", "paused")
+    def _change(
+        self, role: Role, before: StudyState | None, after: StudyState
+    ) -> Callable[[Request], Awaitable[Response]]:
+        """Return an endpoint that changes the state of the study, if it is still `before`."""
 
-    async def _continue(self, request: Request, who: Researcher) -> Response:
-        return await self._set_state(request, who, "paused", "open")
+        async def change(request: Request, who: Researcher) -> Response:
+            state = (await self._store.study()).state
+            if before is not None and state != before:
+                return self._message(request, 409, "Not changed", f"The study is now {state}.")
+            await self._store.set_state(after, who.name)
+            LOG.info("the study is %s", after)
+            return RedirectResponse("/", 303)
 
-    async def _stop(self, request: Request, who: Researcher) -> Response:
-        return await self._set_state(request, who, None, "closed")
-
-    async def _reopen(self, request: Request, who: Researcher) -> Response:
-        return await self._set_state(request, who, "closed", "open")
-
-    async def _set_state(
-        self, request: Request, who: Researcher, before: StudyState | None, after: StudyState
-    ) -> Response:
-        """Change the state of the study, unless it has changed since the page was shown."""
-        state = (await self._store.study()).state
-        if before is not None and state != before:
-            return self._message(request, 409, "Not changed", f"The study is now {state}.")
-        await self._store.set_state(after, who.name)
-        LOG.info("the study is %s", after)
-        return RedirectResponse("/", 303)
+        return self._for(role, change)
 
     async def _set_quota(self, request: Request, who: Researcher) -> Response:
         form = await sent_form(request)
@@ -278,7 +260,6 @@ class ResearcherServer:
         return next((one for one in await self._store.people() if one.id == number), None)
 
     def _session(self, person: PersonRow) -> PlayedSession | None:
-        """Return the participant's session if it runs on this server."""
         session = self._watched.sessions.under_way.get(person.token_hash)
         return session if session and person.active and session.trial is not None else None
 
@@ -301,5 +282,4 @@ class ResearcherServer:
 
 
 def _described(person: PersonRow) -> str:
-    """Return the text of a participant's row that the search looks at."""
     return f"{person_name(person)} {person.status.replace('_', ' ')} {person.phase}".lower()

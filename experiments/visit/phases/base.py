@@ -28,7 +28,6 @@ class Visitor:
     """Data of the participant that a phase may use.
 
     Attributes:
-        answers: Answers given in this phase so far.
         shown_s: Time since the phase was first shown, in seconds.
         attempts: Number of rejected forms in this phase.
         path: Path of the participant's pages.
@@ -80,13 +79,7 @@ class Phase(Protocol):
 
 
 class FormPhase:
-    """A page with a text, the items of a form and a button.
-
-    Args:
-        plan: Plan of the visit.
-        name: Name of the phase and of its section in the texts.
-        template: Template of its page.
-    """
+    """A page with a text, the items of a form and a button. `name` is also that of its section in the texts."""
 
     def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
         self.name, self._template = name, template

@@ -65,7 +65,6 @@ class DeviceCheck(FormPhase):
 
 
 def _measured(sent: FormData) -> _Measured | None:
-    """Return the measurements of a form, or None if they are not valid."""
     try:
         values = {name: float(sent.get(name, "")) for name in MEASURES}
     except ValueError:

@@ -23,13 +23,7 @@ TOKEN = "token"  # form field with the token that the browser has stored
 
 
 class Admission:
-    """Admits participants to a study.
-
-    Args:
-        procedure: Procedure of the study.
-        pages: Pages of the study.
-        keys: Keys of the study.
-    """
+    """Admits participants to a study."""
 
     def __init__(self, procedure: Procedure, pages: VisitPages, keys: Keys) -> None:
         self._procedure, self._pages, self._keys = procedure, pages, keys
@@ -73,7 +67,6 @@ class Admission:
         return await self._arrive(came)
 
     async def _known(self, came: Candidate) -> PersonRow | None:
-        """Return the participant with this platform id, if they have arrived before."""
         return None if came.key is None else await self._store.find(token_hash(self._keys.token(came.key)))
 
     async def _again(self, request: Request, came: Candidate, person: PersonRow, token: str = "") -> Response:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.middleware import Middleware
-from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
@@ -26,7 +25,7 @@ from experiments.visit.server.trials import Trials
 from experiments.visit.store import Assignment, PersonRow
 from experiments.visit.tokens import TOKEN, Keys, token_hash
 from experiments.web.client_files import scene_route, static_routes
-from experiments.web.server.guards import Guards, Network, allowed_hosts, sent_form
+from experiments.web.server.guards import Network, middleware, sent_form
 from experiments.web.server.player import Meter
 from experiments.web.server.pool import WorkerPool
 from mjsim.formats.gltf.store import scenes_folder
@@ -43,7 +42,6 @@ class ServerOptions:
     Attributes:
         secret: Key for deriving the tokens of participants with a platform id.
         proxies: Proxies whose X-Forwarded-For header is trusted.
-        meter: Receives session metrics.
         host: Name of this host if several share a database, or None.
         workers: Number of concurrent trials, or None to measure the machine's capacity.
         background: Tasks that run as long as the server.
@@ -62,11 +60,7 @@ class _ElsewhereError(Exception):
 
 
 class VisitServer:
-    """Pages and WebSockets of all visits.
-
-    Attributes:
-        sessions: Sessions under way.
-    """
+    """Pages and WebSockets of all visits."""
 
     def __init__(self, procedure: Procedure, pool: WorkerPool, options: ServerOptions) -> None:
         self._procedure, self._options, self._pool = procedure, options, pool
@@ -98,18 +92,13 @@ class VisitServer:
                 scene_route(scenes_folder()),
                 *static_routes(),
             ],
-            middleware=[
-                Middleware(
-                    TrustedHostMiddleware, allowed_hosts=allowed_hosts(host, public), www_redirect=False
-                ),
-                Middleware(
-                    Guards,
-                    public=public,
-                    proxies=self._options.proxies,
-                    max_body=MAX_FORM,
-                    embedded_by=self._plan.recruiter.embedded_by,
-                ),
-            ],
+            middleware=middleware(
+                host,
+                public,
+                self._options.proxies,
+                max_body=MAX_FORM,
+                embedded_by=self._plan.recruiter.embedded_by,
+            ),
             exception_handlers={
                 404: self._unknown,
                 _ElsewhereError: self._elsewhere,
@@ -143,16 +132,10 @@ class VisitServer:
             await self._store.close()
 
     async def _show(self, request: Request) -> Response:
-        person = await self._person(request)
-        if person is None:
-            return self._pages.message(request, "unknown", 404)
-        return await self._show_phase(request, person)
+        return await self._show_phase(request, await self._person(request))
 
     async def _submit(self, request: Request) -> Response:
-        person = await self._person(request)
-        if person is None:
-            return self._pages.message(request, "unknown", 404)
-        form = await sent_form(request)
+        person, form = await self._person(request), await sent_form(request)
         async with self._lock(person):
             now = await self._procedure.now(person, request.url.path)
             refused = await self._procedure.submit(now, str(form.get("phase", "")), form)
@@ -161,27 +144,22 @@ class VisitServer:
         return RedirectResponse(request.url.path, 303)
 
     async def _save(self, request: Request) -> Response:
-        person = await self._person(request)
-        if person is None:
-            return Response(status_code=404)
-        form = await sent_form(request)
+        person, form = await self._person(request), await sent_form(request)
         async with self._lock(person):  # keeps an older answer from replacing a newer one
             now = await self._procedure.now(person, request.url.path)
             await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
 
     async def _ask_to_leave(self, request: Request) -> Response:
-        person = await self._person(request)
-        if person is None or not person.active:
-            return self._pages.message(request, "unknown", 404)
+        if not (await self._person(request)).active:
+            raise HTTPException(404)
         path = f"/play/{request.path_params['token']}"
         return self._pages.show(request, "withdrawal", section=self._plan.texts["withdrawal"], path=path)
 
     async def _leave(self, request: Request) -> Response:
-        person = await self._person(request)
-        if person is None or not person.active:
-            return self._pages.message(request, "unknown", 404)
-        form = await sent_form(request)
+        person, form = await self._person(request), await sent_form(request)
+        if not person.active:
+            raise HTTPException(404)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
             self.sessions.limit.release(person.token_hash)  # its page may have just left the queue
@@ -189,14 +167,15 @@ class VisitServer:
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
     async def _film(self, request: Request) -> Response:
-        if await self._person(request) is None or self._plan.film is None:
+        await self._person(request)
+        if self._plan.film is None:
             return PlainTextResponse("not found\n", 404)
         return FileResponse(self._plan.film, headers=FILM_HEADERS, media_type="video/mp4")
 
     async def _floor_plan(self, request: Request) -> Response:
         person = await self._person(request)
-        folder = None if person is None else self._procedure.folders.find(person.token_hash)
-        if person is None or folder is None or person.phase != RESULT or not folder.floor_plan.is_file():
+        folder = self._procedure.folders.find(person.token_hash)
+        if folder is None or person.phase != RESULT or not folder.floor_plan.is_file():
             return PlainTextResponse("not found\n", 404)
         return FileResponse(folder.floor_plan, media_type="image/png")
 
@@ -255,10 +234,12 @@ class VisitServer:
         """Answer with 404, after which a proxy asks the next host. Without one, the participant sees this page."""
         return self._pages.message(request, "paused", 404)
 
-    async def _person(self, request: Request) -> PersonRow | None:
+    async def _person(self, request: Request) -> PersonRow:
         token = request.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
-        if person is not None and self._host is not None and not await self._host.has(person):
+        if person is None:
+            raise HTTPException(404)
+        if self._host is not None and not await self._host.has(person):
             raise _ElsewhereError
         return person
 

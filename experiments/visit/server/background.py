@@ -20,13 +20,7 @@ CLOCK_SET_S = 30.0  # clock deviation that means the clock was set or the machin
 
 
 class HostOfVisits:
-    """This host, among several with one database.
-
-    Args:
-        name: Unique name of the host.
-        store: Store that records the heartbeats of all hosts.
-        folders: Folders with the journals of this host.
-    """
+    """This host, among several with one database. `name` is unique among them."""
 
     def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
         self._name, self._store, self._folders = name, store, folders

@@ -38,28 +38,13 @@ class VisitPages:
 
     def closed(self, request: Request, name: str) -> Response:
         """Show why the study admits no new participants, by the name of the text."""
-        words, platform = self._plan.texts["welcome"], self._recruiter.platform
-        return self.show(
-            request,
-            "closed",
-            section={"title": words[f"{name}_title"]},
-            paragraphs=[words[name]],
-            completion=self._plan.texts["completion"],
-            back=self._recruiter.way_back("withdrawn", {}),
-            remembers=platform == "link",
-        )
+        remembers = self._recruiter.platform == "link"
+        return self._last(request, "welcome", name, "withdrawn", "closed", remembers=remembers)
 
     def phase(
         self, request: Request, now: PhaseState, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
-        """Show the participant's current phase, unless it is a trial.
-
-        Args:
-            request: The request.
-            now: State of the visit.
-            identity: The platform's ids of the participant.
-            refused: Result of a rejected form.
-        """
+        """Show the participant's current phase, unless it is a trial."""
         if now.phase is None:
             return self.left(request, now.person)
         shown = now.phase.page(now.visitor, refused)
@@ -80,7 +65,6 @@ class VisitPages:
         return self.show(request, "queue", **around, texts=filled, refresh=round(queued.refresh))
 
     def _around(self, now: PhaseState) -> dict[str, Any]:
-        """Return the values that the pages of all phases share."""
         common, name = self._plan.texts["common"], now.phase.name if now.phase else ""
         step = common["step"].replace("{step}", str(now.number))
         section = self._plan.texts.get(name)
@@ -107,13 +91,22 @@ class VisitPages:
         section, text, how = names.get(person.status, ("welcome", "timed_out", "timed_out"))
         return self._last(request, section, text, how)
 
-    def _last(self, request: Request, section: str, text: str, how: Leaving) -> Response:
+    def _last(
+        self,
+        request: Request,
+        section: str,
+        text: str,
+        how: Leaving,
+        template: str = "completion",
+        **values: Any,
+    ) -> Response:
         words = self._plan.texts[section]
         return self.show(
             request,
-            "completion",
+            template,
             section={"title": words[f"{text}_title"]},
             paragraphs=[words[text]],
             completion=self._plan.texts["completion"],
             back=self._recruiter.way_back(how, {}),
+            **values,
         )

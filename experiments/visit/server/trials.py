@@ -53,13 +53,7 @@ class Trials:
     """Trials under way on this server.
 
     Args:
-        procedure: Procedure of the study.
-        pool: Pool of workers.
         workers: Number of concurrent trials, or None to measure the machine's capacity.
-        meter: Receives session metrics.
-
-    Attributes:
-        sessions: Sessions under way.
     """
 
     def __init__(
@@ -122,7 +116,6 @@ class Trials:
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        """Return True if the participant and the address may open one more socket."""
         # All participants may be behind one address. A page that is loaded again has two sockets for a moment.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)

@@ -71,11 +71,8 @@ class Assignments(StorePart):
         :meth:`assignment` instead.
 
         Args:
-            person_id: Number of an active participant.
             cells: Quotas of the study file. :meth:`set_quota` may have changed them.
             rule: Rule for choosing a cell, see :func:`choose`.
-            rng: Random generator for the choice and the participant's seeds.
-            now: Current time, with a timezone.
             abandoned_after: How long a place is held without activity.
 
         Raises:
@@ -116,7 +113,6 @@ class Assignments(StorePart):
             wanted: Quotas of the study file.
             first: First phase. Participants in it are not counted as on their way.
             abandoned_after: Inactivity after which a participant does not count, as in :meth:`assign`.
-            now: Current time, with a timezone.
         """
         since = (now or utc_now()) - abandoned_after
         mine, there = person.c.study_id == self._study_id, person.c.seen >= since
@@ -242,7 +238,6 @@ def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.ran
         counts: Number of participants in each cell.
         quotas: Number of wanted participants of each cell.
         rule: The rule. Ties are broken at random.
-        rng: Random generator.
 
     Returns:
         Index of the cell, or None if all are full.

@@ -201,7 +201,6 @@ class Database:
         return True
 
     async def _persist(self, works: Sequence[Callable[[AsyncConnection], Awaitable[Any]]]) -> Sequence[Any]:
-        """Run work in one transaction, with retries."""
         for attempt in range(1, TRIES + 1):
             try:
                 return await self._transaction(works)

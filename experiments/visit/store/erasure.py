@@ -71,9 +71,7 @@ class Erasure(StorePart):
         Measures, answers and amounts stay. The links no longer work, and the participants could take part again.
 
         Args:
-            person_ids: Numbers of the participants.
             names: New names of their folders in place of the hash of the link, in the same order.
-            who: Author for the audit log.
         """
         now = utc_now()
 

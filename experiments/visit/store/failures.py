@@ -65,6 +65,5 @@ def _meaning(error: DBAPIError) -> str | None:
 
 
 def _codes(error: DBAPIError) -> set[str]:
-    """Return MariaDB's error number and PostgreSQL's state."""
     number = error.orig.args[:1] if error.orig is not None else ()
     return {str(code) for code in (*number, getattr(error.orig, "sqlstate", None))}

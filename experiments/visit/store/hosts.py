@@ -43,8 +43,6 @@ class Hosts(StorePart):
         """Let a host have the trials of a participant. Return True if it has them.
 
         Args:
-            person_id: Number of the participant.
-            name: Name of the host.
             new: True if the host accepts new visits.
             journal: True if the host has the participant's journal.
         """

@@ -42,13 +42,10 @@ class Ledger(StorePart):
         """Record that a payment is owed. Return False if the same payment is recorded already.
 
         Args:
-            person_id: Number of the participant.
             kind: Kind of the payment. A participant gets at most one of `reward`, `screen_out` and `partial`.
             cents: Hundredths of the currency, 0 for a rejection.
             currency: Three-letter code.
             key: Permanent name of the payment, such as `12-reward`, of at most 100 characters.
-            note: Reason.
-            now: Current time, with a timezone.
 
         Raises:
             StoreError: The key is used for another payment, the participant already has one of these kinds, or

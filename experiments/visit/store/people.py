@@ -53,8 +53,6 @@ class People(StorePart):
             identity: The platform's ids, which are stored separately and never exported. An active participant's ids
                 are replaced by those of the last arrival.
             token_hash: SHA-256 of the link's token, hexadecimal.
-            phase: First phase of the study.
-            now: Current time, with a timezone.
         """
         now = now or utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
@@ -62,7 +60,7 @@ class People(StorePart):
         async def work(connection: AsyncConnection) -> PersonRow:
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
-                found = replace(_person(known), returning=True)
+                found = replace(PersonRow(*known), returning=True)
                 if found.active:  # a task that is returned and accepted again has new ids for payment
                     mine = ids.c.person_id == found.id
                     await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
@@ -89,7 +87,7 @@ class People(StorePart):
         async with self._database.reading() as connection:
             found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
             row = found.first()
-            return None if row is None else _person(row)
+            return None if row is None else PersonRow(*row)
 
     async def person(self, person_id: int) -> PersonRow:
         """Return a participant by number. Raises StoreError if there is none."""
@@ -99,13 +97,13 @@ class People(StorePart):
             raise StoreError(
                 f"There is no person {person_id} in this study; `mjsim study` shows the numbers."
             )
-        return _person(row)
+        return PersonRow(*row)
 
     async def people(self, status: Status | None = None) -> tuple[PersonRow, ...]:
         """Return all participants, or those of one status, in order of arrival."""
         query = self._select() if status is None else self._select(person.c.status == status)
         async with self._database.reading() as connection:
-            return tuple(_person(row) for row in await connection.execute(query.order_by(person.c.id)))
+            return tuple(PersonRow(*row) for row in await connection.execute(query.order_by(person.c.id)))
 
     async def identity(self, person_id: int) -> dict[str, str]:
         """Return a participant's platform ids, which are only used for payment. Empty if they are erased."""
@@ -125,7 +123,3 @@ class People(StorePart):
 
     def _select(self, *which: ColumnElement[bool]) -> Any:
         return select(*_FIELDS).where(person.c.study_id == self._study_id, *which)
-
-
-def _person(row: Any) -> PersonRow:
-    return PersonRow(*row)

@@ -75,15 +75,10 @@ class Phases(StorePart):
         Return False if the participant is in another phase (double submission, back button, second tab) or has ended.
 
         Args:
-            person_id: Number of the participant.
-            name: Phase that ends.
-            next_name: Phase that follows.
             answers: Answers by item. They replace saved ones.
             reason: Reason for ending, for phases with several.
             duration_s: Duration in seconds, by default the time since the phase was first shown.
-            attempts: Number of attempts.
             status: Final status that ends the participation too, such as `finished` after the last phase.
-            now: Current time, with a timezone.
         """
         now = now or utc_now()
 

@@ -32,7 +32,6 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
     All methods raise :class:`~experiments.errors.StoreError` if the database fails.
 
     Attributes:
-        ledger: Payments of participants.
         researchers: Accounts of the researcher's page, shared by all studies of a database.
     """
 

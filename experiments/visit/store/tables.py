@@ -82,7 +82,7 @@ def _id() -> Column[int]:
 
 
 def _of(table: str, *, unique: bool = False, index: bool = False) -> Column[int]:
-    """Refers to a row of another table; `index` where no unique constraint begins with the column."""
+    """Return a foreign key. `index` is for tables without a unique constraint that starts with the column."""
     return Column(f"{table}_id", ForeignKey(f"{table}.id"), nullable=False, unique=unique, index=index)
 
 

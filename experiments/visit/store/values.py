@@ -43,8 +43,6 @@ class PersonRow:
 
     Attributes:
         token_hash: SHA-256 of the link's token, hexadecimal. Also the name of the visit's folder.
-        platform: Recruitment platform, such as `link` or `prolific`.
-        phase: Name of the current phase.
         seen: Time of the last activity.
         delete_wanted: True if the participant withdrew and asked for deletion.
         host: Host that has the participant's trials. None if there are no trials yet, or only one host.
@@ -69,12 +67,7 @@ class PersonRow:
 
 @dataclass(frozen=True)
 class Host:
-    """A host of a study with several.
-
-    Attributes:
-        seen: Time of the last heartbeat.
-        draining: True if it accepts no new visits.
-    """
+    """A host of a study with several."""
 
     name: str
     seen: datetime

@@ -105,7 +105,7 @@ class BrowserSocket:
         try:
             await asyncio.wait_for(self._wait_for_place(session), OCCUPIED_TIMEOUT)
         except TimeoutError:
-            self._end(Error("idle", "nobody wanted to continue here"))
+            self._end(Error("idle", "no answer to occupied"))
         session.attach(self, hello.view)
         while True:
             message = await self._receive()
@@ -120,7 +120,6 @@ class BrowserSocket:
         return message
 
     async def _wait_for_place(self, session: PlayedSession) -> None:
-        """Wait until no other page has the session, or this one takes it over."""
         until = time.monotonic() + CLOSE_TIMEOUT
         while (before := session.browser) is not None and before.tab != self.tab:
             if time.monotonic() < until:

@@ -7,11 +7,13 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
-from typing import ClassVar
+from typing import Any, ClassVar
 from urllib.parse import parse_qsl, urlsplit
 
 import h11
 from starlette.datastructures import Headers, ImmutableMultiDict, MutableHeaders
+from starlette.middleware import Middleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -62,6 +64,15 @@ def _own_addresses() -> set[str]:
         except OSError:
             continue  # no network of this address family
     return found
+
+
+def middleware(host: str, public: str | None, proxies: Sequence[Network], **options: Any) -> list[Middleware]:
+    """Return the middleware of a server that listens at `host`. `options` are those of `Guards`."""
+    hosts = allowed_hosts(host, public)
+    return [
+        Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False),
+        Middleware(Guards, public=public, proxies=proxies, **options),
+    ]
 
 
 class Guards:
@@ -174,7 +185,6 @@ async def _whole(receive: Receive) -> Receive | None:
 
 
 def _refusal(scope: Scope, headers: Mapping[str, str], origin: str, max_body: int) -> tuple[int, str] | None:
-    """Return the status and text of a rejection, or None."""
     if not origin:
         return 400, "Invalid host header"
     changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
@@ -239,7 +249,6 @@ class TimedConnection(H11Protocol):
         super().handle_websocket_upgrade(event)
 
     def _watch(self) -> None:
-        """Start the timeout of a request, or stop it if the request is complete."""
         if self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
             self._stop()
         elif self._timer is None:

@@ -32,7 +32,7 @@ from experiments.web.protocol import (
 from experiments.web.server.limit import SessionLimit
 from experiments.web.server.player import LiveTrial, Meter, Player
 from experiments.web.server.pool import WorkerPool, WorkerProcess
-from experiments.web.server.spectators import Spectators
+from experiments.web.server.spectators import Spectator, Spectators
 from experiments.web.state import (
     FAILED,
     LOADING,
@@ -53,29 +53,18 @@ MAX_AHEAD = 1000  # maximum number of unprocessed inputs
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
-class Browser(Protocol):
-    """A connection to a page. Each tab has one."""
+class Browser(Spectator, Protocol):
+    """A connection to a playing page. Each tab has one."""
 
     tab: str
-
-    def send(self, message: WireMessage) -> None:
-        """Queue a message."""
-
-    def close(self, code: int, reason: str) -> None:
-        """Close the connection after the queued messages."""
 
 
 class PlayedSession:
     """The trials of a participant, one after the other.
 
     Attributes:
-        player: The participant.
-        trial: The current trial, or None.
-        browser: The connected browser, or None.
         heard: Time of the person's last activity, as of `time.monotonic`.
-        state: Copy of the worker's state.
         display: Display quality as last reported by the page, or None.
-        spectators: The connected spectators.
     """
 
     def __init__(
@@ -103,9 +92,7 @@ class PlayedSession:
         self._view: View | None = None
         self._taken = self._step = 0  # last input on disk, and next control step
         self._lost = False  # True if a worker died and the browser may not know yet
-        self._came: deque[tuple[int, float]] = deque(
-            maxlen=MAX_AHEAD
-        )  # inputs in memory only, with arrival times
+        self._came = deque[tuple[int, float]](maxlen=MAX_AHEAD)  # unsaved inputs, with arrival times
 
     @property
     def processor_time(self) -> float | None:
@@ -244,7 +231,6 @@ class PlayedSession:
                 self._task = None
 
     async def _play(self, trial: LiveTrial) -> None:
-        """Play a trial to its end, replacing workers that die."""
         crashes, safe = 0, 0
         self._taken = self._step = 0
         self._came.clear()

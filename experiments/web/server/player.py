@@ -11,14 +11,9 @@ class LiveTrial:
     """A trial to be played.
 
     Attributes:
-        phase: Name of the phase, `training` or `task`.
-        journal: Folder of the journal.
         run: Run directory that the trial will become.
-        config: Settings of the trial.
         before: Phases before the trial, as fields of `phase_ended` events.
         leave_at: Time of the monotonic clock from which the participant may end the trial, in seconds. May be infinite.
-        floor_plan: True if the run gets a picture of its paths.
-        language: Language of the HUD.
         texts: Texts that replace those of the HUD in this language.
     """
 

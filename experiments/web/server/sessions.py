@@ -27,11 +27,7 @@ QUOTA = Path(
 
 
 class Capacity:
-    """Estimates how many sessions fit on the machine.
-
-    Args:
-        cores: Number of cores for sessions and server.
-    """
+    """Estimates how many sessions fit on the machine."""
 
     def __init__(self, cores: float) -> None:
         self._cores = cores
@@ -45,7 +41,6 @@ class Capacity:
         """Return the number of sessions that fit, at least one. Call this every few seconds.
 
         Args:
-            sessions: Sessions under way, by name.
             held: Names of the sessions with a slot.
         """
         now = time.monotonic()
@@ -84,9 +79,9 @@ class Sessions:
         meter: Meter | None = None,
         capacity: Capacity | None = None,
     ) -> None:
-        self._pool, self._limit, self._idle = pool, limit, idle
+        self._pool, self.limit, self._idle = pool, limit, idle
         self._meter, self._capacity = meter, capacity
-        self._sessions: dict[str, PlayedSession] = {}
+        self.under_way: dict[str, PlayedSession] = {}  # by the keys of their participants
         self._scenes: dict[str, str] = {}  # URL paths of scenes, by house, as reported by workers
 
     def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:
@@ -94,26 +89,16 @@ class Sessions:
 
         With `as_inputs_come`, its clock follows the inputs instead of real time.
         """
-        if player.key not in self._sessions:
-            self._sessions[player.key] = PlayedSession(
+        if player.key not in self.under_way:
+            self.under_way[player.key] = PlayedSession(
                 player,
                 self._pool,
-                self._limit,
+                self.limit,
                 self._scenes,
                 self._meter,
                 as_inputs_come=as_inputs_come,
             )
-        return self._sessions[player.key]
-
-    @property
-    def under_way(self) -> Mapping[str, PlayedSession]:
-        """Sessions by the keys of their participants."""
-        return self._sessions
-
-    @property
-    def limit(self) -> SessionLimit:
-        """The limit of concurrent sessions, with its queue."""
-        return self._limit
+        return self.under_way[player.key]
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
         """Return the URL path of the scene that a trial's page will probably draw, or None if unknown."""
@@ -124,24 +109,24 @@ class Sessions:
         while True:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
-            learnt = self._capacity and self._capacity.measure(self._sessions, self._limit.held)
-            self._limit.resize(learnt or self._limit.count)
+            learnt = self._capacity and self._capacity.measure(self.under_way, self.limit.held)
+            self.limit.resize(learnt or self.limit.count)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
         """Release the sessions selected by `which`."""
-        for session in [session for session in self._sessions.values() if which(session)]:
+        for session in [session for session in self.under_way.values() if which(session)]:
             if session.browser is not None:
                 session.browser.send(protocol.Error("idle", "nothing was received for a long time"))
                 session.browser.close(protocol.IDLE, "idle")
             await session.release()
-            self._sessions.pop(session.player.key, None)
+            self.under_way.pop(session.player.key, None)
 
     def _is_idle(self, session: PlayedSession) -> bool:
         """Return True if the person is away for too long.
 
         The limit is shorter if the page is closed and others wait.
         """
-        closed = session.browser is None and self._limit.waiting > 0
+        closed = session.browser is None and self.limit.waiting > 0
         return time.monotonic() - session.heard > (min(MAX_AWAY, self._idle) if closed else self._idle)
 
 

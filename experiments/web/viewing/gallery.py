@@ -46,9 +46,7 @@ def write_gallery(
     """Draw the missing homes of a gallery, then its sheets and its page. Return the number of homes that failed.
 
     Args:
-        homes: Houses from `homes_of`.
         out: A new folder, or that of a gallery.
-        workers: Number of homes drawn at a time.
         on_home: Called for each home, with None or an error message.
 
     Raises:
@@ -84,7 +82,6 @@ def write_gallery(
 def _drawn(
     homes: Mapping[str, str], folder: Path, workers: int
 ) -> Iterator[tuple[str, GalleryHome | Exception]]:
-    """Yield each home, or its error, in order of completion."""
     with worker_pool(min(workers, len(homes))) as pool:
         running = {pool.submit(draw_home, name, folder / key): key for key, name in homes.items()}
         for future in as_completed(running):

@@ -40,8 +40,6 @@ class GalleryHome(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Name of the house. A folder keeps the name under which it was given.
-        label: Label for readers.
-        rooms: Number of rooms.
         area: Floor area, in m2.
         pictures: Files of the floor plan and of views at eye height.
         digest: Hash of everything that determines the files.
@@ -119,7 +117,6 @@ def draw_home(name: str, folder: Path) -> GalleryHome:
 
 
 def _draw(house: House, folder: Path) -> tuple[str, ...]:
-    """Write a floor plan and two views, and return their names."""
     compiled, rooms = compiled_house(house.catalogue), house.rooms
     areas = dict.fromkeys(house.viewpoints, 0.0)
     for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
@@ -152,13 +149,7 @@ def _code() -> str:
 
 
 def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
-    """Return the HTML of a self-contained page that shows a home from outside, from above, and on a tour.
-
-    Args:
-        house: The home.
-        scene: Its files, by `mjsim.formats.gltf`.
-        caption: Caption of the page.
-    """
+    """Return the HTML of a self-contained page that shows a home from outside, from above, and on a tour."""
     return run_page(house.catalogue.label, _tour(house), scene, tour=caption)
 
 

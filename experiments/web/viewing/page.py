@@ -113,7 +113,6 @@ def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
 
 
 def _scene(house: House, models: set[str]) -> dict[str, bytes]:
-    """Return the files of a scene by name, restricted to the objects of some models."""
     folder = cached_scene(house.catalogue, scenes_folder())
     found = {}
     for path in sorted(folder.rglob("*.*")):
@@ -130,7 +129,6 @@ def _title(record: Record) -> str:
 
 
 def _packed(value: Any) -> str:
-    """Encode as gzipped JSON in base64."""
     return base64.b64encode(gzip.compress(msgspec.json.encode(value), 9, mtime=0)).decode()
 
 

@@ -24,12 +24,10 @@ class RunRecorder(Viewer):
     """A session viewer that stores what it is shown.
 
     Attributes:
-        time: Time of each control step, in seconds.
         body: Position in metres, heading and pitch in radians, flat, four numbers per control step.
         hands: Positions of the left and right hand in the body's frame in metres, flat, six numbers per control step.
         objects: Changed poses by object: step, position in metres and quaternion wxyz, flat, eight numbers each.
         hud: Step and state without markers, whenever the state changed.
-        markers: All distinct markers.
         shown: Step and indices into `markers`, whenever they changed.
     """
 
@@ -85,7 +83,6 @@ class RunRecorder(Viewer):
             self.shown.append((step, shown))
 
     def _number_of(self, marker: Any) -> int:
-        """Return the index of a marker, adding it if it is new."""
         place = tuple(round(value, DECIMALS) for value in marker.position)
         kept = dataclasses.replace(marker, position=place)
         if kept not in self._number:

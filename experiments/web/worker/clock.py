@@ -87,7 +87,6 @@ class Clock:
         self._acknowledger.request(live.input, session.record.step)
 
     def _follows_at_once(self) -> bool:
-        """Return True if the next control step is due and its inputs have arrived."""
         if self._control.state.phase is not RUNNING:
             return False
         promise = self._control.wait_for_promise(self._live.session.record.step, 0.0)
@@ -133,7 +132,6 @@ class _Acknowledger:
         self._thread.submit(self._acknowledge, number, step)
 
     def check(self) -> None:
-        """Raise the error of a failed sync."""
         if self._error is not None:
             raise self._error
 

@@ -25,12 +25,7 @@ class Promise(NamedTuple):
 
 
 class SessionControl:
-    """Thread-safe queue of inputs, and state machine of a session.
-
-    Args:
-        announce: Called with every new state.
-        now: Clock, in seconds.
-    """
+    """Thread-safe queue of inputs, and state machine of a session. `announce` is called with every new state."""
 
     def __init__(self, announce: Callable[[State], None], now: Callable[[], float] = time.monotonic) -> None:
         self.state = State()

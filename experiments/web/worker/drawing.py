@@ -22,8 +22,6 @@ MAX_IN_FLIGHT = 3  # maximum number of sent frames that are not yet shown
 
 
 class _Moment(NamedTuple):
-    """A state to draw."""
-
     data: Any  # copy of the simulator's data
     markers: tuple[Marker, ...]
     step: int
@@ -31,13 +29,10 @@ class _Moment(NamedTuple):
     hidden: bool  # the clock is stopped, so nothing of the task is shown
 
     def content(self) -> object:
-        """Return everything that the frame depends on."""
         return self.hidden or (self.data.qpos.tobytes(), self.markers)
 
 
 class _Job(NamedTuple):
-    """A frame to draw."""
-
     moment: _Moment
     view: View
     key: bool
@@ -147,7 +142,6 @@ class Drawer:
         )
 
     def _drop(self, moment: _Moment | None) -> None:
-        """Keep the memory of a state for reuse."""
         if moment is not None:
             self._spare.append(moment.data)
 

@@ -45,12 +45,7 @@ MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; about 7 h
 
 
 class InputState(msgspec.Struct):
-    """State of the participant.
-
-    Attributes:
-        controls: Held controls and target angles of the mouse.
-        input: Number of the last input that took effect.
-    """
+    """State of the participant."""
 
     controls: Controls = Controls()
     input: int = 0
@@ -59,11 +54,7 @@ class InputState(msgspec.Struct):
 class BrowserParticipant:
     """The participant of a session with a person.
 
-    Args:
-        world: The world in which the participant acts.
-
     Attributes:
-        state: State of the participant.
         inputs: Inputs for the next control step.
         seen: Observation before the next control step.
     """
@@ -97,18 +88,13 @@ class LiveSession:
 
     Args:
         journal: Journal of all control steps. An empty one starts with `config`.
-        house: House of the trial.
         config: Settings of the trial, or None for those in the journal.
-        viewer: Shown every control step.
         before: Earlier phases, as fields of `phase_ended` events.
-        language: Language of the labels and the HUD.
         texts: Texts of the HUD, or None for those of the language.
 
     Attributes:
         config: Settings of the trial.
         shown: House with labels in the language.
-        world: The world.
-        session: The session.
         resumed: True if an earlier process started it.
 
     Raises:
@@ -190,12 +176,7 @@ class LiveSession:
         self._human.state.controls = Controls()
 
     def step(self, inputs: Sequence[Input]) -> None:
-        """Take a control step. It is durable once the journal is synced.
-
-        Raises:
-            PhysicsError: The physics failed.
-            OSError: The journal cannot be written.
-        """
+        """Take a control step, which is durable once the journal is synced. Raises PhysicsError or OSError."""
         for new in inputs:
             if new.scroll:
                 self.session.scroll(new.scroll)
@@ -204,11 +185,7 @@ class LiveSession:
         self.session.record.commit(self._human.state)
 
     def end(self, reason: str) -> None:
-        """End the session. The run directory can then be made from the journal.
-
-        Raises:
-            OSError: The journal cannot be written.
-        """
+        """End the session. The run directory can then be made from the journal."""
         self.session.end(reason)
         self.session.record.commit(self._human.state)
         self._journal.sync()
@@ -247,10 +224,8 @@ def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan:
     """Make the run directory of a finished or unfinished session, and then its floor plan.
 
     Args:
-        folder: Folder of the journal.
         run: The run directory. Existing parts are kept.
         house: House of the trial, or None to load it.
-        floor_plan: True to draw a floor plan.
 
     Raises:
         RecordError: There is no journal or control step, or the run directory cannot be made.

@@ -116,7 +116,6 @@ class Worker:
         self._send(Saved())
 
     def _play(self, opened: Open, control: SessionControl, config: TrialConfig, house: House) -> None:
-        """Start or resume the session, and return when it is over."""
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
             if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it

@@ -95,7 +95,6 @@ class SnapshotStream:
         )
 
     def _look(self, seen: Observation, step: int) -> None:
-        """Update the objects that the client may know, and how long."""
         self._looked, self._hands = step, seen.hands
         soon = self._potential_visibility.may_see(seen, self._aspect)
         for i in np.flatnonzero(soon).tolist():

@@ -136,7 +136,6 @@ class BrowserViewer(Viewer):
         return Moment(step, clock, room, self._reach(live, seen), state.pointer, state.minimap)
 
     def _reach(self, live: LiveSession, seen: Observation) -> Reach | None:
-        """Return what the action key would do now."""
         result = live.world.answer(act(live.world.answer))
         if not result.applied or result.object is None or (camera := self.camera(live.world)) is None:
             return None

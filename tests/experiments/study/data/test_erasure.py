@@ -123,7 +123,7 @@ def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     said = capsys.readouterr().out
     for path in moved:
         (line,) = (line for line in said.splitlines() if f"{path} of " in line)
-        assert "is not there any more; where it was moved, delete p00002 there" in line
+        assert "is missing; if it was moved, delete p00002 there" in line
     assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
 
 

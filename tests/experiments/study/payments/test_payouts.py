@@ -192,7 +192,7 @@ def test_nobody_is_asked_twice_where_the_secret_is_wrong_or_nobody_answers(paid,
     assert main(paid.words) == 0
     monkeypatch.setenv(paid.platform.variable, "another")
     (sent,) = paid.send().values()
-    assert (sent.state, sent.stops) == ("refused", True) and "with this secret" in sent.text
+    assert (sent.state, sent.stops) == ("refused", True) and "rejects this secret" in sent.text
     for unusable in ("", "a\nb", "é"):
         monkeypatch.setenv(paid.platform.variable, unusable)
         assert main([*paid.words, "--send"]) == 2

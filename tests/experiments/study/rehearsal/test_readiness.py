@@ -78,8 +78,8 @@ def test_a_good_file_has_no_problems(study):
 @pytest.mark.parametrize(
     ("before", "after", "line", "said"),
     [
-        ("people@university.edu", "you@example.org", 19, "somebody answers"),
-        ("A university", "your institution", 18, "name yours"),
+        ("people@university.edu", "you@example.org", 19, "working address"),
+        ("A university", "your institution", 18, "name your institution"),
         ("reward = 2.0", "reward = 2.0\nwage = 15.0", 23, "12.00 an hour, below the wage of 15.00"),
         ("[study.pay]", '[study.recruitment]\nplatform = "prolific"\n[study.pay]', 22, "completed"),
         ("people = 2", "people = 1", 16, "one person"),

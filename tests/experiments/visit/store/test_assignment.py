@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.errors import StoreError
-from experiments.visit.store import CellCount, CellQuota, Store
+from experiments.visit.store import CellQuota, Store
+from experiments.visit.store.values import CellCount
 
 pytestmark = pytest.mark.anyio
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.visit.store import choose
+from experiments.visit.store.assignments import choose
 
 CELLS, PEOPLE = 12, 447
 HOUR = 60.0  # min
