@@ -27,20 +27,20 @@ DATA, RUNS, CODEBOOK = "data", "runs", Path("documentation", "codebook.csv")
 
 Table = Sequence[Mapping[str, Any]]
 OWN = {
-    "participant": "Number of the person, the same in all tables and in the names of runs.",
-    "platform": "Where the person came from.",
-    "status": "How the participation ended, or that it is under way.",
-    "arrived": "When the person began, UTC.",
-    "task_ended": "When the task was over, UTC.",
+    "participant": "Number of the participant, the same in all tables and in the names of runs.",
+    "platform": "Recruitment platform.",
+    "status": "Status of the participation.",
+    "arrived": "Time of arrival, UTC.",
+    "task_ended": "End of the task, UTC.",
     "phase": "Phase of the study.",
-    "order": "Which phase of the person it was, from 1.",
-    "duration_s": "Time from showing the phase first to its end, s; empty where it did not end.",
-    "attempts": "How many answers to the phase were refused.",
-    "reason": "Why a trial or the phase ended.",
-    "item": "Name of what was asked.",
-    "answer": "The answer; scales are numbers from 1 on, several choices are joined by semicolons.",
-    "inattentive": "How many items of the survey with a right answer were answered otherwise.",
-    "text": "What the person wrote freely; a text that a spreadsheet would compute begins with an apostrophe.",
+    "order": "Position of the phase in the visit, from 1.",
+    "duration_s": "Time from first showing the phase to its end, in seconds; empty if it did not end.",
+    "attempts": "Number of rejected forms in the phase.",
+    "reason": "Reason for the end of the phase.",
+    "item": "Name of the item.",
+    "answer": "Answer. Scales are numbers from 1. Several choices are joined by semicolons.",
+    "inattentive": "Number of wrong answers to survey items with a right answer.",
+    "text": "Free-text answer. An apostrophe precedes texts that a spreadsheet would evaluate.",
 }
 
 
@@ -208,15 +208,15 @@ def _readme(study: Study, short: str) -> str:
 
 | what | where |
 |---|---|
-| a row for each person whose task is over | `data/study-{short}_data.csv` |
-| phases of everybody who agreed to take part | `data/study-{short}_description-phases_data.csv` |
-| answers, one a row | `data/study-{short}_description-answers_data.csv` |
-| what people wrote freely; read it before you publish it | `data/study-{short}_description-texts_data.csv` |
+| one row per participant who ended the task | `data/study-{short}_data.csv` |
+| phases of all participants who gave consent | `data/study-{short}_description-phases_data.csv` |
+| answers, one per row | `data/study-{short}_description-answers_data.csv` |
+| free-text answers; read them before you publish them | `data/study-{short}_description-texts_data.csv` |
 | the meaning of each column | `documentation/codebook.csv`, and `dataset_description.json` |
 | journals of trials: `mjsim replay`, `mjsim view` | `runs/PERSON/PHASE/` |
 
-The folder follows Psych-DS. People are numbers; nothing in it comes from a recruiting platform.
-`{INDEX}` lists what was made of it on this computer; delete it before you publish the folder.
+The folder follows Psych-DS. Participants are numbered, and ids of recruitment platforms are left out.
+`{INDEX}` lists files made from this folder on this computer. Delete it before you publish the folder.
 """
 
 
@@ -245,7 +245,7 @@ def _variable(study: Study, name: str, told: Mapping[str, str], items: Mapping[s
         return Variable(name, told[name])
     first, _, rest = name.partition("_")
     if first == "phase" and rest.endswith("_s"):
-        return Variable(name, f"Duration of the phase {rest.removesuffix('_s')}, s.", 0)
+        return Variable(name, f"Duration of the phase {rest.removesuffix('_s')}, in seconds.", 0)
     if first in study.settings.phases:
         return Variable(name, f"{rest}, as given or measured in the phase {first}.")
     if first == "behaviour":

@@ -33,35 +33,37 @@ class ServerMetrics(Meter):
     def __init__(self) -> None:
         registry = self._registry = CollectorRegistry()
         ProcessCollector(registry=registry)
-        self._people = Gauge("mjsim_people", "People by status.", ["status"], registry=registry)
+        self._people = Gauge("mjsim_people", "Participants by status.", ["status"], registry=registry)
         self._places = Gauge(
             "mjsim_places", "Places of cells by state.", ["cell", "state"], registry=registry
         )
         self._sessions = Gauge(
-            "mjsim_sessions", "Sessions under way here, by phase.", ["phase"], registry=registry
+            "mjsim_sessions", "Sessions on this server, by phase.", ["phase"], registry=registry
         )
-        self._capacity = Gauge("mjsim_sessions_capacity", "Sessions that may run here.", registry=registry)
-        self._held = Gauge("mjsim_sessions_held", "Sessions that have a place here.", registry=registry)
+        self._capacity = Gauge(
+            "mjsim_sessions_capacity", "Limit of sessions on this server.", registry=registry
+        )
+        self._held = Gauge("mjsim_sessions_held", "Sessions with a slot on this server.", registry=registry)
         self._waiting = Gauge(
-            "mjsim_sessions_waiting", "Sessions that wait for a place here.", registry=registry
+            "mjsim_sessions_waiting", "Sessions waiting for a slot on this server.", registry=registry
         )
-        self._lost = Counter("mjsim_workers_lost", "Workers that died in a session.", registry=registry)
+        self._lost = Counter("mjsim_workers_lost", "Workers that died during a session.", registry=registry)
         self._faults = Counter("mjsim_log", "Warnings and errors in the log.", ["level"], registry=registry)
         self._inputs = Histogram(
             "mjsim_input_acknowledged_seconds",
-            "From an input to its being safe.",
+            "Time from an input until it is on disk.",
             buckets=LATENCIES,
             registry=registry,
         )
         self._writes = Histogram(
             "mjsim_database_write_seconds",
-            "Of transactions that write.",
+            "Duration of write transactions.",
             buckets=LATENCIES,
             registry=registry,
         )
         self._answers = Histogram(
             "mjsim_http_answer_seconds",
-            "Of participants' requests.",
+            "Response time of participants' requests.",
             ["status"],
             buckets=LATENCIES,
             registry=registry,

@@ -1,4 +1,4 @@
-// The one table of controls: what, default keys, gamepad. Keys are kept in this browser.
+// The table of controls with default keys and gamepad buttons. Changed keys are stored in this browser.
 
 /** @import { Input } from "./protocol.js" */
 
@@ -46,7 +46,7 @@ const NAMED = { PageUp: "page_up", PageDown: "page_down" };
 
 export class Bindings {
   /** @type {Map<string, string[]>} */
-  #keys = new Map(); // name of an action -> codes of its keys
+  #keys = new Map(); // action names -> key codes
 
   constructor() {
     const kept = load(NAME);
@@ -58,7 +58,7 @@ export class Bindings {
   }
 
   /**
-   * The action of a key.
+   * Returns the action of a key.
    * @param {string} code
    */
   action(code) {
@@ -66,7 +66,7 @@ export class Bindings {
   }
 
   /**
-   * Names of an action's keys.
+   * Returns the names of an action's keys.
    * @param {string} name of the action
    */
   label(name) {
@@ -74,7 +74,7 @@ export class Bindings {
   }
 
   /**
-   * Gives an action one key; another action loses it.
+   * Assigns a key to an action. Any other action loses it.
    * @param {Action} action
    * @param {string} code
    */
@@ -91,9 +91,9 @@ export class Bindings {
 }
 
 /** @type {ReadonlyMap<string, string>} */
-let layout = new Map(); // code of a key -> what it types on this keyboard
+let layout = new Map(); // key codes -> characters of this keyboard layout
 
-/** Learns what the keys of this keyboard are called, where the browser tells it. */
+/** Loads the keyboard layout if the browser supports it. */
 export async function learnLayout() {
   const { keyboard } = /** @type {{ keyboard?: { getLayoutMap(): Promise<ReadonlyMap<string, string>> } }} */ (navigator);
   layout = (await keyboard?.getLayoutMap().catch(() => undefined)) ?? layout;
@@ -105,5 +105,5 @@ export function keyName(code) {
   return ARROWS[code] ?? layout.get(code)?.toUpperCase() ?? code.replace(/^(Key|Digit)/, "");
 }
 
-/** What an action is called. @param {Action} action */
+/** Returns the label of an action. @param {Action} action */
 export const actionText = (action) => textOf(`action_${action.name}`);

@@ -1,12 +1,12 @@
-// The WebSocket: reconnects after a failure, numbers inputs, and repeats them until they are taken.
+// The WebSocket: reconnects after a failure, numbers inputs, and repeats them until they are acknowledged.
 
 /** @import { FrameMessage, FromBrowser, Input, ToBrowser } from "./protocol.js" */
 
 import { CODECS, FRAME_HEAD_BYTES, IDLE, KEY_FLAG, MAX_INPUTS, REFUSED, REPLACED, TOO_MUCH } from "./protocol.js";
 
-const FIRST_WAIT = 250; // ms before the first attempt to reconnect
-const MAX_WAIT = 500; // ms; a server that was restarted listens within a second
-const FINAL = new Set([REFUSED, REPLACED, IDLE, TOO_MUCH]); // codes after which the page does not reconnect by itself
+const FIRST_WAIT = 250; // delay before reconnecting, in ms
+const MAX_WAIT = 500; // longest delay before reconnecting, in ms
+const FINAL = new Set([REFUSED, REPLACED, IDLE, TOO_MUCH]); // close codes after which the page does not reconnect automatically
 
 /** @typedef {{ type: "closed", code: number, final: boolean }} Closed */
 /** @typedef {ToBrowser | FrameMessage | Closed} Received */
@@ -16,18 +16,18 @@ export class Connection {
   #socket = null;
   #wait = FIRST_WAIT;
   /** @type {Input[]} */
-  #waiting = []; // inputs that are not taken yet
+  #waiting = []; // unacknowledged inputs
   /** @type {Input[]} */
-  #unsent = []; // of them, those that wait for the end of their control step
+  #unsent = []; // inputs of the current control step
   #next = 1;
-  #open = false; // whether the session takes inputs
+  #open = false; // true while the session accepts inputs
   #heard = performance.now();
   #hello;
   #on;
 
   /**
-   * @param {() => FromBrowser} hello gives the first message
-   * @param {(message: Received) => void} on takes messages
+   * @param {() => FromBrowser} hello returns the first message
+   * @param {(message: Received) => void} on handles messages
    */
   constructor(hello, on) {
     this.#hello = hello;
@@ -48,7 +48,7 @@ export class Connection {
   }
 
   /**
-   * Sends a message; it is lost if there is no connection.
+   * Sends a message, or drops it without a connection.
    * @param {FromBrowser} message
    */
   send(message) {
@@ -56,7 +56,7 @@ export class Connection {
   }
 
   /**
-   * Sends an input, repeatedly until it is taken; one of a control step is sent with the others of that step.
+   * Sends an input, repeatedly until acknowledged. Inputs of one control step are sent together.
    * @param {Omit<Input, "number">} values
    * @returns {Input}
    */
@@ -68,23 +68,23 @@ export class Connection {
     return input;
   }
 
-  /** Sends the inputs of control steps before `until`, of which there are no more. @param {number} until */
+  /** Sends all inputs of control steps before `until`, and promises that there are no more. @param {number} until */
   flush(until) {
     if (!this.#open) return;
     this.send({ type: "inputs", inputs: this.#unsent.splice(0, MAX_INPUTS), until });
   }
 
-  /** Number of inputs that are not safe yet. */
+  /** Number of unacknowledged inputs. */
   get pending() {
     return this.#waiting.length;
   }
 
-  /** For how long nothing has come from the server, ms. */
+  /** Time since the last message from the server, in ms. */
   get silence() {
     return performance.now() - this.#heard;
   }
 
-  /** Closes the connection for good. */
+  /** Closes the connection without reconnecting. */
   close() {
     const socket = this.#socket;
     this.#socket = null;

@@ -1,7 +1,7 @@
 // Elements of the page.
 
 /**
- * The element with an id.
+ * Returns the element with an id.
  * @template {Element} T
  * @param {string} id
  * @param {{new (): T}} kind
@@ -12,7 +12,7 @@ export function byId(id, kind) {
 }
 
 /**
- * The first element that a selector finds.
+ * Returns the first match of a selector.
  * @template {Element} T
  * @param {ParentNode} parent
  * @param {string} selector
@@ -26,7 +26,7 @@ export function within(parent, selector, kind) {
 }
 
 /**
- * A new element with a text.
+ * Returns a new element with a text.
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
  * @param {string} text

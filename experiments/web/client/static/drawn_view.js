@@ -1,4 +1,4 @@
-// The view that this browser draws: the scene, the person's predicted walk, and the server's state of all else.
+// The view drawn by this browser: the scene, the predicted walk, and the server's state of everything else.
 
 /** @import { HeadsetPage } from "./headset.js" */
 /** @import { Thing } from "./drawing/things.js" */
@@ -11,10 +11,10 @@ import { Predictor } from "./prediction/predictor.js";
 import { Walker } from "./prediction/walking.js";
 import { MAX_STEPS_AHEAD } from "./protocol.js";
 
-const MAX_LATE = 1000; // ms that control steps may be behind before they are left out: the page was asleep
-const SNAP = Math.PI / 8; // rad of a turn in calm pictures
+const MAX_LATE = 1000; // delay after which control steps are skipped because the page was suspended, in ms
+const SNAP = Math.PI / 8; // turning step with less motion, in radians
 
-/** @typedef {{ body: ArrayLike<number>, moving: boolean, reach: [number, number] | null }} Drawn what was drawn: the body, whether it moves, and where in the view, in shares, is what E would take */
+/** @typedef {{ body: ArrayLike<number>, moving: boolean, reach: [number, number] | null }} Drawn the drawn body, whether it moves, and the position in the view of the object in reach, as shares */
 
 export class DrawnView {
   calm = false;
@@ -36,13 +36,13 @@ export class DrawnView {
   #newest = null;
   /** @type {Moment["reach"]} */
   #reach = null;
-  #due = 0; // when the next control step ends, ms; 0 while the clock does not run
-  #body = new Float64Array(4); // on show
+  #due = 0; // end of the next control step, in ms; 0 while the clock is stopped
+  #body = new Float64Array(4); // the body on show
 
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {(until: number) => void} flush is called when a control step is over
-   * @param {() => void} lost is called when nothing can be drawn any more
+   * @param {() => void} lost is called when drawing has become impossible
    */
   constructor(canvas, flush, lost) {
     this.world = new World3D(canvas);
@@ -50,23 +50,23 @@ export class DrawnView {
     this.#flush = flush;
   }
 
-  /** Which way the person looks, rad. */
+  /** Heading of the view, in radians. */
   get heading() {
     return this.#body[2] ?? 0;
   }
 
-  /** Loads a house ahead of the server's word; `load` says what went wrong. @param {string} path */
+  /** Preloads a house. `load` reports any error later. @param {string} path */
   prepare(path) {
     const before = this.#house.loaded.catch(() => {});
     this.#house = { path, loaded: before.then(() => this.#loadHouse(path)) };
     this.#house.loaded.catch(() => {});
   }
 
-  /** Loads a house; a page that reconnects, or has another size, has it or is loading it. @param {SceneMessage} message */
+  /** Loads a house, unless it is loaded or loading, as after a reconnect or resize. @param {SceneMessage} message */
   async load(message) {
     const { path } = message;
     if (path === null) throw new Error("the server has no files of it");
-    if (this.#scene) this.world.setObjects((this.#things = {})); // all that may be known comes anew
+    if (this.#scene) this.world.setObjects((this.#things = {})); // the server sends all known objects again
     if (this.#house.path !== path) this.prepare(path);
     await this.#house.loaded;
     const floor = message.floor === null ? null : await fetch(message.floor);
@@ -79,22 +79,22 @@ export class DrawnView {
   /** @param {string} path */
   async #loadHouse(path) {
     const { objects } = await this.world.load((name) => path + name);
-    this.world.loadModels(Object.keys(objects)); // now, so that an object that comes into view is there
+    this.world.loadModels(Object.keys(objects)); // ahead of the moment when they come into view
   }
 
-  /** The clock runs from now on. @param {number} now ms */
+  /** Starts the clock. @param {number} now ms */
   begin(now) {
     this.#due = now + 1000 * this.#duration;
     this.#predictor = null;
   }
 
-  /** The clock is stopped: nothing is predicted. */
+  /** Stops the clock and the prediction. */
   end() {
     this.#due = 0;
     this.#predictor = null;
   }
 
-  /** The control step at which an input of now counts; null while there is none. */
+  /** Control step in which a new input takes effect, or null while the clock is stopped. */
   get step() {
     return this.#predictor?.step ?? null;
   }
@@ -126,7 +126,7 @@ export class DrawnView {
     this.world.setOutline(reach?.instance ?? null);
   }
 
-  /** Takes the control steps that are due, but for those that the server would refuse. @param {number} now ms */
+  /** Takes all due control steps that the server would accept. @param {number} now ms */
   tick(now) {
     const predictor = this.#predictor;
     if (!predictor) return;

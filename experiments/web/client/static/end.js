@@ -1,5 +1,5 @@
-// The visit is over; the first page need not offer to continue it. Where people share a browser, as in a lab, nothing
-// of a person is left in it, settings included.
+// Forgets a visit that is over, so that the first page does not offer to continue it. In a shared browser, as in a
+// lab, it also forgets the settings.
 
 import { forgetAll } from "./store.js";
 import { forgetVisit } from "./visit.js";

@@ -1,4 +1,4 @@
-// The page of `mjsim house gallery`: which homes are listed, and in which order.
+// The page of `mjsim house gallery`, which filters and sorts its homes.
 
 import { byId } from "./dom.js";
 

@@ -4,12 +4,12 @@
 
 import { ACTIONS } from "./bindings.js";
 
-const DEAD = 0.15; // of a stick's way, around its middle
+const DEAD = 0.15; // dead zone around a stick's centre, as a share of its range
 
 /**
  * @param {Inputs} inputs
  * @param {Record<string, () => void>} commands of the page itself
- * @param {() => boolean} listens whether inputs are for the view
+ * @param {() => boolean} listens returns true if inputs are for the view
  */
 export function connectGamepad(inputs, commands, listens) {
   /** @type {boolean[]} */
@@ -18,7 +18,7 @@ export function connectGamepad(inputs, commands, listens) {
 
   const stick = (/** @type {number} */ value) => {
     const beyond = Math.max(0, Math.abs(value) - DEAD) / (1 - DEAD);
-    return Math.round(Math.sign(value) * Math.min(1, beyond) * 20) / 20; // few steps, so that few inputs are sent
+    return Math.round(Math.sign(value) * Math.min(1, beyond) * 20) / 20; // coarse steps, so that few inputs are sent
   };
   const poll = () => {
     const pad = navigator.getGamepads().find((found) => found?.mapping === "standard");

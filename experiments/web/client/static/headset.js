@@ -1,4 +1,4 @@
-// Experimental: joins a page that draws with a headset. The head says where to look, controllers walk and press.
+// Experimental: connects a page that draws with a headset. The head sets the view, and controllers walk and press.
 
 /** @import { Point } from "./drawing/camera.js" */
 /** @import { World3D } from "./drawing/world.js" */
@@ -14,18 +14,18 @@ export class HeadsetPage {
   #inputs;
   #panel = Object.assign(document.createElement("canvas"), { width: 1024, height: 512 });
   /** @type {Headset | null} */
-  #headset = null; // while it is worn
-  #heading = 0; // to which the person was told to turn, rad
+  #headset = null; // null while it is not worn
+  #heading = 0; // requested heading of the person, in radians
   #pitch = 0;
 
-  /** @param {World3D} world @param {Inputs | null} inputs of the session; null where a run is only looked at */
+  /** @param {World3D} world @param {Inputs | null} inputs of the session, or null for a recorded run */
   constructor(world, inputs) {
     this.#world = world;
     this.#inputs = inputs;
   }
 
   /**
-   * Shows a button where there is a headset.
+   * Shows a button if a headset is available.
    * @param {HTMLElement} button
    * @param {() => number} heading of the person, rad
    */
@@ -45,7 +45,7 @@ export class HeadsetPage {
     this.#headset = headset;
   }
 
-  /** Puts the eye somewhere, and takes what head and hands did; false where no headset is worn. @param {Point} eye */
+  /** Places the eye, and handles head and hands. Returns false if no headset is worn. @param {Point} eye */
   place(eye) {
     const [headset, inputs] = [this.#headset, this.#inputs];
     if (!headset) return false;

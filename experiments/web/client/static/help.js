@@ -78,7 +78,7 @@ export class Help {
     const action = this.#changing;
     if (!action) {
       if (this.#bindings.action(event.code)?.name !== "help") return;
-      event.stopPropagation(); // else the view, which listens again, opens the table anew
+      event.stopPropagation(); // otherwise the view handles the key and reopens the table
       return this.hide();
     }
     if (event.code === "Tab") return;

@@ -1,4 +1,4 @@
-// The heads-up display: lists beside the view, and what is over it.
+// The heads-up display: lists next to the view, and elements on top of it.
 
 /** @import { BinEntry, ChecklistItem, HudState, InventorySlot, Moment, Pictures, Reach } from "./protocol.js" */
 
@@ -6,11 +6,11 @@ import { byId, made } from "./dom.js";
 import { drawMap } from "./map.js";
 import { textOf } from "./texts.js";
 
-const CONTEXT = 2; // rows above the current one that stay in sight
-const LATEST = 200; // ms that a moment waits for its frame
+const CONTEXT = 2; // rows kept visible above the current one
+const LATEST = 200; // longest wait of a moment for its frame, in ms
 const SYMBOLS = { info: "ℹ", success: "✓", refusal: "✕" };
 
-/** What is over the view has to fit the frame, so that it waits for it. */
+/** Elements on top of the view wait for the frame that they belong to. */
 export class Hud {
   /** @type {Map<string, HTMLImageElement>} */
   #pictures = new Map();
@@ -19,7 +19,7 @@ export class Hud {
   /** @type {HudState | null} */
   #state = null;
   #key;
-  reach = false; // whether the action key would do something
+  reach = false; // true if the action key would do something
 
   /** @param {() => string} key name of the action key */
   constructor(key) {
@@ -31,7 +31,7 @@ export class Hud {
   learn({ pictures }) {
     for (const [key, address] of Object.entries(pictures)) {
       const image = new Image();
-      image.alt = ""; // the name is beside it
+      image.alt = ""; // the label next to it has the name
       image.src = address;
       this.#pictures.set(key, image);
     }
@@ -48,7 +48,7 @@ export class Hud {
     byId("progress", HTMLElement).textContent = textOf("progress", { count: state.delivered, all: state.total });
     const text = state.message ? `${SYMBOLS[state.message.kind]} ${state.message.text}` : "";
     const bar = byId("message", HTMLElement);
-    if (bar.textContent !== text) bar.textContent = text; // the same text again would be read again
+    if (bar.textContent !== text) bar.textContent = text; // setting the same text would make a screen reader repeat it
     bar.className = state.message?.kind ?? "";
     this.#scroll();
   }
@@ -59,7 +59,7 @@ export class Hud {
     setTimeout(() => this.reached(moment.step), LATEST);
   }
 
-  /** @param {number} step whose frame is on show */
+  /** @param {number} step control step of the shown frame */
   reached(step) {
     const due = this.#waiting.filter((moment) => moment.step <= step);
     this.#waiting = this.#waiting.slice(due.length);
@@ -76,7 +76,7 @@ export class Hud {
     arrow.hidden = !pointer;
     if (pointer) {
       const [x, y] = [Math.cos(pointer.angle), -Math.sin(pointer.angle)];
-      const far = 44 / Math.max(Math.abs(x), Math.abs(y)); // % of the view, to its edge
+      const far = 44 / Math.max(Math.abs(x), Math.abs(y)); // distance to the edge, in % of the view
       arrow.style.left = `${50 + far * x}%`;
       arrow.style.top = `${50 + far * y}%`;
       arrow.style.rotate = `${-pointer.angle}rad`;
@@ -96,7 +96,7 @@ export class Hud {
     this.moveReach(reach.at);
   }
 
-  /** Puts the mark of what is in reach to a place in shares of the view. @param {[number, number] | null} at */
+  /** Moves the mark of the object in reach to a position in shares of the view. @param {[number, number] | null} at */
   moveReach(at) {
     const mark = byId("reach", HTMLElement);
     mark.classList.toggle("away", !at);
@@ -131,7 +131,7 @@ export class Hud {
     );
   }
 
-  /** A row of a list. @param {string | null} picture @param {HTMLElement[]} words */
+  /** Returns a row of a list. @param {string | null} picture @param {HTMLElement[]} words */
   #listed(picture, words) {
     const [row, text] = [made("li", ""), made("span", "")];
     text.append(...words);
@@ -145,7 +145,7 @@ export class Hud {
     return image ? [/** @type {Node} */ (image.cloneNode())] : [];
   }
 
-  /** Follows the current step, and scrolls as the person asked. */
+  /** Scrolls to the current step and by the person's scrolling. */
   #scroll() {
     if (!this.#state) return;
     const list = byId("list", HTMLElement);
@@ -165,7 +165,7 @@ function countText(items) {
   return textOf("next_step", { number: items.length - left + 1, count: items.length });
 }
 
-/** @param {string} text for screen readers alone */
+/** @param {string} text only for screen readers */
 function hidden(text) {
   const element = made("span", text);
   element.className = "hidden";

@@ -3,7 +3,7 @@
 /** @import { Input } from "./protocol.js" */
 /** @import { Axes } from "./bindings.js" */
 
-const PERIOD = 20; // ms between two inputs of mouse and wheel
+const PERIOD = 20; // period of inputs of mouse and wheel, in ms
 /** @type {(keyof Axes)[]} */
 const AXES = ["forward", "left", "turn", "look"];
 const MAX_ANGLE = 7; // rad
@@ -12,7 +12,7 @@ const MAX_SCROLL = 100; // rows
 export class Inputs {
   #on;
   /** @type {Map<string, Axes>} */
-  #held = new Map(); // source, as a key or a stick -> axes
+  #held = new Map(); // sources (keys, sticks) -> axes
   #yaw = 0;
   #pitch = 0;
   #rows = 0;
@@ -25,7 +25,7 @@ export class Inputs {
   }
 
   /**
-   * Sets what a source holds down from now on.
+   * Sets the axes held by a source.
    * @param {string} source a key, a stick or a button on the screen
    * @param {Axes} axes
    */
@@ -74,7 +74,7 @@ export class Inputs {
     this.#timer ??= setTimeout(() => this.send(), PERIOD);
   }
 
-  /** Sends what is held down, and what was collected. @param {Pick<Input, "press">} more */
+  /** Sends the held axes and the collected movement. @param {Pick<Input, "press">} more */
   send(more = {}) {
     clearTimeout(this.#timer);
     this.#timer = undefined;

@@ -1,4 +1,4 @@
-// Keys that are held and pressed in the view.
+// Held and pressed keys of the view.
 
 /** @import { Bindings } from "./bindings.js" */
 /** @import { Inputs } from "./inputs.js" */
@@ -7,7 +7,7 @@
  * @param {Bindings} bindings
  * @param {Inputs} inputs
  * @param {Record<string, () => void>} commands of the page itself: pause, help
- * @param {() => boolean} listens whether keys are for the view
+ * @param {() => boolean} listens returns true if keys are for the view
  */
 export function connectKeyboard(bindings, inputs, commands, listens) {
   window.addEventListener("keydown", (event) => {

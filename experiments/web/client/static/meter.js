@@ -1,11 +1,11 @@
-// How well the person sees: frames a second, times between frames, latency from an input to the frame that shows it,
-// or, where the browser draws, to the state of the server that counts it.
+// Display quality: frame rate, frame times, and latency from an input to the frame that shows it, or, if the browser
+// draws, to the server's state with that input.
 
 /** @import { FrameMessage } from "./protocol.js" */
 
 export class Meter {
   /** @type {Map<number, number>} */
-  #sent = new Map(); // number of an input -> when it was sent, ms
+  #sent = new Map(); // input numbers -> sending times, in ms
   /** @type {number[]} */
   #trips = [];
   /** @type {number[]} */
@@ -13,7 +13,7 @@ export class Meter {
   #shown = 0; // frames
   #came = 0;
   #bytes = 0;
-  #last = 0; // when the last frame was shown, ms
+  #last = 0; // time of the last frame, in ms
   #start = performance.now();
 
   /** @param {number} number of an input */
@@ -33,7 +33,7 @@ export class Meter {
     this.drawn();
   }
 
-  /** The server has counted all inputs up to this number. @param {number} input */
+  /** Records that all inputs up to this number have taken effect. @param {number} input */
   answered(input) {
     const now = performance.now();
     for (const [number, time] of this.#sent) {
@@ -43,14 +43,14 @@ export class Meter {
     }
   }
 
-  /** A picture is shown. */
+  /** Records a shown picture. */
   drawn() {
     const now = performance.now();
     if (this.#shown++) this.#gaps.push(now - this.#last);
     this.#last = now;
   }
 
-  /** What was measured since the last call. */
+  /** Returns the measurements since the last call. */
   take() {
     const now = performance.now();
     const seconds = Math.max(0.001, (now - this.#start) / 1000);

@@ -1,16 +1,16 @@
-// What happens to the page: hidden, left by the keyboard, closed, resized.
+// Events of the page: hidden, focus lost, closed, resized.
 
-const HIDDEN_GRACE = 5000; // ms that the page may be hidden before the session is paused
-const RESIZED = 300; // ms after which a new size of the page is told
+const HIDDEN_GRACE = 5000; // how long the page may be hidden before the session is paused, in ms
+const RESIZED = 300; // delay before a new size of the page is reported, in ms
 
 /**
  * @typedef {object} Reactions
- * @property {() => void} release nothing is held any more
- * @property {() => void} hidden the page was hidden for long
- * @property {(away: boolean) => void} blur the keyboard is elsewhere, or is back
+ * @property {() => void} release release all keys
+ * @property {() => void} hidden the page was hidden for too long
+ * @property {(away: boolean) => void} blur the page lost or regained the focus
  * @property {() => void} close
  * @property {() => void} resize at once
- * @property {() => void} resized once the size stays
+ * @property {() => void} resized once the size is stable
  */
 
 /** @param {HTMLElement} view whose size counts, also where text around it grows @param {Reactions} on */
@@ -34,6 +34,6 @@ export function watchPage(view, on) {
     clearTimeout(resized);
     resized = window.setTimeout(on.resized, RESIZED);
   };
-  window.addEventListener("resize", resize); // also where the screen has other pixels
+  window.addEventListener("resize", resize); // also when the pixel ratio of the screen changes
   new ResizeObserver(resize).observe(view);
 }

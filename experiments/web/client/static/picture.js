@@ -1,4 +1,4 @@
-// The picture of the apartment: drawn by this browser, or frames that the server draws.
+// The picture of the apartment, drawn by this browser or as frames from the server.
 
 /** @import { Codec, Draw, Input, SceneMessage, View } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
@@ -10,31 +10,31 @@ import { Meter } from "./meter.js";
 import { Screen, bestCodec } from "./screen.js";
 
 const DEGREE = Math.PI / 180; // rad
-const SLOWEST = 20; // pictures a second below which the server draws instead
+const SLOWEST = 20; // frame rate below which the server draws instead, in fps
 
 /**
  * @typedef {object} Events
  * @property {(message: View | Draw | { type: "seen", frame: number }) => void} send
- * @property {(until: number) => void} flush sends what counts at the control steps before `until`
- * @property {(step: number) => void} shown the state of this control step is on show
- * @property {() => void} loaded there is something to see
+ * @property {(until: number) => void} flush sends the inputs of control steps before `until`
+ * @property {(step: number) => void} shown the state of this control step is shown
+ * @property {() => void} loaded the first picture is ready
  * @property {(reason: string) => void} failed this browser cannot draw, and the server must not
  */
 
 export class Picture {
   meter = new Meter();
   /** @type {DrawnView | null} */
-  drawn = null; // null where the server draws
+  drawn = null; // null if the server draws
   #wanted;
   #events;
   #screen;
   #told = { width: 0, height: 0 }; // px
   /** @type {Codec} */
   #codec = "jpeg";
-  #degrees = 0; // of the field of view that the person chose; 0 where none was chosen
+  #degrees = 0; // field of view chosen by the person; 0 for the default
   /** @type {number | null} */
-  #chosen = null; // how wide the picture is, rad; null where that cannot be chosen
-  #frame = ""; // what the last frame was
+  #chosen = null; // field of view in radians; null if it cannot be chosen
+  #frame = ""; // description of the last frame
 
   /** @param {string} wanted `auto`, `browser` or `server` @param {Events} events */
   constructor(wanted, events) {
@@ -55,7 +55,7 @@ export class Picture {
     );
   }
 
-  /** Finds out what this browser can do; why it does not draw, or null. @returns {Promise<string | null>} */
+  /** Checks this browser. Returns the reason why it does not draw, or null. @returns {Promise<string | null>} */
   async prepare() {
     this.#codec = await bestCodec();
     if (this.#wanted === "server") return null;
@@ -72,13 +72,13 @@ export class Picture {
     }
   }
 
-  /** What the server is told. @returns {View} */
+  /** Returns the view to request from the server. @returns {View} */
   get view() {
     this.#told = this.#screen.size;
     return { type: "view", ...this.#told, codec: this.drawn ? "none" : this.#codec, ...(this.#degrees && { field_of_view: this.#degrees * DEGREE }) };
   }
 
-  /** What draws, in words; empty before there is anything to see. */
+  /** Name of the renderer; empty before the first picture. */
   get renderer() {
     return this.drawn ? this.drawn.world.info().renderer : this.#frame;
   }
@@ -126,7 +126,7 @@ export class Picture {
     this.meter.sent(input.number);
   }
 
-  /** How well it was seen since the last call; too slow a browser draws no more. */
+  /** Returns the display quality since the last call. A browser that is too slow stops drawing. */
   report() {
     const seen = this.meter.take();
     const slow = seen.frames_per_s < SLOWEST && !document.hidden;
@@ -148,14 +148,14 @@ export class Picture {
     this.#sendView();
   }
 
-  /** Asks for another field of view; the scene that follows says what counts. @param {number} degrees 0 for the usual one */
+  /** Requests another field of view. The next scene confirms it. @param {number} degrees 0 for the default */
   setFieldOfView(degrees) {
     if (degrees === this.#degrees) return;
     this.#degrees = degrees;
     if (this.drawn) this.#sendView();
   }
 
-  /** Offers to choose the field of view, where that is left to the person. @param {SceneMessage} message */
+  /** Shows the choice of the field of view if the study allows it. @param {SceneMessage} message */
   #offer({ field_of_view_range: range, field_of_view: angle }) {
     this.#chosen = range && this.drawn && angle;
     const row = byId("field-of-view", HTMLElement);
@@ -167,7 +167,7 @@ export class Picture {
     output.value = `${input.value}°`;
   }
 
-  /** The server has to know the size, if it has changed. */
+  /** Sends the size to the server if it has changed. */
   tellSize() {
     const { width, height } = this.#screen.size;
     if (width !== this.#told.width || height !== this.#told.height) this.#sendView();

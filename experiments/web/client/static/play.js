@@ -24,18 +24,18 @@ import { Sounds } from "./sounds.js";
 import { textOf } from "./texts.js";
 import { rememberVisit } from "./visit.js";
 
-const DONE = 1500; // ms for which the end of a trial is shown
-const TICK = 20; // ms between two looks at the clock; pages in the background get no pictures to draw
+const DONE = 1500; // how long the end of a trial is shown, in ms
+const TICK = 20; // timer period in ms, since animation frames stop in background pages
 
 const page = byId("play", HTMLElement);
 const { trial = "", objects = "", wait = "0", draw = "auto" } = page.dataset;
-const endable = performance.now() + 1000 * Number(wait); // when the trial may be ended by hand, ms
+const endable = performance.now() + 1000 * Number(wait); // time from which the trial may be ended by hand, in ms
 const canvas = byId("screen", HTMLCanvasElement);
 const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16)).join("-");
 
 const session = new Session();
-let pressed = 0; // number of the last input with a press, on which the server decides
-let silent = false; // whether the link was lost without being closed
+let pressed = 0; // last input with a press, whose effect the server decides
+let silent = false; // true if the server is silent on an open connection
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
   {
@@ -78,7 +78,7 @@ const listens = () => session.phase === "running" && !panel.open && !help.open;
 function take(message) {
   if (silent && message.type !== "closed") {
     silent = false;
-    connection.send({ type: "pause", reason: "silent" }); // the state that follows lets the clock run again
+    connection.send({ type: "pause", reason: "silent" }); // the next state allows the clock to run again
   }
   picture.take(message);
   switch (message.type) {
@@ -102,7 +102,7 @@ function take(message) {
       else if (message.input >= pressed) showBusy("");
       break;
     case "beat":
-      if (session.phase === "running") connection.send({ type: "beat" }); // not by a timer: those of hidden pages are slow
+      if (session.phase === "running") connection.send({ type: "beat" }); // without a timer, which would be slow in hidden pages
       break;
     case "busy":
       showBusy(message.busy ? "hands_moving" : "");
@@ -133,7 +133,7 @@ function take(message) {
   }
 }
 
-/** @param {string} name of the text that says why a key does nothing now, or empty */
+/** @param {string} name of the text that explains why a key has no effect, or empty */
 function showBusy(name) {
   const mark = byId("busy", HTMLElement);
   mark.hidden = !name;
@@ -152,7 +152,7 @@ function drawPicture(now) {
 
 function showState() {
   if (session.phase !== "running") picture.drawn?.end();
-  page.dataset.phase = session.phase; // the style sheet hides what belongs to the task while the clock does not run
+  page.dataset.phase = session.phase; // the style sheet hides the task while the clock is stopped
   switch (session.phase) {
     case "loading":
       panel.show(dialogs.loading(session.interrupted));
@@ -237,7 +237,7 @@ function openHelp() {
 
 byId("panel", HTMLDialogElement).addEventListener("keydown", (event) => {
   if (session.phase !== "paused" || bindings.action(event.code)?.name !== "pause") return;
-  event.stopPropagation(); // else the view, which listens again, pauses anew
+  event.stopPropagation(); // otherwise the view handles the key and pauses again
   run();
 });
 byId("help-button", HTMLElement).addEventListener("click", openHelp);

@@ -6,7 +6,7 @@ import { ACTIONS } from "./bindings.js";
 
 const TURN_PER_PIXEL = 0.0025; // rad
 const TURN_PER_TOUCHED_PIXEL = 0.006; // rad
-const LINE = 40; // px of the wheel for one row
+const LINE = 40; // wheel movement per row, in pixels
 
 /**
  * @param {HTMLCanvasElement} canvas
@@ -21,8 +21,8 @@ export function connectMouse(canvas, inputs, listens, reaches) {
     if ((event instanceof PointerEvent && event.pointerType === "touch") || !listens()) return;
     canvas.focus();
     const locked = document.pointerLockElement === canvas;
-    if (locked || reaches()) inputs.press("act"); // the first click, which captures the mouse, tries nothing in vain
-    // Refused right after Esc; the next click asks again.
+    if (locked || reaches()) inputs.press("act"); // the first click only captures the mouse if nothing is in reach
+    // Browsers refuse this right after Esc. The next click asks again.
     if (!locked) canvas.requestPointerLock?.()?.catch?.(() => {});
   });
   document.addEventListener("mousemove", (event) => {

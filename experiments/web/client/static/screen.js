@@ -1,11 +1,11 @@
-// Shows frames: JPEG, or H.264 where the browser can decode it.
+// Shows frames as JPEG, or as H.264 if the browser can decode it.
 
 /** @import { Codec, FrameMessage } from "./protocol.js" */
 
 const H264 = { codec: "avc1.42E01F", optimizeForLatency: true };
 
 /**
- * The best codec that this browser decodes.
+ * Returns the best codec that this browser decodes.
  * @returns {Promise<Codec>}
  */
 export async function bestCodec() {
@@ -20,15 +20,15 @@ export async function bestCodec() {
 export class Screen {
   #canvas;
   /** @type {CanvasRenderingContext2D | null} */
-  #context = null; // there is none before the first frame: until then the canvas lets through what is below
+  #context = null; // created with the first frame, so that the canvas is transparent before
   #shown;
   #failed;
   /** @type {VideoDecoder | null} */
   #decoder = null;
   /** @type {Map<number, FrameMessage>} */
-  #waiting = new Map(); // number of a frame -> frame, while it is decoded
-  #newest = 0; // number of the frame on show
-  #last = 0; // number of the frame that came last
+  #waiting = new Map(); // frames being decoded, by number
+  #newest = 0; // number of the shown frame
+  #last = 0; // number of the last received frame
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -41,7 +41,7 @@ export class Screen {
     this.#failed = failed;
   }
 
-  /** The size of the canvas, device pixels. */
+  /** Size of the canvas, in device pixels. */
   get size() {
     const box = this.#canvas.getBoundingClientRect();
     const scale = window.devicePixelRatio || 1;
@@ -59,7 +59,7 @@ export class Screen {
 
   /** @param {FrameMessage} frame */
   async show(frame) {
-    if (frame.number <= this.#last) this.reset(); // numbers begin anew with every view
+    if (frame.number <= this.#last) this.reset(); // numbers restart with every view
     this.#last = frame.number;
     if (frame.codec === "h264") this.#decode(frame);
     else this.#draw(await createImageBitmap(new Blob([frame.data], { type: "image/jpeg" })), frame);

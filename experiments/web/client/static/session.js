@@ -1,4 +1,4 @@
-// A copy of the state of the session, which the worker owns.
+// A copy of the session's state, which the worker owns.
 
 /** @import { Phase, State } from "./protocol.js" */
 
@@ -8,7 +8,7 @@ export class Session {
   /** @type {Phase} */
   phase = "loading";
   reason = "";
-  interrupted = false; // whether the clock ran when the connection or the worker was lost
+  interrupted = false; // true if the clock was running when the connection or worker was lost
 
   /** @param {Pick<State, "phase" | "reason">} state from the server */
   take({ phase, reason }) {
@@ -18,12 +18,12 @@ export class Session {
     this.reason = reason;
   }
 
-  /** The connection is lost: the state is not known until the server sends it. */
+  /** Records that the connection is lost. The state is unknown until the server sends it. */
   lose() {
     this.take({ phase: "loading", reason: "" });
   }
 
-  /** Let the clock run, ahead of the answer of the server; false where it cannot. */
+  /** Starts the clock before the server confirms it. Returns false if that is not possible. */
   run() {
     const after = TRANSITIONS[this.phase]["run"];
     if (!after) return false;

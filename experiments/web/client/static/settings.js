@@ -1,4 +1,4 @@
-// What a person may choose about picture, mouse and sound; kept in this browser, and the same for all conditions.
+// Settings of picture, mouse and sound, stored in this browser and independent of the condition.
 
 import { load, save } from "./store.js";
 

@@ -1,8 +1,8 @@
-// Values kept in this browser; where it keeps none (private windows), nothing is kept.
+// Values stored in this browser. Private windows may store nothing.
 
 /**
  * @param {string} name
- * @returns {any} null where nothing is kept
+ * @returns {any} null if nothing is stored
  */
 export function load(name) {
   try {

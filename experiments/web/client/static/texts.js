@@ -6,9 +6,9 @@ import { byId } from "./dom.js";
 let texts = null;
 
 /**
- * A text by its name, with values in its places.
+ * Returns a text by its name, with its placeholders filled.
  * @param {string} name
- * @param {Record<string, string | number>} values by the names of the places
+ * @param {Record<string, string | number>} values of the placeholders
  */
 export function textOf(name, values = {}) {
   texts ??= /** @type {Record<string, string>} */ (JSON.parse(byId("texts", HTMLScriptElement).text));

@@ -1,4 +1,4 @@
-// The link of the visit that was started in this browser, kept in this browser only.
+// The link of the visit that was started in this browser, stored only here.
 
 import { load, save } from "./store.js";
 

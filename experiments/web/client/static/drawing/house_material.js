@@ -117,7 +117,7 @@ void main() {
   place.xyz += (centre - cameraPosition) * radius / max(distance(centre, cameraPosition), radius);
   #endif
   #ifndef FLAT
-  // The columns are orthogonal: this is the inverse transpose, but for its length.
+  // The columns are orthogonal, so this is the inverse transpose up to its length.
   vec3 squares = vec3(dot(placed[0], placed[0]), dot(placed[1], placed[1]), dot(placed[2], placed[2]));
   vColour.rgb = lit(vColour.rgb, normalize(mat3(placed) * (normal / squares)), place.xyz);
   #endif

@@ -16,7 +16,7 @@ export class Instances extends InstancedMesh {
     for (const attribute of [this.instanceMatrix, this.#tint]) attribute.setUsage(DynamicDrawUsage);
     this.matrixAutoUpdate = false;
     this.frustumCulled = false;
-    this.boundingSphere = new Sphere(); // else three.js computes one, which is of no use here
+    this.boundingSphere = new Sphere(); // otherwise three.js computes an unused one
     this.empty();
   }
 
@@ -25,7 +25,7 @@ export class Instances extends InstancedMesh {
     this.visible = false;
   }
 
-  /** Past its capacity, nothing is added. @param {Matrix4} pose @param {number} red @param {number} green @param {number} blue @param {number} opacity */
+  /** Adds an instance, unless the capacity is reached. @param {Matrix4} pose @param {number} red @param {number} green @param {number} blue @param {number} opacity */
   put(pose, red, green, blue, opacity) {
     if (this.count === this.instanceMatrix.count) return;
     this.setMatrixAt(this.count, pose);
@@ -34,7 +34,7 @@ export class Instances extends InstancedMesh {
     this.visible = true;
   }
 
-  /** Sends what was added to the graphics card. */
+  /** Uploads the added instances. */
   send() {
     for (const attribute of [this.instanceMatrix, this.#tint]) {
       attribute.clearUpdateRanges();

@@ -1,4 +1,4 @@
-// A line around the object that the action key would take: yellow within dark, so that it shows on any ground.
+// A line around the object in reach of the action key, yellow with dark edges, visible on any background.
 
 import { Group, InstancedBufferGeometry, Mesh, ShaderMaterial, Vector2, Vector3 } from "../vendor/three.js";
 import { AlwaysStencilFunc, KeepStencilOp, NotEqualStencilFunc, ReplaceStencilOp } from "../vendor/three.js";
@@ -7,7 +7,7 @@ import { AlwaysStencilFunc, KeepStencilOp, NotEqualStencilFunc, ReplaceStencilOp
 
 // Passes one after another: where the object is, and two lines outside of that. Widths in CSS px.
 const PASSES = [{ width: 0, colour: [0, 0, 0] }, { width: 4, colour: [0.03, 0.06, 0.2] }, { width: 2.5, colour: [1, 0.86, 0.1] }];
-const STEPS = 12; // directions in which the silhouette is shifted
+const STEPS = 12; // number of directions in which the silhouette is shifted
 const NEARER = 0.04; // m, so that what the object stands on does not cut the line
 const INSIDE = 2; // bit of the stencil where the object itself is seen
 const FIRST = 20; // in the order of drawing: after contact shadows and markers

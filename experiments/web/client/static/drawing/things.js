@@ -15,7 +15,7 @@ export class Things extends Group {
   #models = new Map(); // by name
   /** @type {Map<string, { model: string; object: Group }>} */
   #things = new Map(); // by instance
-  #moved = true; // a shadow has to follow
+  #moved = true; // a shadow needs an update
   #files;
   #read;
   #shadows;
@@ -33,7 +33,7 @@ export class Things extends Group {
     this.#shadows = shadows;
   }
 
-  /** What there is, by instance; an object shows as soon as its model is loaded. @param {Record<string, Thing>} things */
+  /** Sets all objects, by instance. Each appears once its model is loaded. @param {Record<string, Thing>} things */
   async set(things) {
     for (const [instance, { model, object }] of this.#things) {
       if (things[instance]?.model === model) continue;
@@ -57,7 +57,7 @@ export class Things extends Group {
     object.matrixWorldNeedsUpdate = true; // it may have been drawn without its model
   }
 
-  /** Each model is read once. @param {string} name */
+  /** Loads a model once. @param {string} name */
   async model(name) {
     const file = this.#files[name]?.file;
     if (!file) throw new Error(`scene.json has no object model ${name}`);
@@ -83,7 +83,7 @@ export class Things extends Group {
     return this.#things.get(instance ?? "")?.object ?? null;
   }
 
-  /** Puts the shadows under what moved. */
+  /** Moves the shadows of moved objects. */
   update() {
     if (!this.#moved || !this.#shadows) return;
     this.#moved = false;

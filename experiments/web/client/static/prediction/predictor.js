@@ -8,17 +8,17 @@
 import { BODY_SIZE, HEADING, PITCH, X, Y } from "./body.js";
 import { AT_REST, controlStep } from "./controls.js";
 
-const KEPT = 128; // control steps that can be repeated: some 5 s
-const SAME = 1e-6; // m, rad: differences of this size are rounding
-const FADING = 0.1; // s in which a correction shrinks to a third of what is seen
-const TOO_FAR = 1.5; // m from which a correction is shown at once
+const KEPT = 128; // control steps kept for corrections, about 5 s
+const SAME = 1e-6; // tolerance for rounding, in metres and radians
+const FADING = 0.1; // time constant of fading corrections, in seconds
+const TOO_FAR = 1.5; // size from which a correction is not faded, in metres
 const POSE = 4; // numbers: x, y, heading and pitch
 
 /** @typedef {{ body: Float64Array, controls: Controls, inputs: readonly Input[] }} Kept a control step: the state before it, and the inputs that count at it */
 
 export class Predictor {
-  step; // the next control step
-  predicting; // false while only the server knows: a pick or place is under way, or the walk is physics
+  step; // next control step
+  predicting; // false during a pick or place, or if the walk is simulated by physics
   #walker;
   #speeds;
   #duration;
@@ -29,7 +29,7 @@ export class Predictor {
   #kept = new Map();
   /** @type {Input[]} */
   #pending = []; // made since the last control step
-  #fading = new Float64Array(POSE); // what was shown minus what is true
+  #fading = new Float64Array(POSE); // shown minus true position
   #drawn = new Float64Array(POSE);
   #ahead = new Float64Array(BODY_SIZE);
 
@@ -47,7 +47,7 @@ export class Predictor {
     this.#body.set(body);
   }
 
-  /** Takes an input that counts at the next control step. @param {Input} input */
+  /** Adds an input for the next control step. @param {Input} input */
   add(input) {
     this.#pending.push(input);
   }
@@ -69,7 +69,7 @@ export class Predictor {
   }
 
   /**
-   * Compares a state of the server with what was predicted, and starts from it where they differ.
+   * Compares a state of the server with the prediction, and continues from it if they differ.
    * @param {number} step that begins with this state
    * @param {ArrayLike<number>} body
    * @param {boolean} busy

@@ -1,9 +1,9 @@
-// Measures what a computer can do, and fills it into the form of the page.
+// Measures the computer and fills the page's form.
 
 import { byId, within } from "../dom.js";
 
-const TRIPS = 5; // to the server and back
-const MEASURED = 1500; // ms in which pictures are counted
+const TRIPS = 5; // number of round trips to the server
+const MEASURED = 1500; // duration of the frame rate measurement, in ms
 const KEY = "KeyW";
 
 const form = byId("device", HTMLFormElement);

@@ -1,10 +1,10 @@
-// Saves the answers of a form as they are given, so that a closed page loses nothing.
+// Saves answers as they are given, so that closing the page loses nothing.
 
 import "../wait.js";
 
 import { rememberVisit } from "../visit.js";
 
-const PAUSE = 500; // ms after the last key before a text is saved
+const PAUSE = 500; // delay after the last key before a text is saved, in ms
 
 rememberVisit();
 

@@ -1,4 +1,4 @@
-// Asks again and again whether a place is free, so that what somebody reads stays; without scripts the page loads itself.
+// Polls for a free place and updates the text in place. Without scripts, the page reloads itself.
 
 import { byId } from "../dom.js";
 
@@ -6,7 +6,7 @@ const queue = byId("queue", HTMLElement);
 const period = 1000 * Number(queue.dataset["refresh"]);
 
 async function ask() {
-  const answer = await fetch(location.pathname).catch(() => null); // the server may be away for a moment
+  const answer = await fetch(location.pathname).catch(() => null); // the server may be restarting
   if (answer?.ok) {
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     const now = page.getElementById("queue");

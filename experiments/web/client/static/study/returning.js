@@ -1,4 +1,4 @@
-// Offers to continue where this browser has the link of a visit, which shows the server who asks.
+// Offers to continue if this browser has the link of the visit, which proves the identity.
 
 import { byId, within } from "../dom.js";
 import { lastVisit } from "../visit.js";

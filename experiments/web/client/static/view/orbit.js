@@ -2,7 +2,7 @@
 
 const FOV = (50 * Math.PI) / 180;
 const NARROW = (20 * Math.PI) / 180; // from far away, so that walls hide little of the floor
-const TURN = 0.006; // rad a pixel
+const TURN = 0.006; // radians per pixel
 /** @type {Record<string, [number, number, number]>} as of a drag and a wheel, px */
 const KEYS = { ArrowLeft: [-30, 0, 0], ArrowRight: [30, 0, 0], ArrowUp: [0, 30, 0], ArrowDown: [0, -30, 0], "+": [0, 0, -100], "-": [0, 0, 100] };
 const [LOWEST, HIGHEST] = [0.1, 1.5]; // rad above the horizon
@@ -57,7 +57,7 @@ export class Orbit {
     return { position: [x + out * Math.cos(this.#azimuth), y + out * Math.sin(this.#azimuth), z + height], target: [x, y, z], fovy: FOV };
   }
 
-  /** Turns or comes nearer; whether the key is for that. @param {string} key */
+  /** Turns or zooms. Returns true if the key is for the camera. @param {string} key */
   key(key) {
     this.#turn(...(KEYS[key] ?? [0, 0, 0]));
     return key in KEYS;

@@ -18,12 +18,12 @@ export class Run {
     this.recorded = recorded;
   }
 
-  /** How long it lasts, s. */
+  /** Duration, in seconds. */
   get duration() {
     return this.recorded.time.at(-1) ?? 0;
   }
 
-  /** The control step under way at a time, and the share of it that is over. @param {number} time s */
+  /** Returns the control step at a time, and the elapsed share of it. @param {number} time s */
   at(time) {
     const times = this.recorded.time;
     const step = Math.max(0, lastUpTo(time, times.length, (i) => times[i]));
@@ -66,7 +66,7 @@ export class Run {
     return valueAt(this.recorded.shown, step).map((index) => /** @type {Marker} */ (this.recorded.markers[index]));
   }
 
-  /** The plan that was followed at a time. @param {number} time s */
+  /** Returns the current plan at a time. @param {number} time s */
   plan(time) {
     return this.recorded.plans.findLast((plan) => plan.t <= time);
   }
