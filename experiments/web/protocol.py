@@ -1,7 +1,7 @@
 """Messages between browser, server and worker (docs/protocol.md).
 
-A message is an object whose `type` is the lower-case name of its class. Messages between browser and server are JSON,
-except binary frames. Messages between server and worker are MessagePack. The server forwards most of them.
+A message is an object whose `type` is the tag of its class. Messages between browser and server are JSON, except
+binary frames. Messages between server and worker are MessagePack. The server forwards most of them.
 """
 
 import struct

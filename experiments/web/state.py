@@ -46,7 +46,7 @@ TRANSITIONS: Mapping[tuple[SessionPhase, Trigger], SessionPhase] = {
 
 
 class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """A message. Its `type` is the lower-case name of its class."""
+    """A message. Its `type` is its tag, by default the lower-case name of its class."""
 
 
 class State(WireMessage, frozen=True):

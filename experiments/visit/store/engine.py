@@ -182,10 +182,7 @@ class Database:
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
-        """Run work in one transaction and set its futures.
-
-        Return False if nothing was written and no future was set.
-        """
+        """Write a group in one transaction. Return False if its members must be written one by one."""
         try:
             results = await self._persist([work for work, _ in group])
         except Exception as error:
