@@ -170,7 +170,7 @@ def test_a_german_display_has_no_english_word(name):
         "Mehr können Sie"
     )
     if name == "optimal":
-        assert state.checklist[3].detail.startswith("Hinein: ") and state.checklist[4].detail.startswith(
+        assert state.checklist[3].detail.startswith("Ablegen: ") and state.checklist[4].detail.startswith(
             "Aufheben ·"
         )
     frame = np.zeros((480, 640, 3), np.uint8)
