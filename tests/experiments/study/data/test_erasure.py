@@ -124,7 +124,7 @@ def test_a_copy_that_was_moved_is_named(served, tmp_path, capsys):
     for path in moved:
         (line,) = (line for line in said.splitlines() if f"{path} of " in line)
         assert "is missing; if it was moved, delete p00002 there" in line
-    assert f"the runs of p00002 are not here; delete visits/{'b' * 64}" in said
+    assert f"the runs of p00002 are not on this machine; delete visits/{'b' * 64}" in said
 
 
 def test_another_person_with_the_same_number_stays_in_a_backup(served, tmp_path):

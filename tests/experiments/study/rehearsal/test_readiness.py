@@ -185,7 +185,7 @@ def test_a_dry_run_finds_a_phase_that_takes_anything(study, tmp_path, monkeypatc
         _Sloppy(plan_of(study), "survey") if p.name == "survey" else p for p in phases_of(plan_of(study))
     ]
     walked, _ = _walked(study, tmp_path, monkeypatch, phases)
-    assert "survey takes a form that it should refuse" in walked.faults
+    assert "survey accepts a form that it should refuse" in walked.faults
 
 
 @pytest.mark.slow
