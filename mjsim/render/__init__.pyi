@@ -3,7 +3,7 @@ from .context import GlInfo, gl_info
 from .labels import Labels
 from .markers import MarkerLike
 from .pictures import (
-    FloorPlanPicture,
+    FloorPlan,
     largest_scale,
     render_floorplan,
     render_house_map,
@@ -19,7 +19,7 @@ __all__ = [
     "PROFILES",
     "QUALITY",
     "CameraPose",
-    "FloorPlanPicture",
+    "FloorPlan",
     "Frame",
     "GlInfo",
     "Labels",

@@ -140,7 +140,7 @@ def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> ND
 
 
 @dataclass(frozen=True, eq=False)
-class FloorPlanPicture:
+class FloorPlan:
     """An orthographic picture from above. North (+y) is up."""
 
     rgb: NDArray[np.uint8]  # uint8, (height, width, 3), rows from the top
@@ -159,7 +159,7 @@ def render_floorplan(
     data: Any,
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
-) -> FloorPlanPicture:
+) -> FloorPlan:
     """Draw a house from above, without ceilings (geom group 1) and person, within (xmin, ymin, xmax, ymax), m."""
     xmin, ymin, xmax, ymax = bounds
     if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax and pixels_per_metre > 0):
@@ -187,7 +187,7 @@ def render_floorplan(
         drawn = rasteriser.layer(view, hidden=_person_geoms(model), lowest=True)
         rgb = reduced(drawn.colour, rasteriser.size)
         rgb[rasteriser.geometry(view)[0] < 0] = _PAPER
-    return FloorPlanPicture(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
+    return FloorPlan(rgb, (xmin, ymin, xmax, ymax), pixels_per_metre)
 
 
 def _person_geoms(model: Any) -> NDArray[np.bool_]:
