@@ -95,7 +95,7 @@ def test_folders_of_play_are_collected_without_their_links(tmp_path, run, capsys
             shutil.copytree(run, visit / "task")
     out = tmp_path / "table"
     assert main(["study", "collect", "paper", str(tmp_path / "play"), "--out", str(out)]) == 0
-    assert "1 row; without one: 1 under way" in capsys.readouterr().out
+    assert "1 row; participants without a row: 1 under way" in capsys.readouterr().out
     (row,) = read_rows(out / "trials.parquet")
     assert row["delivered"] == 1 and len(row["participant"]) == 9
     assert not [path for path in out.iterdir() if b"a" * 64 in path.read_bytes()]
@@ -125,7 +125,7 @@ def test_a_person_is_erased_from_database_and_files_and_backups_move_the_rest(tm
     moved.mkdir()
     assert main(["study", "restore", str(tmp_path / "backup.db"), str(moved / "study.db")]) == 0
     assert main(["study", "collect", str(study_file), str(moved), "--out", str(tmp_path / "table")]) == 2
-    assert "nobody" in capsys.readouterr().err
+    assert "no participant in" in capsys.readouterr().err
     for path in (*folder.rglob("*"), tmp_path / "backup.db"):
         assert not path.is_file() or b"secret-first" not in path.read_bytes()
     assert not (folder / "visits" / ("f" * 64)).exists()
