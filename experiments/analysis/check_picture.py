@@ -16,8 +16,8 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.views import Drawing
 from mjsim.support.files import replacing
 
-SIDE = 9.0  # longest side of a drawing, inches
-MAX_LINES = 100  # of findings; image viewers refuse longer pictures
+SIDE = 9.0  # longest side of a drawing, in inches
+MAX_LINES = 100  # maximum number of listed findings, because image viewers refuse taller images
 LETTERS_PER_INCH = 13.0
 COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
@@ -79,7 +79,7 @@ _BLUE = "#0072B2"
 
 
 def draw_disorder(path: Path, disorder: Disorder, kinds: Mapping[str, int]) -> None:
-    """Write a PNG. `kinds` has the number of misplaced objects of each kind."""
+    """Write a PNG with charts of the disorder in a set of episodes. `kinds` counts misplaced objects by kind."""
     figure = Figure(figsize=(11, 3.4), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     many, far, which = figure.subplots(1, 3)

@@ -45,7 +45,7 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Block:
-    """Trials under the same circumstances. `rows` are by condition, then by seeds and values of the person."""
+    """Trials that share all circumstances. `rows` has them by condition, then by seeds and person parameters."""
 
     label: str
     rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
@@ -56,11 +56,11 @@ class Difference:
     """Two conditions compared in one metric.
 
     Attributes:
-        means: Mean of the pairs in each condition.
-        difference: Mean of second minus first.
-        interval: 95 % confidence interval of the difference; None for fewer than two pairs.
+        means: Mean over the pairs in each condition.
+        difference: Mean of the second condition minus mean of the first.
+        interval: 95 % confidence interval of the difference, or None for fewer than two pairs.
         effect: Effect size d_z; None, like its interval and p, if the differences do not vary.
-        p: Two-sided p of the paired t test.
+        p: Two-sided p value of the paired t test.
     """
 
     block: str
@@ -76,7 +76,7 @@ class Difference:
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """Read the trials of a batch with two or more conditions by circumstances, in the order of its table."""
+    """Read a batch with two or more conditions. Return its trials grouped by circumstances, in table order."""
     path = folder / f"{NAME}.parquet"
     rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
@@ -108,7 +108,7 @@ def batch_origin(blocks: Sequence[Block]) -> str:
 
 
 def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
-    """Yield a line for each two conditions without the same trials."""
+    """Yield a message for each pair of conditions whose trials do not match."""
     conditions = list(dict.fromkeys(name for block in blocks for name in block.rows))
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
@@ -127,7 +127,7 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """Yield a line for each metric that is unknown in some pairs, then for each that is unknown in all."""
+    """Yield a message for each metric that is unknown in some pairs of trials, or in all of them."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
     for d in differences:
         block = next(block for block in blocks if block.label == d.block)
@@ -144,7 +144,7 @@ def unknown_metrics(
 
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
-    """Compare each two conditions in every metric, on the complete pairs."""
+    """Compare each pair of conditions in every metric. Pairs of trials with an unknown value are left out."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:
@@ -206,7 +206,7 @@ def mean_interval(values: NDArray[np.float64]) -> Interval:
 
 
 def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | None]:
-    """Return d_z, its confidence interval, and the p of the paired t test, from differences (n,)."""
+    """Return d_z, its confidence interval, and the p value of the paired t test of these differences (n,)."""
     count = len(gaps)
     spread = float(gaps.std(ddof=1)) if count > 1 else 0.0
     if spread <= 1e-12 * max(1.0, float(np.abs(gaps).max())):

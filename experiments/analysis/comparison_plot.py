@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from experiments.analysis.comparison import Block, batch_origin, mean_interval
 from mjsim.support.files import replacing
 
-PANEL = (2.6, 2.4)  # size, inches
+PANEL = (2.6, 2.4)  # size of a panel, in inches
 PAIR, MEAN = "#9AA5B1", "#0072B2"
 LABELS = {"ipl_locations": "inverse path length", "nd_feasible": "normalized deviations"}
 UNITS = {"_s": "s", "_m": "m"}
@@ -19,7 +19,7 @@ CAPTION = "grey: a person under each condition; blue: mean and 95 % confidence i
 
 
 def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str]) -> None:
-    """Write a figure with a row of panels per block and a panel per metric. The suffix of `path` selects the format."""
+    """Write a figure with a row of panels per block and a column per metric. The suffix of `path` sets the format."""
     size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.5
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
@@ -74,5 +74,5 @@ def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
 
 
 def mark_origin(figure: Figure, origin: str) -> None:
-    """Write above a figure whether people were simulated."""
+    """Print the origin of the data, such as simulated people, above a figure."""
     figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")

@@ -1,4 +1,4 @@
-"""Power of a study in several homes by the numbers of homes, people and trials.
+"""Power of a study in several homes, as a function of the numbers of homes, people and trials.
 
 The variances come from a mixed model of simulated participants. The design is balanced: conditions have equal numbers
 of people, people have equal numbers of trials, and all conditions share the homes. Effects of a home that all
@@ -33,7 +33,7 @@ class HomesPower:
         trials: Number of trials per person.
         means: Mean by condition.
         variances: Variances of people, of conditions within houses, and of the residual.
-        power: Power by homes, then by people.
+        power: Power with a row per number of homes and a column per number of people.
     """
 
     origin: str
@@ -56,10 +56,10 @@ def homes_power(
     difference: float | None = None,
     alpha: float = 0.05,
 ) -> HomesPower:
-    """Compute the power of all these designs from a pool of people with trials in several homes.
+    """Compute the power for each combination of `homes` and `people` from a pool with trials in several homes.
 
-    The means are those of the pool. With `difference`, the extremes differ by it, and the other means are in the
-    middle.
+    The condition means are those of the pool. With `difference`, the first and the last condition differ by it, and the
+    means of the others are halfway between.
 
     Raises:
         ConfigError: A design is impossible.
@@ -109,16 +109,16 @@ def power_of_design(
 ) -> float:
     """Compute the power of the F test of the conditions, with Satterthwaite's degrees of freedom.
 
-    `people` is the number per condition. At most as many homes are used as a condition has trials.
+    `people` is the number per condition. A condition with fewer trials than homes uses one home per trial.
     """
     count, each = len(means), people * trials
     used = min(homes, each)
     left = variances["residual"]
-    of_people = left + trials * variances["person"]  # this and the next are expected mean squares
+    of_people = left + trials * variances["person"]  # expected mean squares, here and in the next line
     of_homes = left + each / used * variances[SLOPE]
     freedom = count * (people - 1), (count - 1) * (used - 1)
-    rest = max(count * each - sum(freedom) - used, freedom[0])  # at least that, if people share no homes
-    variance = (of_people + of_homes - left) / each  # of a condition's mean, without the shared part
+    rest = max(count * each - sum(freedom) - used, freedom[0])  # residual df; minimum if no home is shared
+    variance = (of_people + of_homes - left) / each  # variance of a condition mean; shared effects cancel
     parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
     df2 = variance**2 * each**2 / float(parts.sum())
     effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance
@@ -126,7 +126,7 @@ def power_of_design(
 
 
 def draw(path: Path, found: HomesPower, measure: str) -> None:
-    """Draw the power by the number of homes, with a line per number of people."""
+    """Plot the power against the number of homes, with a line per number of people."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()

@@ -16,10 +16,10 @@ from experiments.analysis.study.table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
 from experiments.trials.exclusions import LeftOut
 
-RESAMPLES = 200  # of the pool, for the interval
-STUDIES = 400  # drawn from the pool, to check the power
-COVERAGE = 0.9  # of the interval
-MIN_POOL = 10  # people per cell of the pool
+RESAMPLES = 200  # bootstrap resamples of the pool, for the interval of the sample size
+STUDIES = 400  # number of studies drawn from the pool to check the power
+COVERAGE = 0.9  # coverage of the interval of the sample size
+MIN_POOL = 10  # minimum number of people in each cell of the pool
 
 Cell = tuple[str, int]
 Pool = Mapping[Cell, Values]
@@ -31,7 +31,7 @@ class StudyCost:
 
     Attributes:
         fee: Fee of the platform as a share of the pay.
-        dropout: Share of the people who start and do not finish.
+        dropout: Share of people who start but do not finish.
     """
 
     pay: float = 7.5  # PAPER section 7
@@ -48,15 +48,15 @@ class StudyCost:
                 )
 
     def total(self, people: int) -> float:
-        """Return the cost of this number of people who finish."""
+        """Return the total cost if this number of people finish."""
         return people * self.pay * (1 + self.fee)
 
     def hours(self, people: int) -> float:
-        """Return the hours of this number of people who finish, and of those who do not."""
+        """Return the total hours of all participants, including dropouts, if this number of people finish."""
         return self.to_recruit(people) * self.minutes / 60
 
     def to_recruit(self, people: int) -> int:
-        """Return the number of people who must start."""
+        """Return the number of people to recruit so that this number finish."""
         return math.ceil(people / (1 - self.dropout) - 1e-9)
 
 
@@ -104,10 +104,10 @@ class PowerPlan:
 
     Attributes:
         interval: 90 % interval of `per_cell` by resampling the pool; None if it does not depend on the pool.
-        power: Share of studies of that size, drawn from the pool, that detect the effect.
-        power_error: Standard error of that share.
-        people: Number of people who finish, in all cells.
-        to_recruit: Number of people who must start.
+        power: Share of studies of this size, drawn from the pool, that detect the effect.
+        power_error: Standard error of `power`.
+        people: Number of people who must finish, in all cells.
+        to_recruit: Number of people to recruit, including dropouts.
     """
 
     origin: str
@@ -221,7 +221,7 @@ def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
 
 
 def _squares(means: Mapping[Cell, float], effect: str) -> float:
-    """Return the sum of squares of an effect on means, with one person per cell."""
+    """Return the sum of squares of an effect on cell means, as if each cell had one person."""
     values = np.array(list(means.values()))
     first, second = (np.array([cell[k] for cell in means]) for k in (0, 1))
     if len(set(second.tolist())) == 1 or len(set(first.tolist())) == 1:
@@ -235,7 +235,7 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
     for k in range(RESAMPLES):
         try:
             sizes.append(_eta_squared({cell: v[k] for cell, v in drawn.items()}, wanted, draws=2))
-        except StatisticsError:  # the resampled people show no effect
+        except StatisticsError:  # this resample shows no effect
             sizes.append(0.0)
     small, large = np.quantile(sizes, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2], method="nearest").tolist()
     cells, freedom = len(pool), _freedom(pool, wanted.effect)
@@ -250,7 +250,7 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
 
 
 def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
-    """Replace the effects in the pool by the wanted effect only."""
+    """Return the pool with its cells shifted so that the wanted effect is the only one."""
     own = wanted.difference is None and wanted.eta_squared is None
     pattern = _own_pattern(pool, wanted.effect) if own else _pattern(pool, wanted.effect)
     ratio = eta_squared / (1 - eta_squared) * len(pool) * _variance(pool)
@@ -259,7 +259,7 @@ def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
 
 
 def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return means by cell, up to a factor: the extreme levels of one factor, or of both factors crossed."""
+    """Return unscaled cell means: -1 and 1 at a factor's extreme levels, else 0. An interaction is their product."""
 
     def step(cell: Cell, name: str) -> float:
         levels = _levels(pool, name)
@@ -270,7 +270,7 @@ def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
 
 def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return means of the pool's cells without the other effects. Their scale is ignored; chance enlarges it."""
+    """Return what the effect adds to each cell mean of the pool. Only the pattern is used: chance inflates its size."""
     means = {cell: float(v.mean()) for cell, v in pool.items()}
     grand = float(np.mean(list(means.values())))
 

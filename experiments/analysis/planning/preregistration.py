@@ -39,14 +39,14 @@ ANALYSIS = (
     "experiments/trials/exclusions.py",
 )
 CELL = ("assistance", "objects")
-_DATE = (1980, 1, 1, 0, 0, 0)  # of every file, because ZIP requires a date
+_DATE = (1980, 1, 1, 0, 0, 0)  # fixed date of every ZIP entry, so that equal studies give equal bytes
 
 Files = dict[str, bytes]
 
 
 @dataclass(frozen=True)
 class Preregistration:
-    """A frozen study: its files, the SHA-256 of the ZIP, and settings of each trial (`design`)."""
+    """A frozen study. `sha256` is the hash of the ZIP file, and `design` has the settings of each trial."""
 
     files: Mapping[str, bytes]
     sha256: str

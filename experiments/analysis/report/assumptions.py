@@ -15,7 +15,7 @@ from experiments.analysis.statistics.models import residuals_of
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"
-ANALYSES = {  # kind of result -> row of the matrix
+ANALYSES = {  # row of the matrix by kind of result
     ONE_WAY: FISHER,
     TWO_WAY: FISHER,
     "two-way, Type III": "Type III",
@@ -35,7 +35,7 @@ DIAGNOSTIC_HEAD = (
     *("df", "p", "smallest SD (cell)", "largest SD (cell)"),
 )
 SIGNIFICANT = COLOURS[2]
-COLUMN, ROW = 0.11, 0.17  # of the matrix, inches
+COLUMN, ROW = 0.11, 0.17  # width and height of a matrix cell, in inches
 
 
 class Specification(NamedTuple):
@@ -47,7 +47,7 @@ class Specification(NamedTuple):
 
 
 def specification_curve(analysis: Analysis, name: str, label: str) -> FigureBlock | None:
-    """Draw every effect on a measure by every reading and analysis, with the choices below, or return None.
+    """Draw a specification curve: a measure's effects in every reading and analysis. Return None without effects.
 
     Source: Simonsohn, Simmons and Nelson 2020, doi:10.1038/s41562-020-0912-z.
     """
@@ -143,7 +143,7 @@ def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> FigureBlock:
 
 
 def assumptions(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[Block]:
-    """Yield diagnostics, and the decisions of analyses with weaker assumptions."""
+    """Yield tables and figures of diagnostics, then a table of the decisions under weaker assumptions."""
     found = {r.measure: r.value for r in analysis.results if r.kind == "diagnostics" and r.value}
     if not found:
         return

@@ -36,11 +36,11 @@ from mjsim.values.episode import Episode
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
-RASTER_DPI = 200  # of rasterized dots
-PANEL = (3.0, 2.6)  # size, inches
+RASTER_DPI = 200  # resolution of rasterized dots
+PANEL = (3.0, 2.6)  # size of a panel, in inches
 JITTER = 0.12  # relative to the width of a category
-MAX_DOTS = 2000  # more dots than this are rasterized, for a smaller file
-WIDTH = 4.0  # of a panel, inches
+MAX_DOTS = 2000  # number of dots above which they are rasterized to keep the file small
+WIDTH = 4.0  # width of a panel with paths, in inches
 DISTANCE = "distance"
 
 
@@ -112,7 +112,7 @@ def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
 
 
 def answers(analysis: Analysis) -> FigureBlock:
-    """Draw shares of the answers to every survey item by condition, over all numbers of objects."""
+    """Draw the distribution of answers to each survey item by condition, over all numbers of objects."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
@@ -192,7 +192,7 @@ def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: 
 
 
 def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
-    """Draw a panel per condition, for the smallest number of objects, from the run directories in `folder`.
+    """Draw the planned and walked paths of one person per condition, from the run directories in `folder`.
 
     Raises:
         RecordError: `folder` has no run directories of these people.
@@ -214,7 +214,7 @@ def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
 
 
 def median_people(table: StudyTable) -> Iterator[Any]:
-    """Yield, for each condition, the row of the person with the median distance at the smallest number of objects."""
+    """Yield one row per condition: the person with the median distance at the smallest number of objects."""
     if DISTANCE not in table.columns:
         return
     walked, least = table.columns[DISTANCE], table.levels()[0]
@@ -225,7 +225,7 @@ def median_people(table: StudyTable) -> Iterator[Any]:
 
 
 def _run_of(row: Any, folder: Path) -> Path | None:
-    """Find the run directory of a row. Fingerprints identify trials, but people may play the same trial."""
+    """Find a row's run directory, first by participant, because people with the same trial share a fingerprint."""
     visit = folder / str(row.get("participant")) / TASK
     if is_run(visit):
         return visit

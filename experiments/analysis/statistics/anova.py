@@ -12,11 +12,11 @@ from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
 OWN_VARIANCE = "variance, each group in units of its own"
-EFFECTS = ("assistance", "objects", "interaction")  # of a two-way analysis of variance
+EFFECTS = ("assistance", "objects", "interaction")  # effects of a two-way analysis of variance
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Check that there are two groups or more, with at least `least` values each, that vary within groups."""
+    """Check that there are two or more groups of at least `least` values, and that values vary within a group."""
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
@@ -69,7 +69,7 @@ def welch(groups: Mapping[str, Values]) -> FTest:
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
-    """Test for equal variances: an analysis of variance of the distances from the median, without structural zeros.
+    """Test for equal variances by an analysis of variance of the distances from the group medians.
 
     The median fixes one distance in each group: of d1 <= d2 <= ... <= dn, d1 is 0 if n is odd, and equal to d2 if n is
     even. So d2, ..., dn are compared, with (d1 + d2) / sqrt(2) in place of d2 if n is even. With d1, the test would
@@ -125,7 +125,7 @@ class Cells:
     squares: Values
 
     def residual(self, names: Iterable[str]) -> float:
-        """Return the residual sum of squares of a linear model with these effects, without the squares within cells."""
+        """Return the residual sum of squares of the cell means in a linear model with these effects."""
         weights = np.sqrt(self.people)[:, None]
         design = np.hstack([self.columns[name] for name in names]) * weights
         wanted = self.means * weights[:, 0]
@@ -159,7 +159,7 @@ def _sum_coded(levels: int) -> Values:
 
 
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
-    """Compute an analysis of variance of two crossed factors with unequal numbers of people, by name of `EFFECTS`.
+    """Compute a two-way analysis of variance with unequal numbers of people per cell. Keys are those in `EFFECTS`.
 
     Values and factors have shape (n,). `kind` is the type of the sums of squares, 2 or 3.
 
@@ -222,7 +222,7 @@ def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any])
 def hc3(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
     """Compute F tests with the heteroscedasticity-consistent covariance HC3 of the linear model with all effects.
 
-    In a model with a mean per cell, the covariance is the variance of each cell over its number of people less one.
+    In a model with a mean per cell, the covariance is each cell's variance divided by its number of people minus 1.
     Arguments are as in `welch_james`. Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
     """
     return _tests(values, assistance, objects, 1, lambda statistic, q, _: (statistic / q, None))
@@ -240,7 +240,7 @@ def _tests(
     fewer: int,
     scaled: Callable[[float, int, Values], tuple[float, float | None]],
 ) -> dict[str, FTest]:
-    """Compute Wald tests of each effect. The variance of a cell's mean is its variance over its people less `fewer`."""
+    """Compute a Wald test of each effect. A cell mean has the variance of its cell divided by (people - `fewer`)."""
     cells = cells_of(values, assistance, objects)
     if cells.people.min() < 2:
         raise StatisticsError("a cell has only one person; its variance is unknown")
@@ -258,7 +258,7 @@ def _tests(
 
 
 def _contrasts(cells: Cells) -> dict[str, Values]:
-    """Return matrices (q, cells) by effect that map cell means to its parameters."""
+    """Return a matrix (q, cells) per effect that maps the cell means to the effect's q parameters."""
     rows = np.asarray(np.linalg.inv(np.hstack(list(cells.columns.values()))), float)
     found, start = {}, 0
     for effect, block in cells.columns.items():

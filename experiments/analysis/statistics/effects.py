@@ -65,9 +65,9 @@ class FTest:
         return found[0] / (found[0] + self.people), found[1] / (found[1] + self.people)
 
     def p_of_equivalence(self, bound: float) -> float:
-        """Return the probability of such an F or a smaller one if partial eta squared were `bound`.
+        """Return the p value of an equivalence test: below .05, partial eta squared is smaller than `bound`.
 
-        Below .05, partial eta squared is smaller. Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
+        It is the probability of an F this small at the bound. Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
         """
         return float(ncfdtr(self.df1, self.df2, self.people * bound / (1.0 - bound), self.statistic))
 
@@ -83,8 +83,8 @@ def partial_eta_squared(statistic: float, df1: float, df2: float) -> float:
 def hedges_g(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float | None, Interval | None]:
     """Return the bias-corrected standardized difference of means, second minus first, and its 95 % interval.
 
-    Groups have shapes (n,) and (m,). The interval is by the noncentral t. Both are None if undefined. Source: Hedges
-    1981, doi:10.3102/10769986006002107.
+    Groups have shapes (n,) and (m,). The interval inverts the noncentral t distribution. Both are None if undefined.
+    Source: Hedges 1981, doi:10.3102/10769986006002107.
     """
     n, m = len(first), len(second)
     freedom = n + m - 2
@@ -153,15 +153,15 @@ def _both(bound: Callable[[float], float | None], confidence: float) -> Interval
 def _root(excess: Callable[[float], float], low: float, high: float) -> float | None:
     try:
         return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
-    except ValueError:  # scipy returned NaN for a value in between
+    except ValueError:  # scipy returned NaN inside the range
         return None
 
 
 def power_of(eta_squared: float, df1: int, df2: float, people: int, alpha: float = ALPHA) -> float:
     """Return the probability that an F test detects an effect of this partial eta squared.
 
-    The noncentrality is people eta squared / (1 - eta squared). Source: Cohen 1988, Statistical Power Analysis for the
-    Behavioral Sciences, chapter 8.
+    The noncentrality is people * eta_squared / (1 - eta_squared). Source: Cohen 1988, Statistical Power Analysis for
+    the Behavioral Sciences, chapter 8.
     """
     critical = f.ppf(1.0 - alpha, df1, df2)
     return float(ncf.sf(critical, df1, df2, people * eta_squared / (1.0 - eta_squared)))
@@ -175,7 +175,7 @@ def detectable_eta_squared(df1: int, df2: float, people: int, power: float = POW
 def people_per_cell(
     eta_squared: float, df1: int, cells: int, power: float = POWER, alpha: float = ALPHA
 ) -> int:
-    """Return the smallest number of people in each of `cells` equal cells with which a test has a power."""
+    """Return the smallest number of people per cell with which a test of `cells` equal cells reaches `power`."""
 
     def enough(people: int) -> bool:
         return power_of(eta_squared, df1, cells * (people - 1), cells * people, alpha) >= power

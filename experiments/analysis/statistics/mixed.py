@@ -20,7 +20,7 @@ BATCH = 100  # resamples in memory at a time
 
 @dataclass(frozen=True)
 class WaldTest:
-    """A Wald F test of a model's term, with Satterthwaite's degrees of freedom of the error."""
+    """A Wald F test of a model's term, with Satterthwaite's degrees of freedom for the error."""
 
     statistic: float
     df1: int
@@ -35,8 +35,7 @@ class RandomFactor:
     Attributes:
         variance: Variance between levels, in squared units of the measure.
         share: Share of the variance within conditions, from 0 to 1.
-        interval: 95 % interval of the share, by the profile of the restricted likelihood; None in models with a
-            covariate.
+        interval: 95 % profile likelihood interval of the share, or None in models with a covariate.
     """
 
     levels: int
@@ -47,7 +46,7 @@ class RandomFactor:
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A linear model with crossed random factors. Tests are by effect, those of a covariate last."""
+    """A linear model with crossed random factors. `tests` has a test per effect, with those of a covariate last."""
 
     tests: Mapping[str, WaldTest]
     random: Mapping[str, RandomFactor]
@@ -113,7 +112,7 @@ def _with_covariate(name: str, values: Values, conditions: Values) -> dict[str, 
 
 @dataclass(frozen=True)
 class HouseDifference:
-    """Difference of means, second less first, with a 95 % interval by resampling houses with all their trials."""
+    """Difference of means, second minus first, with a 95 % interval by resampling houses with all their trials."""
 
     first: str
     second: str

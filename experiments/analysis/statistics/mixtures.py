@@ -17,7 +17,7 @@ from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper one, people of a kind hardly differ
+PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, people of the same kind hardly differ
 STARTS = 10  # random starting points, in addition to those from the data and from the fit of fewer kinds
 
 Counts = NDArray[np.int64]
@@ -25,11 +25,11 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Mixture:
-    """A fitted mixture of k kinds, by falling mean acceptance rate.
+    """A fitted mixture of k kinds, in descending order of mean acceptance rate.
 
     Attributes:
-        precisions: a + b of the Beta distributions, (k,); the larger, the more alike people of a kind are.
-        bic: Schwarz's criterion; smaller is better.
+        precisions: a + b of each Beta distribution, (k,). The higher it is, the more similar people of the kind are.
+        bic: Schwarz's criterion. Smaller is better.
     """
 
     shares: tuple[float, ...]
@@ -40,9 +40,9 @@ class Mixture:
 
 
 def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
-    """Fit mixtures of one to three kinds by maximum likelihood, to accepted visits and all visits of each person, (n,).
+    """Fit mixtures of one to three kinds by maximum likelihood. The best mixture by BIC comes first.
 
-    The best mixture by BIC comes first.
+    `accepted` and `visits`, (n,), are each person's numbers of accepted visits and of all visits.
 
     Raises:
         StatisticsError: There are too few people, or the numbers are invalid.
@@ -51,7 +51,7 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
         raise StatisticsError(f"a mixture needs at least {MIN_PEOPLE} people; there are {len(accepted)}")
     if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
         raise StatisticsError("a number of accepted visits is below 0 or above the number of visits")
-    # Equal people are counted instead of computed repeatedly.
+    # People with equal numbers are one case, whose likelihood is computed once.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
     found: list[Mixture] = []
     for kinds in range(1, MAX_KINDS + 1):
@@ -60,7 +60,7 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
 
 
 def _fit(cases: Counts, people: Counts, kinds: int, fewer: Mixture | None) -> Mixture:
-    """Return the best of several climbs. `cases` has accepted and all visits, (m, 2), `people` their counts, (m,)."""
+    """Return the best fit. `cases` (m, 2) has distinct pairs (accepted, visits), `people` (m,) their frequencies."""
     bounds = [(-8.0, 8.0)] * (2 * kinds - 1) + [PRECISIONS] * kinds
     climbs = [
         minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)

@@ -64,7 +64,7 @@ def _climb(counts: Values) -> tuple[float, Values]:
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     share = counts.sum(axis=0).cumsum()[:-1] / counts.sum()
     point = np.concatenate([logit(share), np.zeros(groups - 1)])
-    # Logit of "at most this answer" by cut and group: the cut less the shift of the group
+    # Logit of "at most this answer" by cut and group: the cut minus the group's shift
     member = np.repeat(np.eye(groups)[:, 1:], cuts, axis=0)
     design = np.hstack([np.tile(np.eye(cuts), (groups, 1)), -member])
     value, gradient, curvature = _likelihood(counts, design, point)
@@ -150,5 +150,5 @@ def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
 
 
 def residuals_of(cells: Mapping[str, Values]) -> Values:
-    """Return values less the mean of their cell, cell by cell, (n,)."""
+    """Return the values minus the mean of their cell, (n,), in the order of cells."""
     return np.concatenate([values - values.mean() for values in cells.values()])

@@ -18,7 +18,7 @@ from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
-TAIL = 1e-18  # probability left out at each end of the distribution of the standard deviation
+TAIL = 1e-18  # probability cut off at each end of the distribution of the sample standard deviation
 WIDEST = 1e4  # upper limit of quantiles of the studentized range
 
 
@@ -27,11 +27,11 @@ class Pair:
     """Two groups compared. p values are two-sided, and None if they cannot be computed.
 
     Attributes:
-        difference: Mean of the second less mean of the first.
+        difference: Mean of the second minus mean of the first.
         interval: 95 % confidence interval of the difference, simultaneous over all pairs (Tukey).
-        holm_p: Welch's t test, corrected over all pairs by Holm's method.
+        holm_p: p value of Welch's t test, corrected over all pairs by Holm's method.
         equivalence_bound: Largest difference that counts as equivalent, in units of the values.
-        equivalence_p: Two one-sided Welch tests; below .05, the difference is smaller than the bound.
+        equivalence_p: p value of two one-sided Welch tests. Below .05, the difference is smaller than the bound.
         verdict: `different` (Tukey), else `equivalent`, else `undecided`.
     """
 
@@ -92,7 +92,7 @@ def _compare(
 
 
 def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool:
-    """Return True if Tukey's test finds a difference of two of several groups at .05. This is faster than its p."""
+    """Return True if two of the groups differ by Tukey's test at .05. This is faster than computing its p value."""
     check_groups(groups)
     if missing := [name for name in (first, second) if name not in groups]:
         raise StatisticsError(f"no people in {missing[0]}")
@@ -108,7 +108,7 @@ def _difference(groups: Mapping[str, Values], first: str, second: str) -> tuple[
 
 
 def tukey_p(statistic: float, groups: int, freedom: float) -> float:
-    """Return the p of a difference of two of several groups, in standard errors, by the studentized range.
+    """Return the p value of Tukey's test for a difference between two of several groups, in standard errors.
 
     Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal numbers of people.
     """
@@ -116,7 +116,7 @@ def tukey_p(statistic: float, groups: int, freedom: float) -> float:
 
 
 def tukey_quantile(groups: int, freedom: float) -> float:
-    """Return the 95 % quantile of the difference of two of several groups, in standard errors."""
+    """Return the critical difference of Tukey's test at .05, in standard errors."""
     return range_quantile(CONFIDENCE, groups, freedom) / math.sqrt(2)
 
 
@@ -126,7 +126,7 @@ def pooled_deviation(groups: Mapping[str, Values]) -> float:
 
 
 def holm(p: Values) -> Values:
-    """Correct p values (n,) for their number.
+    """Correct p values (n,) for multiple comparisons.
 
     Source: Holm 1979, Scandinavian Journal of Statistics 6.
     """
@@ -160,9 +160,9 @@ def range_quantile(share: float, groups: int, freedom: float) -> float:
 
 
 def _deviations(freedom: float) -> tuple[Values, Values]:
-    """Return sample standard deviations for a true one of 1, and their weights in an integral.
+    """Return nodes and weights for integrals over the sample standard deviation, relative to the true one.
 
-    The nodes are spaced by the root of the deviation, in which the density is smooth at 0 for any degrees of freedom.
+    The nodes are placed on the scale of its root, where the density is smooth at 0 for any degrees of freedom.
     """
     low, high = (
         2 * end / freedom for end in (gammaincinv(freedom / 2, TAIL), gammainccinv(freedom / 2, TAIL))

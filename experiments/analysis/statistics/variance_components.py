@@ -20,7 +20,7 @@ STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # starting ratios of vari
 MAX_RATIO = 1e6
 NEWTON_STEPS = 30
 DENSE = 400  # number of levels above which crossproducts are sparse
-PRECISION = 1e-4  # of interval ends
+PRECISION = 1e-4  # precision of interval ends
 
 
 class VarianceComponents:
@@ -42,7 +42,7 @@ class VarianceComponents:
         ends = np.cumsum(self.sizes[order]).tolist()
         self.slices = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
         self.levels = ends[-1]
-        self.start = ends[len(self.nested) - 1]  # first crossed level; the effects come after the levels
+        self.start = ends[len(self.nested) - 1]  # index of the first crossed level; effects follow the levels
         ones, rows = np.ones(len(values)), np.arange(len(values))
         parts = [csr_array((ones, (rows, members[k]))) for k in order]
         columns = hstack([*parts, csr_array(np.column_stack([design, values]))], "csr")
@@ -76,7 +76,7 @@ class VarianceComponents:
     def _check_variances(self) -> None:
         traces = self._traces()[0]
         sizes = traces.diagonal()
-        aliased = sizes.min() <= 1e-13 * self.freedom**2  # with the effects
+        aliased = sizes.min() <= 1e-13 * self.freedom**2  # a factor is aliased with the effects
         if aliased or np.linalg.cond(traces / np.sqrt(np.outer(sizes, sizes))) > 1e8:
             raise StatisticsError("the design cannot distinguish the variances of the random factors")
 
@@ -90,7 +90,7 @@ class VarianceComponents:
         levels, effects = self.levels, slice(-self.effect_count, None)
         self.between = products[:levels, :levels]
         wide = _dense(products[:, self.start :])
-        # Crossed levels and effects, by Henderson's equations.
+        # Solve for crossed levels and effects by Henderson's equations.
         root, one = self._roots(ratios)
         inner = root[:, None] * wide[self.start : -1, :-1] * root
         inner[np.diag_indices(len(root))] += one
@@ -104,7 +104,7 @@ class VarianceComponents:
         self.residual = self.squares / self.freedom
 
     def _roots(self, ratios: Values) -> tuple[Values, Values]:
-        """Return the roots of the ratios of crossed levels, then ones for the effects. Add the identity's diagonal."""
+        """Return the scales of crossed levels and effects in Henderson's equations, and the diagonal to add next."""
         levels = np.repeat(np.sqrt(ratios[self.crossed]), self.sizes[self.crossed])
         ones = np.ones(self.effect_count)
         return np.append(levels, ones), np.append(np.ones(len(levels)), 0.0 * ones)
@@ -155,13 +155,13 @@ class VarianceComponents:
         return float(self.ratios[k] / (1.0 + self.ratios.sum()))
 
     def interval(self, k: int) -> tuple[float, float]:
-        """Return the shares of a factor in the variance that a likelihood ratio test at 5 % does not reject."""
+        """Return the interval of a factor's share of the variance that a likelihood ratio test accepts at 5 %."""
         lowest, limit = self.deviance(self.ratios), float(np.sqrt(chdtri(1, 0.05)))
         others, best, last = np.delete(self.ratios, k), self.share(k), MAX_RATIO / (1.0 + MAX_RATIO)
 
-        @cache  # repeated evaluations would start elsewhere and might change sign
+        @cache  # a second evaluation would start elsewhere and might differ in sign
         def above(share: float) -> float:
-            nonlocal others  # start from those of the last share
+            nonlocal others  # start from the ratios found for the previous share
             if share == best:
                 return -limit
             odds = share / (1.0 - share)
@@ -170,13 +170,13 @@ class VarianceComponents:
                 return self.deviance(np.insert(ratios, k, odds * (1.0 + ratios.sum())))
 
             others, height = self._lowest(of_others, others)
-            return float(np.sqrt(max(height - lowest, 0.0))) - limit  # the root is nearly linear in the share
+            return float(np.sqrt(max(height - lowest, 0.0))) - limit  # the root makes it nearly linear
 
         low = float(brentq(above, 0.0, best, xtol=PRECISION)) if best > 0.0 and above(0.0) > 0.0 else 0.0
         return low, float(brentq(above, best, last, xtol=PRECISION)) if above(last) > 0.0 else 1.0
 
     def test(self, indices: NDArray[np.int64]) -> tuple[float, int, float]:
-        """Test the effects with these indices. Return F and its degrees of freedom.
+        """Test the effects with these indices. Return F, and the degrees of freedom of numerator and denominator.
 
         Source of the degrees of freedom: Fai and Cornelius 1996, doi:10.1080/00949659608811740.
         """
@@ -184,7 +184,7 @@ class VarianceComponents:
         sizes, turn = np.linalg.eigh(block)
         squares = (turn.T @ self.effects[indices]) ** 2 / sizes
         slopes = [(turn.T @ d[np.ix_(indices, indices)] @ turn).diagonal() for d in self._slopes()]
-        gradient = np.array(slopes)  # of `sizes` with respect to the variances, (k, q)
+        gradient = np.array(slopes)  # derivatives of the eigenvalues by the variances, (k, q)
         freedom = 2.0 * sizes**2 / np.einsum("iq,ij,jq->q", gradient, self._variances(), gradient)
         q, statistic = len(indices), float(squares.mean())
         return statistic, q, _joint_freedom(freedom)
@@ -208,13 +208,13 @@ class VarianceComponents:
         traces = np.zeros((len(places), len(places)))
         for k, m in np.ndindex(traces.shape):
             block = self.between[places[k], places[m]]
-            # The squares of a sparse matrix minus a product of narrow matrices.
+            # Sum the squares of a sparse matrix minus a product of narrow matrices without forming the product.
             crossing = float((self.bent[places[k]] * (block @ self.through[places[m]])).sum())
             traces[k, m] = (block**2).sum() - 2.0 * crossing + float((halves[k] * halves[m].T).sum())
         return self._with_residual(traces, single, float(self.freedom)), single
 
     def _with_residual(self, of_factors: Values, single: Values, total: float) -> Values:
-        """Add the residual to traces or quadratic forms of P V_k P V_l, (k, k), using V = 1 + sum of ratios V_k."""
+        """Extend traces or quadratic forms of P V_k P V_l, (k, k), by the residual, with V = 1 + sum of ratio_k V_k."""
         mixed = single - of_factors @ self.ratios
         last = total - self.ratios @ single - self.ratios @ mixed
         return np.block([[of_factors, mixed[:, None]], [mixed[None], np.array([[last]])]])
@@ -255,7 +255,7 @@ def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[
 
 
 def _swept(products: Any, place: slice, ratio: float, *, keep: bool = False) -> tuple[Any, float]:
-    """Eliminate the factor in a slice. Return the crossproducts, its own only if `keep`, and the log determinant."""
+    """Eliminate the factor at `place`, dropping its rows unless `keep`. Return crossproducts and log determinant."""
     block = products[place]
     counts = block[:, place].diagonal()
     shrink = np.zeros(len(counts)) if ratio == 0.0 else 1.0 / (1.0 / ratio + counts)
@@ -272,7 +272,7 @@ def _dense(matrix: Any) -> Values:
 
 
 def _joint_freedom(freedom: Values) -> float:
-    """Return the degrees of freedom of an F whose parts have different ones, (q,)."""
+    """Return the denominator degrees of freedom of an F statistic from those of its q components."""
     if np.ptp(freedom) < 1e-8 * freedom.max():
         return float(freedom.mean())
     expected = float((freedom / (freedom - 2.0))[freedom > 2.0].sum())

@@ -38,7 +38,7 @@ from experiments.errors import StatisticsError
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
 OUT_OF_MEMORY = "not enough memory; analyse fewer trials, or trials with fewer people, houses or conditions"
-STRICT = "nd_strict_2n"  # from which the number of deviations follows, because its denominator is known
+STRICT = "nd_strict_2n"  # measure with a known denominator, which gives the number of deviations
 
 
 Test = FTest | WaldTest | Chi2Test
@@ -46,7 +46,7 @@ Test = FTest | WaldTest | Chi2Test
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """A test or model of a measure, over all numbers of objects if `objects` is None, or the reason for no value."""
+    """A test or model of a measure, or the reason for its absence. If `objects` is None, it covers all numbers."""
 
     measure: str
     kind: str
@@ -126,7 +126,7 @@ def analyse(table: StudyTable, measures: Measures) -> Analysis:
 
 
 def test_results(table: StudyTable, measures: Measures) -> list[AnalysisResult]:
-    """Return all F tests, mixed models and ordinal models, from which `tests_of` yields tests."""
+    """Compute all F tests, mixed models and ordinal models. Pass a result to `tests_of` for its tests."""
     results = []
     for name in table.columns:
         answers = name.startswith(LIKERT_PREFIX)
@@ -222,7 +222,7 @@ def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
     if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
         found["person"] = table.people
         trials = table.numbers("trial_number")
-        # Two levels say nothing about a variance.
+        # Two levels are too few to estimate a variance.
         if len(set(trials.tolist())) > 2 and not np.isnan(trials).any():
             found["trial_number"] = trials
     if houses >= MIN_LEVELS or not found:
@@ -250,9 +250,8 @@ def _acceptance(table: StudyTable) -> list[AnalysisResult]:
         here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
         visits = made[here]
         deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
-        accepted = np.clip(
-            visits - deviations, 0, visits
-        )  # without a column `visits`, dropped objects count as deviations
+        # Without a column `visits`, dropped objects count as deviations.
+        accepted = np.clip(visits - deviations, 0, visits)
         kind = f"acceptance, {condition}"
         results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))
     return results

@@ -33,7 +33,7 @@ def check_files(folder: Path, *, replace: bool) -> None:
 
 
 def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mapping[str, Any]) -> None:
-    """Write all files atomically. `report` is the page, `further` has more entries of the statistics."""
+    """Write each file atomically. `report` is the HTML page, and `further` is added to the statistics."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)

@@ -18,7 +18,7 @@ from experiments.trials.trial_config import SETTINGS
 from mjsim.support.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
-MAX_COLUMNS_SHOWN = 20  # in a sentence
+MAX_COLUMNS_SHOWN = 20  # maximum number of columns named in a message
 _OF_A_TRIAL = re.compile(
     r"(person|behaviour|max|mean|p99)_\w+|simulated(_s)?|fingerprint|participant|releases_settled|ejections|"
     "tunnellings|grips_lost"
@@ -28,13 +28,13 @@ ANSWERS = (1, 5)  # smallest and largest answer of Likert items
 
 
 class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A measure of the paper and its scored column.
+    """A measure of the paper, and the column that is analysed for it.
 
     Attributes:
-        why: Reason for this column.
+        why: Reason for choosing this column.
         range: Valid values of its columns.
         without: Column used instead if `column` has no values.
-        others: Other readings of the measure, which are reported as well.
+        others: Columns with alternative readings of the measure, which are reported too.
     """
 
     label: str
@@ -92,7 +92,7 @@ def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
-    """Return a sentence on columns that are neither measures nor part of a trial's record, or an empty list."""
+    """Return a list with a note that names unrecognized columns, or an empty list."""
     read = {c for m in measures.objective.values() for c in m.columns}
     recorded = (field.name for kind in (Metrics, Displays) for field in fields(kind))
     known = {*read, *SETTINGS, *CIRCUMSTANCES, *recorded}

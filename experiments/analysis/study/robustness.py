@@ -21,7 +21,7 @@ CHANGE_HEAD = (
     *("measure", "test", "effect", "objects", "F or χ²", "without", "p", "without"),
     *("partial η²", "without", "decision"),
 )
-Key = tuple[str, str, str, int | None]  # measure, test, effect, objects
+Key = tuple[str, str, str, int | None]  # measure, test, effect, and number of objects or None for all
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class LeaveOneOut:
 
     Attributes:
         alone: Number of people whom only this rule excludes.
-        changes: Changes of every test without the rule; empty if it excludes no one alone.
-        refused: Why there are no results without the rule, or None.
+        changes: Change of every test without the rule. Empty if the rule alone excludes no one.
+        refused: Reason why there are no results without the rule, or None.
     """
 
     rule: str
@@ -72,7 +72,7 @@ def leave_one_out(
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
-        except RecordError as error:  # without the rule, the table has an invalid value
+        except RecordError as error:  # the rule excludes a row with an invalid value
             refused = str(error)
         found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
     return found
@@ -104,7 +104,7 @@ def _change(key: Key, one: Test | None, other: Test | None) -> Change:
 
 @dataclass(frozen=True)
 class Selection:
-    """Exclusions of a study, and departures from its preregistration, given as SHA-256."""
+    """Exclusions of a study, and departures from its preregistration, which is named by its SHA-256."""
 
     rules: Sequence[LeaveOneOut]
     preregistration: str | None = None

@@ -33,13 +33,13 @@ ANALYSIS = "analysis"  # default folder
 REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
 FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # files of an analysis
 REQUIRED = ("assistance", "objects", "user")
-CONDITIONS = ("none", "highlight", "optimal")  # of the paper
-MAX_PEOPLE_SHOWN = 20  # in a line
+CONDITIONS = ("none", "highlight", "optimal")  # conditions of the paper
+MAX_PEOPLE_SHOWN = 20  # maximum number of people named in a message
 
 
 @dataclass(frozen=True)
 class Gap:
-    """People whose value of a measure is `missing` or `infinite`. They are left out of its tests."""
+    """People left out of the tests of a measure because their value is `missing` or `infinite`."""
 
     measure: str
     value: str
@@ -94,7 +94,7 @@ class StudyTable:
         )
 
     def groups(self, name: str, objects: int | None = None) -> dict[str, NDArray[np.float64]]:
-        """Return the known values of a column by condition, at one or all numbers of objects, without empty groups."""
+        """Return the known values of a column by condition, for one number of objects or all. Omit empty groups."""
         values, known = self.columns[name], ~np.isnan(self.columns[name])
         here = known if objects is None else known & (self.objects == objects)
         found = {c: values[here & (self.assistance == c)] for c in self.conditions()}
@@ -132,12 +132,12 @@ class StudyTable:
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the people of a study, a batch or `mjsim play` who finished."""
+    """Read the people who finished a study, a batch or `mjsim play`."""
     return study_table(read_people(folder), measures, people_path(folder))
 
 
 def people_path(folder: Path) -> Path:
-    """Return the path of the table of a study or a batch, or the folder of visits of `mjsim play`."""
+    """Return the path of the table of a study or batch, or `folder` itself if it has visits of `mjsim play`."""
     return folder if visit_folders(folder) else folder / f"{NAME}.parquet"
 
 
@@ -171,7 +171,7 @@ def study_table(
     path: Path,
     exclusions: Exclusions = Exclusions(),  # noqa: B008 - frozen
 ) -> StudyTable:
-    """Make the table of the people who are not excluded. `path` names the table in messages."""
+    """Build the table of all people who are not excluded. `path` only appears in messages."""
     _check_design(people, path)
     check_answer_columns(present_columns(people), measures, path)
     absent = left_out(exclusions, people, path)
@@ -241,7 +241,7 @@ def _numbers(rows: Mapping[int, Mapping[str, Any]], column: str, path: Path) -> 
 def _gaps(
     rows: Mapping[int, Mapping[str, Any]], read: Mapping[str, NDArray[np.float64]], sources: Mapping[str, str]
 ) -> Iterator[Gap]:
-    """Yield people without a value. An infinite column is reported even if it is not analysed."""
+    """Yield the gaps of all analysed columns, and of other columns with infinite values."""
     names = {column: name for name, column in sources.items()}
     everyone = [person_name(row, k) for k, row in rows.items()]
     for column, values in read.items():
