@@ -27,10 +27,8 @@ from mjsim.world.walking.path_following import ARRIVED_WITHIN
 from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
-TEXTS = Path(__file__).with_name("texts")  # one file for each language
-VIEWPOINT_SPACING = (
-    2.2  # m; objects within this distance of a viewpoint are visible from it despite furniture
-)
+TEXTS = Path(__file__).with_name("texts")  # folder with one TOML file per language
+VIEWPOINT_SPACING = 2.2  # distance from a viewpoint within which furniture hides no objects, in metres
 VIEWPOINT_CANDIDATES = 3000
 WALL_GAP = 0.05  # extra distance of planned paths from walls, in metres, so that walkers can cut corners
 
@@ -45,7 +43,7 @@ class House:
         geodesics: Shortest paths for planning and guidance, slightly away from walls. An object may be off the navmesh
             but within reach.
         receptacles: Geometry by receptacle key.
-        bounds: (x_min, y_min, x_max, y_max) of the floor, m.
+        bounds: (x_min, y_min, x_max, y_max) of the floor, in metres.
         texts: HUD texts in the language of the catalogue's labels.
         seen: Keys of the receptacles that the participant has seen, or None for all.
     """
@@ -138,12 +136,12 @@ class House:
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
-        """Navigable points from which to use each receptacle, m, shape (2,), by receptacle key."""
+        """Navigable point from which to use each receptacle, in metres, shape (2,), by receptacle key."""
         return {key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()}
 
     @cached_property
     def viewpoints(self) -> Mapping[str, NDArray[np.float64]]:
-        """Points from which a whole room can be seen, m, shape (k, 2), by room key."""
+        """Points from which a whole room can be seen, in metres, shape (k, 2), by room key."""
         # The seed is fixed because viewpoints are a property of the house, not of a trial.
         floor = self.navmesh.sample(np.random.default_rng(0), VIEWPOINT_CANDIDATES)
         rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
@@ -156,7 +154,7 @@ class House:
     def sample_episode(
         self, *, objects: int, seed: int, points: int = POINTS, disorder: Disorder | None = None
     ) -> Episode:
-        """Sample a disorganized house (PAPER section 4).
+        """Sample an episode, which is a disorganized state of the house (PAPER section 4).
 
         Raises:
             SamplingError: `objects` is out of range, or the house is too small for the points.
@@ -167,10 +165,10 @@ class House:
         )
 
     def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
-        """Return the points of a seed at which objects may lie, m, shape (points, 2).
+        """Sample points at which objects may lie, in metres, shape (points, 2).
 
         Raises:
-            SamplingError: The house is too small for them.
+            SamplingError: The house is too small for the points.
         """
         return house_points(self.catalogue, self.sampling_floor, seed=seed, points=points)
 

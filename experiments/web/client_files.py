@@ -29,7 +29,7 @@ _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-
 
 
 def modules_of(entry: str) -> Mapping[str, str]:
-    """Return the sources of a module and all its imports, by path. Their imports name these paths."""
+    """Return a module and all modules that it imports: sources by path, with imports rewritten to these paths."""
     found: dict[str, str] = {}
     waiting = [entry]
     while waiting:
@@ -42,7 +42,7 @@ def modules_of(entry: str) -> Mapping[str, str]:
 
 
 def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
-    """Return a replacement of relative imports by paths, which appends the paths to `needs`."""
+    """Return a function for `re.sub` that turns relative imports into paths and appends them to `needs`."""
 
     def named(match: re.Match[str]) -> str:
         target = ((STATIC / path).parent / match[2]).resolve()
@@ -123,7 +123,7 @@ _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters.update(duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
-_templates.env.auto_reload = False  # would check the file for each page
+_templates.env.auto_reload = False  # do not check for a changed file on each request
 
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
@@ -132,5 +132,5 @@ def page(request: Request, name: str, status: int = 200, **values: Any) -> Respo
 
 
 def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return the texts of the trial page by name, from a language's texts by section."""
+    """Select the trial page's texts from the sections of a language. Return them by name."""
     return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -1,4 +1,4 @@
-"""Conversion of a person's inputs into the actions of control steps.
+"""Converts a person's inputs into one action per control step.
 
 A control step handles all inputs since the previous one, so that a short tap between two steps counts. The mouse sets a
 target angle, which body and head follow within their limits.
@@ -15,7 +15,7 @@ from mjsim.values.actions import Action, ActionResult, Move, Pick, Place, Refusa
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 
-Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # share of the highest speed
+Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # fraction of the maximum speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # radians
 Press = Literal["act", "left hand", "right hand"]
 MAX_PITCH = 1.2  # largest pitch set by the mouse, in radians
@@ -29,7 +29,7 @@ class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     # consecutive number, from 1
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-    # control step in which it takes effect, or None for the next one; a past step means the next one
+    # control step in which the input takes effect; None or a past step means the next one
     step: Annotated[int, msgspec.Meta(ge=0, le=2**53)] | None = None
     forward: Share = 0.0  # held: walking speed, negative to walk back
     left: Share = 0.0  # held: speed to the left
@@ -104,7 +104,7 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
 
 
 def act(answer: Answer) -> Pick | Place:
-    """Return the action that the action key attempts."""
+    """Return the action of the action key: a place if possible, otherwise a pick."""
     place = answer(Place())
     at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
     if place.applied or (at_another_receptacle and not answer(Pick()).applied):
@@ -115,7 +115,7 @@ def act(answer: Answer) -> Pick | Place:
 def _move(
     controls: Controls, inputs: Sequence[Input], seen: Observation, person: PersonParameters, duration: float
 ) -> Move:
-    """Return the fastest requested walk since the previous step, and the turn towards the mouse's target."""
+    """Return the move at the highest speeds requested since the previous step, turning to the mouse's target."""
     asked = inputs if controls.held is None else (*inputs, controls.held)
 
     def fastest(name: str) -> float:

@@ -31,13 +31,13 @@ LENGTH = struct.Struct("!I")  # length prefix of messages between server and wor
 CODECS = {"jpeg": 1, "h264": 2}
 BEAT_PERIOD = 0.5  # time between heartbeats, in seconds
 MAX_SILENCE = 1.0  # silence after which the connection is considered lost, in seconds
-MAX_STEPS_AHEAD = 25  # largest lead of inputs and promises over the last control step, in control steps
+MAX_STEPS_AHEAD = 25  # how far inputs and promises may be ahead of the last step, in control steps
 DISPLAY_PERIOD = 5.0  # time between `display` messages, in seconds
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSocket close codes
 
 Codec = Literal["jpeg", "h264", "none"]
-Drawer = Literal["browser", "server"]  # side that draws the picture
+Drawer = Literal["browser", "server"]  # where the view is drawn
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # pixels
@@ -59,7 +59,7 @@ class View(WireMessage, frozen=True):
 
 
 class Hello(WireMessage, frozen=True):
-    """First message of a connection: a random name of the page that survives reconnects, its trial and its view."""
+    """First message of a connection. `tab` is a random name of the page, which it keeps when it reconnects."""
 
     tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
     trial: Annotated[str, msgspec.Meta(max_length=20)]
@@ -71,7 +71,7 @@ class TakeOver(WireMessage, frozen=True):
 
 
 class RunMessage(WireMessage, frozen=True, tag="run"):
-    """Start or resume the clock. A page that promises its inputs sends its current promise, or 0."""
+    """Start or resume the clock. `until` is the page's promise (see `Inputs`), at first 0, or None."""
 
     until: Count | None = None
 
@@ -101,7 +101,7 @@ class Beat(WireMessage, frozen=True):
 
 
 class Display(WireMessage, frozen=True):
-    """Quality of the display during the last 5 s, which is only logged.
+    """Display quality over the last 5 s. Only logged.
 
     Attributes:
         width: Width of the view, in CSS pixels. `height` likewise.
@@ -127,7 +127,7 @@ class Display(WireMessage, frozen=True):
 
 
 class Draw(WireMessage, frozen=True):
-    """Change of the drawing side, with the reason. Only logged."""
+    """Drawing has moved to the browser or to the server. Only logged, with the reason."""
 
     draw: Drawer
     reason: Annotated[str, msgspec.Meta(max_length=200)]
@@ -177,7 +177,7 @@ class Taken(WireMessage, frozen=True):
 
 
 class FrameMessage(WireMessage, frozen=True, tag="frame"):
-    """A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it.
+    """A frame of a control step, numbered from 1 in each view. `input` is the last input that has taken effect in it.
 
     H.264 is in Annex B format, one access unit per frame. `key` frames can be decoded without earlier ones.
     `milliseconds` is the time to draw and compress the frame.

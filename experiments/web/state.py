@@ -122,7 +122,7 @@ class Snapshot(WireMessage, frozen=True):
 
     Attributes:
         step: Control step that starts with this state.
-        input: Number of the last input that counts in it.
+        input: Number of the last input that has taken effect.
         body: Position, speeds, commands and servos of the body (docs/protocol.md).
         eye: Position in metres, heading and pitch in radians.
         hands: Positions of the left and right hand in the body's frame, in metres.
@@ -158,7 +158,7 @@ class Pictures(WireMessage, frozen=True):
 
 
 class Hud(WireMessage, frozen=True):
-    """State of the HUD next to the picture, without markers and the values of a `moment`."""
+    """State of the HUD, without its markers and without the values that a `moment` has."""
 
     state: HudState
 

@@ -1,4 +1,4 @@
-"""Checks of all requests, headers of all responses, and limits of connections."""
+"""Request checks, response headers and connection limits of the server."""
 
 import asyncio
 import re
@@ -23,7 +23,7 @@ from experiments.web.client_files import static_caching
 
 MAX_BODY = 4096  # maximum size of a form, in bytes
 HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
-UNCACHED = "no-store"  # for pages
+UNCACHED = "no-store"  # `Cache-Control` header of pages
 Address = IPv4Address | IPv6Address
 Network = IPv4Network | IPv6Network
 HEADERS = {
@@ -62,12 +62,12 @@ def _own_addresses() -> set[str]:
                 found.add(str(probe.getsockname()[0]))
             found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, family)}
         except OSError:
-            continue  # no network of this address family
+            continue  # the machine has no network with such addresses
     return found
 
 
 def middleware(host: str, public: str | None, proxies: Sequence[Network], **options: Any) -> list[Middleware]:
-    """Return the middleware of a server that listens at `host`. `options` are those of `Guards`."""
+    """Return the middleware of a server that listens at `host`. `options` are passed to `Guards`."""
     hosts = allowed_hosts(host, public)
     return [
         Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False),
@@ -219,7 +219,7 @@ async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
 
 
 class TimedConnection(H11Protocol):
-    """A uvicorn connection with timeouts. Beyond the limit, the address with the most connections loses one."""
+    """A uvicorn connection with timeouts. Above the limit, the oldest one of the busiest address is closed."""
 
     _open: ClassVar[dict["TimedConnection", str]] = {}  # clients by connection, oldest first
     _timer: asyncio.TimerHandle | None = None

@@ -12,14 +12,14 @@ FORGOTTEN_S = 3600.0  # silence after which a page loses its position in the que
 class SessionLimit:
     """Limits the number of concurrent sessions, first come, first served. Sessions have names.
 
-    A waiting page polls for a slot (:meth:`ask`). While it is silent, others go first. When it polls again, it has its
-    position back. The session of an admitted page takes the slot (:meth:`hold`).
+    A waiting page polls for a slot (:meth:`ask`). While it is silent, others go first. When it polls again, it regains
+    its position. The session of an admitted page takes the slot (:meth:`hold`).
     """
 
     def __init__(self, count: int) -> None:
         self._count = count
-        self._held: dict[str, float] = {}  # expiry times
-        self._queue: dict[str, float] = {}  # deadlines for asking again
+        self._held: dict[str, float] = {}  # expiry times of slots, by name
+        self._queue: dict[str, float] = {}  # deadlines for the next poll, by name
         self._durations: deque[float] = deque(maxlen=100)
 
     @property
@@ -37,7 +37,7 @@ class SessionLimit:
     def expected_wait(self, position: int, default: float) -> float:
         """Return the expected wait at a position in the queue, in seconds.
 
-        `default` is the duration of a session that is assumed until one has ended.
+        `default` is the assumed duration of a session until one has ended, in seconds.
         """
         return position * (fmean(self._durations) if self._durations else default) / self._count
 

@@ -46,15 +46,13 @@ from experiments.web.state import (
 )
 
 LOG = logging.getLogger("mjsim.play")
-MAX_CRASHES = (
-    3  # worker crashes in a row after which the session fails, unless control steps were saved in between
-)
+MAX_CRASHES = 3  # consecutive worker crashes after which a session fails; saved control steps reset the count
 MAX_AHEAD = 1000  # maximum number of unprocessed inputs
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
 class Browser(Spectator, Protocol):
-    """A connection to a playing page. Each tab has one."""
+    """A connection to a page that plays. `tab` is the name of the page."""
 
     tab: str
 
@@ -133,7 +131,7 @@ class PlayedSession:
             case View():
                 self._view = message
             case Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
-                return None  # the browser sends them again
+                return None  # ignored, because the browser sends the inputs again
             case Inputs(inputs):
                 if (error := self._input_error(message)) is not None:
                     return error

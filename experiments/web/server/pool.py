@@ -96,7 +96,7 @@ class WorkerPool:
             try:
                 return await asyncio.shield(starting)
             except asyncio.CancelledError:
-                starting.add_done_callback(self._discard_started)  # the start continues in its thread
+                starting.add_done_callback(self._discard_started)  # its thread cannot be cancelled
                 raise
             except (EOFError, ConnectionError) as error:
                 if time.monotonic() > until:

@@ -20,10 +20,8 @@ MAX_AWAY = 20.0  # how long a session without a page keeps its slot while others
 SHARE = 0.7  # usable share of the cores; the rest is a reserve for peaks
 MOST = 1 / 3  # cores of a session whose frames are drawn on the server, assumed for new sessions
 SERVER = 0.7  # load of the server's own core above which no session is admitted
-WINDOWS = 6  # measurements per session, of which the largest counts
-QUOTA = Path(
-    "/sys/fs/cgroup/cpu.max"
-)  # quota of a container: time per period, and the period, in microseconds
+WINDOWS = 6  # number of recent measurements per session, of which the largest counts
+QUOTA = Path("/sys/fs/cgroup/cpu.max")  # CPU time per period of a container, and the period, in microseconds
 
 
 class Capacity:
@@ -31,9 +29,7 @@ class Capacity:
 
     def __init__(self, cores: float) -> None:
         self._cores = cores
-        self._seen: dict[
-            str, tuple[float, float]
-        ] = {}  # time and CPU time of the last measurement of running sessions
+        self._seen: dict[str, tuple[float, float]] = {}  # time and CPU time at a session's last measurement
         self._shares: dict[str, deque[float]] = {}
         self._own = time.monotonic(), time.process_time()
 
@@ -81,7 +77,7 @@ class Sessions:
     ) -> None:
         self._pool, self.limit, self._idle = pool, limit, idle
         self._meter, self._capacity = meter, capacity
-        self.under_way: dict[str, PlayedSession] = {}  # by the keys of their participants
+        self.under_way: dict[str, PlayedSession] = {}  # by participant key
         self._scenes: dict[str, str] = {}  # URL paths of scenes, by house, as reported by workers
 
     def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:

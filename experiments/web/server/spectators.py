@@ -59,7 +59,7 @@ class Spectators:
             spectator.close(IDLE, "the session has stopped")
 
     def tell(self, message: Any) -> None:
-        """Handle a message to the session's page."""
+        """Forward a message of the session's page to all spectators, and keep it for new ones."""
         match message:
             case Snapshot(objects=objects, models=models, gone=gone):
                 self._snapshot = message
@@ -68,7 +68,7 @@ class Spectators:
                 for name in gone:
                     self._objects.pop(name, None)
                     self._models.pop(name, None)
-            case SceneMessage() | FrameMessage():  # snapshots start again, or are not needed
+            case SceneMessage() | FrameMessage():  # earlier snapshots are obsolete
                 self._snapshot = None
                 self._objects, self._models = {}, {}
         if isinstance(message, KEPT):

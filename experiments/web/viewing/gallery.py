@@ -70,7 +70,7 @@ def write_gallery(
         with replacing(out / SHEET.format(count)) as temporary:
             cv2.imwrite(str(temporary), sheet[..., ::-1])
     number = count + 1
-    while (old := out / SHEET.format(number)).is_file():  # left from a longer gallery
+    while (old := out / SHEET.format(number)).is_file():  # left over from a larger gallery
         old.unlink()
         number += 1
     page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
@@ -94,7 +94,7 @@ def _drawn(
 
 
 def sheets(homes: Sequence[tuple[GalleryHome, Path]]) -> Iterator[Image]:
-    """Yield RGB sheets of ten homes each, given with the folders of their pictures."""
+    """Yield RGB contact sheets of up to ten homes. `homes` has each home with the folder of its pictures."""
     for first in range(0, len(homes), COLUMNS * ROWS):
         cards = [_card(home, folder) for home, folder in homes[first : first + COLUMNS * ROWS]]
         rows = -(-len(cards) // COLUMNS)

@@ -39,7 +39,7 @@ class GalleryHome(msgspec.Struct, frozen=True):
     """Description of a home in a gallery.
 
     Attributes:
-        name: Name of the house. A folder keeps the name under which it was given.
+        name: Full name of a generated house, or the name or path as given.
         area: Floor area, in m2.
         pictures: Files of the floor plan and of views at eye height.
         digest: Hash of everything that determines the files.
@@ -58,7 +58,7 @@ class GalleryHome(msgspec.Struct, frozen=True):
 
     @property
     def origin(self) -> str:
-        """Seed and version of a generated home, or the name of another one."""
+        """Seed and version of a generated home, or the name of any other home."""
         found = re.fullmatch(r"generated:(\d+)\?rooms=\d+&version=(\d+)", self.name)
         return f"seed {found[1]}, version {found[2]}" if found else self.name
 

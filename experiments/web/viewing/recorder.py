@@ -16,8 +16,8 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-DECIMALS = 4  # of metres, radians and quaternions
-HEIGHT = 480  # height of the picture for pointers, in pixels
+DECIMALS = 4  # decimal places of stored metres, radians and quaternions
+HEIGHT = 480  # height of the picture for which pointers are computed, in pixels
 
 
 class RunRecorder(Viewer):
@@ -44,7 +44,7 @@ class RunRecorder(Viewer):
         self._poses: dict[str, list[float]] = {}
 
     def camera(self, world: World) -> CameraView:
-        """Return the eye camera, in the aspect ratio of a film."""
+        """Return the eye camera with the aspect ratio of the person's picture."""
         pose = camera_pose(world.model, world.data, avatar.EYE, PICTURE_ASPECT)
         return CameraView(pose.position, pose.rotation, pose.fovy, round(PICTURE_ASPECT * HEIGHT), HEIGHT)
 

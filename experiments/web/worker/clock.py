@@ -83,7 +83,7 @@ class Clock:
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
         if not self._follows_at_once():
-            self._show()  # otherwise the state after the next step is shown
+            self._show()  # if the next step follows at once, only the state after that is shown
         self._acknowledger.request(live.input, session.record.step)
 
     def _follows_at_once(self) -> bool:
@@ -125,7 +125,7 @@ class _Acknowledger:
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Acknowledge everything up to this input and control step. Without a new input, some steps may be delayed."""
+        """Acknowledge all inputs and control steps up to these, or later if there is no new input."""
         if number == self._number and step < self._newest + MAX_UNWRITTEN:
             return
         self._number, self._newest = number, step
@@ -140,7 +140,7 @@ class _Acknowledger:
 
     def _acknowledge(self, number: int, step: int) -> None:
         if step < self._newest or self._error is not None:
-            return  # a later call syncs this too
+            return  # a later request includes these steps
         try:
             self._sync()
         except OSError as error:
@@ -150,8 +150,8 @@ class _Acknowledger:
 
 
 PATIENCE = 0.75  # how long a control step waits for its promised inputs, in seconds
-WINDOW = 25  # period of adjusting to the page's clock, in control steps
-PULL = 0.05  # largest relative speed-up for that
+WINDOW = 25  # period of adjustments to the page's clock, in control steps
+PULL = 0.05  # largest relative speed-up by an adjustment
 
 
 class Schedule:

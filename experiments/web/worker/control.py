@@ -14,14 +14,14 @@ from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, State, T
 
 MAX_NOTES = 1000  # maximum number of pending events
 MAX_PROMISES = 64  # maximum number of stored promises
-Note = tuple[str, dict[str, Any]]  # name and fields of a logged event
+Note = tuple[str, dict[str, Any]]  # name and fields of an event to be logged
 
 
 class Promise(NamedTuple):
-    """Arrival of a control step's inputs: the monotonic time, or None if none were promised."""
+    """Arrival of a control step's promised inputs. `came` is the monotonic time, or None without arrival."""
 
     came: float | None
-    missing: bool  # True if they were promised but have not arrived
+    missing: bool  # True if inputs were promised but have not arrived
 
 
 class SessionControl:
@@ -32,12 +32,12 @@ class SessionControl:
         self._now = now
         self._announce = announce
         self._inputs: list[Input] = []
-        # promises, oldest first: all inputs before this control step have arrived, at this time
+        # promises, oldest first: (control step before which all inputs have arrived, time of the promise)
         self._promises: deque[tuple[int, float]] = deque(maxlen=MAX_PROMISES)
         self._notes: list[Note] = []
         self._changed = threading.Condition()
         self._asked = False  # a frame was requested
-        self._ready = 0.0  # monotonic time from which the session could be started
+        self._ready = 0.0  # monotonic time at which the session became ready to start, or 0
         self._heard = now()  # time of the last message from the page
 
     def apply(
@@ -83,7 +83,7 @@ class SessionControl:
                 self._promise(until)
 
     def hear(self) -> None:
-        """Record a message from the page."""
+        """Record that the page has sent a message."""
         with self._changed:
             self.pause_if_silent()
             self._heard = self._now()
@@ -101,7 +101,7 @@ class SessionControl:
                 self._note(event, **fields)
 
     def take_inputs(self, step: int) -> tuple[Input, ...]:
-        """Return the inputs for a control step, in order: those for it, for earlier steps, and without a step."""
+        """Take all inputs from the queue up to the first one that is stamped with a later step."""
         with self._changed:
             later = (i for i, new in enumerate(self._inputs) if new.step is not None and new.step > step)
             count = next(later, len(self._inputs))

@@ -17,7 +17,7 @@ from mjsim.house.scene.scene import Scene
 from mjsim.render import FAST, Renderer
 from mjsim.world.world import World
 
-COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile of the smallest size
+COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile of the smallest frame size
 MAX_IN_FLIGHT = 3  # maximum number of sent frames that are not yet shown
 
 
@@ -26,7 +26,7 @@ class _Moment(NamedTuple):
     markers: tuple[Marker, ...]
     step: int
     input: int
-    hidden: bool  # the clock is stopped, so nothing of the task is shown
+    hidden: bool  # True to send a black frame, because the clock is stopped
 
     def content(self) -> object:
         return self.hidden or (self.data.qpos.tobytes(), self.markers)
@@ -83,7 +83,7 @@ class Drawer:
         return self._control.state.phase is not RUNNING
 
     def draw(self, world: World, state: HudState, step: int, number: int, hidden: bool) -> None:
-        """Queue a state, in place of one that was not drawn yet."""
+        """Queue a state for drawing. It replaces a queued state that has not been drawn yet."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
@@ -101,7 +101,7 @@ class Drawer:
     def _run(self) -> None:
         try:
             self._draw_all()
-        except Exception as error:  # without frames, the session cannot continue
+        except Exception as error:  # the session cannot continue without frames
             self._control.apply(Trigger.FAIL, describe(error))
         for renderer in self._renderers.values():
             renderer.close()

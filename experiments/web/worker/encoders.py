@@ -20,7 +20,7 @@ H264_OPTIONS = {
     "profile": "baseline",
     "threads": "1",
 }
-KEY_EVERY = 250  # largest distance of key frames
+KEY_EVERY = 250  # maximum interval between key frames, in frames
 
 
 class Encoder(Protocol):

@@ -70,7 +70,7 @@ def preload(name: str) -> None:
 
 
 def _begin(work: Callable[[House], object], house: House) -> None:
-    """Run `work` in a detached process, since the fork server may have no children but its workers."""
+    """Run `work` in a detached process, because only workers may be children of the fork server."""
     between = os.fork()
     if not between:
         try:

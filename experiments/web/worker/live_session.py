@@ -45,7 +45,7 @@ MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; about 7 h
 
 
 class InputState(msgspec.Struct):
-    """State of the participant."""
+    """State of a participant, stored in the journal."""
 
     controls: Controls = Controls()
     input: int = 0
@@ -125,7 +125,7 @@ class LiveSession:
             journal.append(Header(config.settings(), self.scene.episode.to_json()))
             journal.sync()
         record = read_journal(journal.entries) if len(journal.entries) > 1 else None
-        journal.entries = ()  # entries of an hour take some 80 MB
+        journal.entries = ()  # free the memory: an hour of entries takes about 80 MB
         self.resumed = record is not None
         options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
@@ -150,7 +150,7 @@ class LiveSession:
             user=self._human,
             journal=journal,
         )
-        self.session.shows_each_step = False  # the clock decides
+        self.session.shows_each_step = False  # the clock decides which steps are shown
         Familiarisation(tuple(before), None).log(log)
         if record is None:
             self.session.begin()
@@ -201,7 +201,7 @@ def _config_in(journal: Journal) -> TrialConfig | None:
 
 
 def is_over(journal: Journal) -> bool:
-    """Return True if the session of an open journal is over."""
+    """Return True if the session recorded in an open journal has ended."""
     last = journal.entries[-1] if journal.entries else None
     return (
         isinstance(last, JournalEntry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
@@ -267,6 +267,6 @@ def remove_journal(folder: Path, run: Path) -> None:
     except (RecordError, ReplayError, OSError) as error:
         LOG.warning("%s is kept: %s", folder / JOURNAL, error)
         return
-    with suppress(OSError):  # another trial has a journal
+    with suppress(OSError):  # the folder has the journal of another trial
         folder.rmdir()
         folder.parent.rmdir()

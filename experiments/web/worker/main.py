@@ -62,7 +62,7 @@ class Worker:
             opened, control = self._opened.get()
             try:
                 self._serve(opened, control)
-            except Exception as error:  # the server reports it, and the journal is kept
+            except Exception as error:  # the server reports the failure, and the journal is kept
                 control.apply(Trigger.FAIL, describe(error))
 
     def _send(self, message: WireMessage) -> None:
@@ -80,7 +80,7 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        if not isinstance(message, Open | Pause):  # these may come from the server itself
+        if not isinstance(message, Open | Pause):  # the server sends these on its own, too
             self._control.hear()
         match message:
             case Open():
@@ -118,7 +118,7 @@ class Worker:
     def _play(self, opened: Open, control: SessionControl, config: TrialConfig, house: House) -> None:
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
-            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved it
+            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have saved the run
                 live = LiveSession(
                     journal,
                     house,

@@ -15,9 +15,9 @@ from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
 HORIZON = 0.3  # an object is sent once it may come into view within this time, in seconds
-LINGERING = 25  # how long an object is still sent after that, in control steps
+LINGERING = 25  # how long an object is sent after it could last come into view, in control steps
 LOOK_EVERY = 3  # period of updating the objects to send, in control steps
-DECIMALS = 4  # of positions in metres, and of orientations
+DECIMALS = 4  # decimal places of positions in metres and of orientations
 
 
 def field_of_view(live: LiveSession, view: View) -> float:

@@ -25,14 +25,12 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-HUD_EVERY = (
-    4  # period of HUD updates for clients that draw, in control steps; a pick or place updates at once
-)
+HUD_EVERY = 4  # HUD update period for clients that draw, in control steps; picks and places update it at once
 HEIGHT = 480  # height of the picture for projections, in pixels; the value is arbitrary
 
 
 class BrowserViewer(Viewer):
-    """Sends the changes of each control step. `live` and `drawer` are None without an open session."""
+    """Sends the changes of each control step to the page. `live` and `drawer` are None if no session is open."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -48,7 +46,7 @@ class BrowserViewer(Viewer):
         self._glance: object = None  # state at that update
 
     def set_view(self, view: View | None) -> None:
-        """Show everything again to a new connection. None repeats the last view."""
+        """Send everything to a new connection, in this view or, if it is None, in the last one."""
         self.view = view or self.view
         if self.drawer is not None and self.view is not None:
             self.drawer.set_view(self.view)
@@ -155,7 +153,7 @@ class BrowserViewer(Viewer):
 
 
 def page_hud(state: HudState) -> Hud:
-    """Return the HUD next to the picture: the state without markers and moving parts."""
+    """Return the HUD state without its markers and without the values that a `Moment` has."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None

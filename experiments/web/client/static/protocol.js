@@ -4,15 +4,15 @@
 /** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View View requested by a page: size in CSS pixels, and the codec of frames. The codec is `none` if the page draws. */
-/** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection: a random name of the page that survives reconnects, its trial and its view. */
+/** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello First message of a connection. `tab` is a random name of the page, which it keeps when it reconnects. */
 /** @typedef {{ type: "takeover" }} TakeOver Continue a session here that is open in another page. Answers `occupied`. */
-/** @typedef {{ type: "run"; until?: number | null }} RunMessage Start or resume the clock. A page that promises its inputs sends its current promise, or 0. */
+/** @typedef {{ type: "run"; until?: number | null }} RunMessage Start or resume the clock. `until` is the page's promise (see `Inputs`), at first 0, or None. */
 /** @typedef {{ number: number; step?: number | null; forward?: number; left?: number; turn?: number; look?: number; yaw?: number; pitch?: number; press?: "act" | "left hand" | "right hand" | null; scroll?: number }} Input A change of the keyboard, mouse, gamepad or touch screen. */
 /** @typedef {{ type: "inputs"; inputs: Array<Input>; until?: number | null }} Inputs Inputs of the person, in order, each once. */
 /** @typedef {{ type: "seen"; frame: number }} Seen Number of a frame that the browser has shown. */
 /** @typedef {{ type: "beat" }} Beat Heartbeat. The server sends two per second, and the page answers each. */
-/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display Quality of the display during the last 5 s, which is only logged. */
-/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Change of the drawing side, with the reason. Only logged. */
+/** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display Display quality over the last 5 s. Only logged. */
+/** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw Drawing has moved to the browser or to the server. Only logged, with the reason. */
 /** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause Stop the clock. The reason is logged. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur The page lost or regained the keyboard focus. Only logged. */
 /** @typedef {{ type: "leave" }} Leave End the trial now. */
@@ -32,7 +32,7 @@
 /** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal that is out of view. */
 /** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
 /** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
-/** @typedef {{ type: "hud"; state: HudState }} Hud State of the HUD next to the picture, without markers and the values of a `moment`. */
+/** @typedef {{ type: "hud"; state: HudState }} Hud State of the HUD, without its markers and without the values that a `moment` has. */
 /** @typedef {{ object: string; receptacle: string | null; at: [number, number] | null; instance: string; place: [number, number, number] }} Reach Effect of the action key: the object, and the receptacle if the object would be placed. */
 /** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment Values that change as the person moves: clock in whole seconds, room, object in reach, pointer and map. */
 /** @typedef {{ type: "busy"; busy: boolean }} Busy Start or end of a pick or place, for clients that show frames. Keys pressed during it are handled afterwards. */
@@ -41,7 +41,7 @@
 /** @typedef {{ type: "occupied" }} Occupied The session is open in another page. `takeover` continues it here. */
 /** @typedef {{ type: "replaced" }} Replaced Another page took the session over. This connection is closed. */
 /** @typedef {{ type: "error"; code: "idle" | "malformed" | "out of order" | "too early" | "too much"; message: string }} Error A message was rejected, with a code and a reason. */
-/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} FrameMessage A frame of a view, with its number from 1, the control step that it shows, and the last input that counts in it. */
+/** @typedef {{ type: "frame"; number: number; step: number; input: number; codec: "h264" | "jpeg" | "none"; key: boolean; width: number; height: number; milliseconds: number; data: Uint8Array<ArrayBuffer> }} FrameMessage A frame of a control step, numbered from 1 in each view. `input` is the last input that has taken effect in it. */
 /** @typedef {Hello | TakeOver | RunMessage | Inputs | View | Seen | Beat | Display | Draw | Pause | Blur | Leave} FromBrowser */
 /** @typedef {State | Taken | SceneMessage | Snapshot | Markers | Pictures | Hud | Moment | Busy | Beat | Saved | Queue | Occupied | Replaced | Error} ToBrowser */
 
