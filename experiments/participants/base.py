@@ -1,4 +1,4 @@
-"""The interface of simulated participants: their percept, their decisions, and what all of them use."""
+"""The interface of simulated participants, the percepts that they receive, and helpers that they share."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,17 +17,17 @@ from mjsim.values.person_parameters import PersonParameters
 from planner.errors import PlannerError
 from planner.plan import Visit
 
-if TYPE_CHECKING:  # options of commands name participants, and must not load the simulator
+if TYPE_CHECKING:  # the command line imports this module and must not load the simulator
     from experiments.house import House
     from mjsim.house.compiled.sites import ReceptacleGeometry
 
 Point = NDArray[np.float64]
 """Position on the floor, m, shape (2,)."""
 
-NEARBY = 1.3  # m; an object at the feet is nearer than this
+NEARBY = 1.3  # distance within which an object counts as at the feet, m
 DEFAULT_PERSON = PersonParameters()
-FAR = 1e6  # m; distance if there is no path
-TURNING = 0.8  # share of the turning speed at which a person looks around
+FAR = 1e6  # distance that stands for "no path", m
+TURNING = 0.8  # turning speed while looking around, as a share of the person's maximum
 LOOK_GAIN = 4.0  # speed at which the gaze is levelled, rad/s per rad of pitch
 FULL_TURN = 2.0 * math.pi
 
@@ -69,7 +69,7 @@ class Choice:
 
 
 class Percept:
-    """The knowledge of a person at one control step without any assistance.
+    """Knowledge of an unassisted person at one control step.
 
     Sessions use a subclass that adds the objects in view and the HUD, computed at the first access.
 
@@ -135,22 +135,22 @@ class Percept:
 
     @property
     def shown_roles(self) -> frozenset[str]:
-        """Roles of the markers that the HUD shows in this condition, as the person has learnt in the training."""
+        """Roles of the markers that the HUD shows in this condition, known to the person from the training."""
         return frozenset()
 
     @property
     def guidance(self) -> Guidance | None:
-        """The step that the HUD shows, or None if the condition shows no path or all is done."""
+        """The step that the HUD shows, or None if the condition shows no path or the task is finished."""
         return None
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Floor positions of the flagpoles in view, also those behind walls, m, shape (2,), by object."""
+        """Floor positions of the flagpoles in view, including those behind walls, m, shape (2,), by object."""
         return {}
 
     @property
     def choices(self) -> Sequence[Choice]:
-        """All visits that are possible next with their regrets, the best first.
+        """All possible next visits with their regrets, the best first.
 
         Only models of compliance use them, because no condition shows as much. Empty when all is done, and in live
         planning until the regrets are known.
@@ -164,7 +164,7 @@ def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
 
 
 class Participant(Protocol):
-    """A user of the assistance, who answers percepts with decisions.
+    """A user of the assistance: receives a percept at each decision and returns an action.
 
     Attributes:
         needs: Roles of the markers that the participant requires (`breadcrumb`, `flagpole`). A session whose condition
@@ -207,9 +207,9 @@ def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) ->
 
 
 class FullTurn:
-    """A full turn on the spot, which starts at a heading, rad.
+    """A full turn on the spot, starting from a given heading, rad.
 
-    With `level`, the gaze is brought to the horizontal. Otherwise the pitch stays.
+    With `level`, the gaze is also brought to the horizontal. Otherwise the pitch does not change.
     """
 
     def __init__(self, heading: float, *, level: bool = False) -> None:

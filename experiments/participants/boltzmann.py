@@ -21,10 +21,10 @@ TEMPERATURE = 0.5  # m
 
 
 def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
-    """Draw a choice with probability proportional to exp(-regret / temperature), m. At 0, return the best one.
+    """Draw a choice with probability proportional to exp(-regret / temperature), or the best one at temperature 0.
 
     A capped regret is only a lower bound. If such a choice is drawn, its exact regret is computed, and the draw is
-    rejected with the probability by which the bound made it too likely. So the probabilities are exact.
+    rejected with the probability that compensates for the bound, which keeps the distribution exact.
     """
     if temperature <= 0:
         return min(choices, key=lambda choice: choice.regret)

@@ -1,10 +1,10 @@
-"""Distributions of parameters over people. In TOML they are written as follows.
+"""Distributions of parameters over people. Examples in TOML:
 
 walking_speed = {normal = [1.2, 0.2], min = 0.8}    # mean and standard deviation
 reading_time = {lognormal = [1.35, 0.35]}           # median, and standard deviation of the logarithm
 reach = {uniform = [0.8, 1.1]}                      # lowest and highest value
-lapse = {beta = [0.5, 3]}                           # both shape parameters, from 0 to 1
-follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # kinds of people: weight, distribution
+lapse = {beta = [0.5, 3]}                           # both shape parameters; values from 0 to 1
+follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # weight and distribution of each group of people
 field_of_view = 1.2                                 # the same for each person
 """
 
@@ -44,7 +44,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     lognormal: _Pair | None = None  # median, and standard deviation of the logarithm
     uniform: _Pair | None = None  # lowest and highest value
     beta: _Pair | None = None  # both parameters
-    # kinds of people: weight, and a number or a distribution
+    # (weight, number or distribution) for each group of people
     mixture: "tuple[tuple[_NonNegative, float | Distribution], ...] | None" = None
     min: float = -math.inf  # lowest value
     max: float = math.inf  # highest value
@@ -91,9 +91,9 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return {self.shape: kinds or self._numbers, **limits}
 
     def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
-        """Return the value below which this share (0 to 1) of the distribution truncated at two values lies.
+        """Return the quantile for a share from 0 to 1, after truncating the distribution to [`lowest`, `highest`].
 
-        In a mixture, the share first selects the kind, and then the value of that kind.
+        In a mixture, the share first selects a component, and then a value of that component.
         """
         if self.constant is not None:
             return self.constant
@@ -107,7 +107,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return min(high, max(low, self._value(below + share * (above - below))))
 
     def _kind(self, share: float) -> "tuple[float | Distribution, float]":
-        """Return the kind of a mixture that a share selects, and the share within that kind."""
+        """Return the mixture component that a share (0 to 1) falls into, and the share rescaled within it."""
         kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
         left = share * sum(weight for weight, _ in kinds)
         for weight, kind in kinds[:-1]:
@@ -153,7 +153,7 @@ def distribution(name: str, given: object) -> Distribution:
 
 
 def converted(given: object) -> Distribution:
-    """Do the same as `distribution`, with errors that do not name the parameter: a ConfigError or a ValidationError."""
+    """Convert like `distribution`, but raise ConfigError or ValidationError without the parameter's name."""
     if isinstance(given, Mapping):
         return msgspec.convert(given, Distribution)
     return Distribution(constant=msgspec.convert(given, float))
@@ -167,7 +167,7 @@ class Distributions(Mapping[str, Distribution]):
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "Distributions":
-        """Make distributions of a TOML table. A subtable `[compliance] follows = 1` is a group."""
+        """Create distributions from a TOML table. A subtable such as `[compliance]` holds a group of parameters."""
         if not isinstance(values, Mapping):
             raise ConfigError(f"{shown(values)} is not a table of values such as {{ walking_speed = 1.2 }}")
         found: dict[str, Distribution] = {}
@@ -196,7 +196,7 @@ class Distributions(Mapping[str, Distribution]):
             raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the description, which `of` accepts."""
+        """Return the description in the form that `of` accepts."""
         return {name: described.as_value() for name, described in self.items()}
 
     def updated(self, other: "Distributions") -> "Distributions":
@@ -226,11 +226,11 @@ class Parameter:
     usual: float | Mapping[str, Any]  # default distribution over people, as in TOML
     lowest: float  # smallest valid value
     highest: float  # largest valid value
-    unit: str  # unit; empty for a plain number, `probability` for a number from 0 to 1
+    unit: str  # empty for a plain number, `probability` for a number from 0 to 1
 
     @functools.cached_property
     def spread(self) -> Distribution:
-        """The default distribution, converted once because that takes longer than a draw."""
+        """The default distribution. It is cached because converting it takes longer than drawing from it."""
         return converted(self.usual)
 
     def check(self, name: str, value: float) -> None:
@@ -254,7 +254,7 @@ def draw(
 def quantiles(
     parameters: Mapping[str, Parameter], described: Distributions, shares: Sequence[float], of: str
 ) -> dict[str, float]:
-    """Do the same as `draw` with a share from 0 to 1 for each parameter instead of a generator."""
+    """Like `draw`, but take the quantile at a given share (0 to 1) of each parameter instead of a random one."""
     for name in described:
         if name not in parameters:
             has = f"it has {', '.join(parameters)}" if parameters else "it has no parameters"
@@ -275,5 +275,5 @@ def varies(usual: float | Mapping[str, Any], lowest: float, highest: float, unit
 
 
 def chance(usual: float | Mapping[str, Any]) -> Any:
-    """Declare a field as `varies` does, for a probability."""
+    """Declare a dataclass field for a probability that differs from person to person."""
     return varies(usual, 0.0, 1.0, "probability")

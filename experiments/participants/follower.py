@@ -11,7 +11,7 @@ from mjsim.values.actions import WAIT, Action
 
 
 class BreadcrumbFollower:
-    """Walks along the breadcrumbs and makes the current step at their end."""
+    """Walks along the breadcrumbs and carries out the current step at their end."""
 
     needs = frozenset({"breadcrumb"})
 

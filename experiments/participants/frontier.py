@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point, estimated_distances
 
-SHIFT = 0.15  # m; standard deviation by which places move in each round, to see what was hidden before
+SHIFT = 0.15  # standard deviation of random shifts of places in each round, which reveal hidden objects, m
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Frontier:
     def of_room(self, room: str, position: Point) -> SearchPlace:
         """Return the place of a room nearest to a position, m, shape (2,)."""
         points = self._house.viewpoints.get(room)
-        if points is None:  # a room without floor to stand on
+        if points is None:  # no free floor in the room
             return SearchPlace(room, position)
         gaps = estimated_distances(self._house, position, list(points))
         return SearchPlace(room, points[int(np.argmin(gaps))])
@@ -58,7 +58,7 @@ class Frontier:
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
-        """Mark the places of a room as searched that are in view from inside the room within a distance, m."""
+        """Mark the places of `room` as searched that are in view and nearer than `within`, m."""
         within /= self._round  # a person who has missed something looks more closely
         walls = self._house.navmesh.outline
         self._left = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 from experiments.errors import ConfigError
 
-if TYPE_CHECKING:  # command options name participants, and must not load the simulator
+if TYPE_CHECKING:  # the command line imports this module and must not load the simulator
     from experiments.participants.base import ParticipantFactory
 
 DEFAULT_PARTICIPANT = "follower"

@@ -1,4 +1,4 @@
-"""The participant of `mjsim study rehearse`, which plays through the study's server and nowhere else."""
+"""The participant of `mjsim study rehearse`, which can play only through a study server."""
 
 from typing import Never
 

@@ -9,8 +9,8 @@ from experiments.participants.visit_executor import VisitExecutor
 from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
-SEARCHED = 0.5  # m; a look around begins within this distance of a viewpoint
-GONE = 1.2  # m; a remembered object nearer than this and not in view is no longer there
+SEARCHED = 0.5  # distance from a viewpoint at which the person starts to look around, m
+GONE = 1.2  # a remembered object that is nearer than this and not in view counts as gone, m
 
 
 class Searcher:

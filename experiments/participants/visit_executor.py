@@ -12,17 +12,17 @@ from mjsim.world.walking.polyline import project
 from planner.plan import Visit, VisitKind
 
 STOP_SHARE = 0.72  # stopping distance as a share of the reach, large enough not to kick the object
-CLOSER = 0.12  # m by which the stopping distance shrinks after a refusal
+CLOSER = 0.12  # reduction of the stopping distance after a refusal, m
 MIN_STOP_DISTANCE = 0.30  # m
-ARRIVED = 0.5  # m; a look around begins within this distance of a viewpoint
+ARRIVED = 0.5  # distance from a viewpoint at which the person starts to look around, m
 
 WalkTo = Callable[[Percept, Point, float], Action]
 
 
 class VisitExecutor:
-    """Executes visits. It stops nearer after a refusal, and takes another path when blocked.
+    """Executes visits. After a refusal, the person stops closer to the goal. If blocked, the person changes path.
 
-    A bin that the person has not seen is searched for first.
+    If the person has not seen the bin yet, it is searched for first.
     """
 
     def __init__(self, house: House) -> None:
@@ -37,7 +37,7 @@ class VisitExecutor:
     def act(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point], *, until: float | None = None
     ) -> Action:
-        """Walk the shortest known path to a visit, and make the visit.
+        """Walk the shortest known path to a visit's place and carry out the visit there.
 
         `objects` are remembered places, m, shape (2,). `until` is the simulated time of the next decision, s.
         """
@@ -54,7 +54,7 @@ class VisitExecutor:
         return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
-        """Walk along the shown path and make the shown visit at its end. Decide again at `until`, s."""
+        """Walk along the shown path and carry out the visit at its end. `until` is the time of the next decision, s."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
@@ -108,7 +108,7 @@ class VisitExecutor:
         return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
-        """Return the last path (k, 2), m, or a new one if it leads elsewhere, is blocked or was left."""
+        """Return the current path (k, 2), m. Replan if the goal has changed, or the path was blocked or left."""
         path = self._path
         if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
             self._path = path = np.vstack(
@@ -119,7 +119,7 @@ class VisitExecutor:
     def _find_places(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
     ) -> tuple[Point, Point]:
-        """Return the result of `places`, computed again for another visit or if the object has moved."""
+        """Return the cached result of `places`. Recompute it if the visit has changed or its object has moved."""
         known = self._places
         if known is not None and known[0] == visit:
             _, goal, stand = known
@@ -176,7 +176,7 @@ class BinSearch:
             del self._unknown[key]
 
     def until(self, time: float | None) -> float | None:
-        """Return the earlier of a time and the next look, s, or None if there is neither."""
+        """Return the earlier of `time` and the time of the next look, s. None if both are unset."""
         if not self._unknown:
             return time
         return self._next_look if time is None else min(time, self._next_look)
@@ -215,7 +215,7 @@ class BinSearch:
         return [*self._house.viewpoints.get(room, ()), self._house.approaches[key]]
 
     def _nearest(self, position: Point, points: list[Point]) -> int:
-        """Return the number of the nearest place. The last place counts only if there is no other."""
+        """Return the index of the nearest point. The last point is considered only if it is the only one."""
         candidates = points[:-1] or points
         return int(np.argmin(estimated_distances(self._house, position, candidates)))
 

@@ -1,4 +1,4 @@
-"""A simulated person who was shown the house once: notices, remembers, chooses, complies or not, and takes time.
+"""A simulated person who has seen the house once: models perception, memory, choice, compliance and reading times.
 
 Each part of the model has a class for its parameters, their distributions over people, units and sources.
 `docs/participants.md` lists them, and `docs/paper.md` names the fitted ones.

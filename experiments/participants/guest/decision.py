@@ -26,7 +26,7 @@ class Decision:
 
     # an option that costs c metres more is chosen with odds exp(-c / temperature), m
     temperature: float = varies({"lognormal": [0.5, 0.35]}, 0.0, 1000.0, "m")
-    # number of visits that are imagined, always the nearest one next; rounded
+    # planning depth: visits simulated ahead, nearest first; rounded to an integer
     look_ahead: float = varies({"uniform": [1.5, 4.5]}, 1.0, 12.0, "visits")
     # standard deviation of the logarithm of an estimated distance
     distance_error: float = varies(0.15, 0.0, 5.0)
@@ -37,19 +37,19 @@ class Decision:
 
 @dataclass(frozen=True)
 class Task:
-    """The known rest of the task. Places are numbered, and place 0 is the person's."""
+    """The rest of the task as the person knows it. Places are numbered. Place 0 is the person's position."""
 
     legs: NDArray[np.float64]  # costs of walks from place to place, m, shape (n, n)
-    picks: Sequence[int]  # place of each object that can be fetched
+    picks: Sequence[int]  # place of each object that can be picked up
     bins: Sequence[int]  # place of the bin of each of these objects
     carried: Sequence[int]  # place of the bin of each object in the hands
     capacity: int  # largest number of objects that can be carried
 
 
 def first_step_costs(task: Task, look_ahead: int) -> list[float]:
-    """Return the cost of the next `look_ahead` visits, m, for each possible first visit: `picks`, then `carried`.
+    """Return the cost of the next `look_ahead` visits for each possible first visit: `picks`, then `carried`, m.
 
-    After the first visit, always the nearest possible one follows. If the hands are full, picks cost infinity.
+    After the first visit, the nearest possible one always follows. If the hands are full, picks cost infinity.
     """
     picks, carried, full = (
         list(range(len(task.picks))),
@@ -71,7 +71,7 @@ def first_step_costs(task: Task, look_ahead: int) -> list[float]:
 def _imagined(
     task: Task, legs: list[list[float]], at: int, picks: list[int], carried: list[int], visits: int
 ) -> float:
-    """Return the cost of a number of visits, always the nearest possible one, m."""
+    """Return the cost of the next `visits` visits if the nearest possible one is always next, m."""
     picks, carried, cost = list(picks), list(carried), 0.0
     for _ in range(visits):
         options = [(legs[at][place], 1, place, k) for k, place in enumerate(carried)]
@@ -110,7 +110,7 @@ class Known:
     """The person's knowledge of the task on which a choice depends."""
 
     objects: Mapping[str, Point]  # remembered places of objects, m, shape (2,)
-    pull: float  # weight of straight lines in estimates of distances to these objects, 0 to 1
+    pull: float  # weight (0 to 1) of the straight-line distance in estimated distances to these objects
     search: bool  # True if a search is possible when no known object can be fetched
 
 
@@ -198,14 +198,14 @@ class Timing:
 
     # factor of all these times: below 1 for quick people, above 1 for slow ones
     pace: float = varies({"lognormal": [1.0, 0.35]}, 0.05, 20.0)
-    # preparing one's next step mentally, s (Card, Moran and Newell, CACM 23, 1980: 1.35 s)
+    # time to prepare the next step mentally, s (Card, Moran and Newell, CACM 23, 1980: 1.35 s)
     deciding: float = varies(1.35, 0.0, 60.0, "s")
     # words per minute (Brysbaert, Journal of Memory and Language 109, 2019: 238)
     reading_speed: float = varies(238.0, 10.0, 10_000.0, "words a minute")
     words: float = varies(4.0, 0.0, 100.0)  # words in a row of the task list
-    # understanding a suggested step and its path before walking, s; a starting value
+    # time to understand a suggested step and its path before walking, s; a starting value
     guided_step: float = varies(6.0, 0.0, 60.0, "s")
-    # relating the flagpoles to the house before a choice, s; a starting value
+    # time to relate the flagpoles to the house before a choice, s; a starting value
     interpreting: float = varies({"uniform": [1.5, 3.0]}, 0.0, 60.0, "s")
 
     def list_time(self, rows: int) -> float:

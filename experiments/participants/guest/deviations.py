@@ -8,7 +8,7 @@ from experiments.house import House
 from experiments.participants.base import Point, estimated_distances
 from experiments.participants.distribution import chance, varies
 
-MIN_DETOUR = 0.5  # m; shorter detours are not taken
+MIN_DETOUR = 0.5  # shortest detour that a person takes, m
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Adherence:
         return chance < self.compliance.follows and not self._has_quit
 
     def gives_up_after(self, duration: float) -> float | None:
-        """Return the time after which a step is given up on a walk of this duration, s, or None if it is not."""
+        """Return the time into a walk of this duration at which the person gives up the step, s, or None."""
         chance, share = self._rng.random(2).tolist()
         gives_up = chance < self.compliance.abandons and not self._always_follows
         return share * duration if gives_up else None
@@ -65,8 +65,8 @@ class Walking:
     # probability, at each walk not along a shown path, of absent-mindedly going elsewhere first
     lapse_rate: float = chance({"beta": [0.5, 3.0]})
     lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # longest walk to that place
-    # probability, at each walk to a flagpole in another room, of first walking to the point of this room
-    # nearest to the flagpole; also the weight of straight lines in estimated distances of flagpoles
+    # probability, at each walk to a flagpole in another room, of first going to the point of this room that is nearest
+    # to it; also the weight of the straight-line distance in estimated distances to flagpoles
     pull: float = chance({"beta": [2.0, 3.0]})
 
 

@@ -17,9 +17,9 @@ from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
 from mjsim.world.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
 
-ARRIVED = 0.5  # m; a place nearer than this is reached
-GONE = 1.2  # m; a remembered object nearer than this and not in view is no longer there
-SEEN_BIN = 2.0  # m; the place of a bin nearer than this is learnt
+ARRIVED = 0.5  # distance at which a place counts as reached, m
+GONE = 1.2  # a remembered object that is nearer than this and not in view counts as gone, m
+SEEN_BIN = 2.0  # distance within which the person learns a bin's place, m
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Intention:
 
     aim: Visit | SearchPlace  # a visit, or a place to search
     suggested: bool = False  # True if this is the suggested step
-    # True if the person takes another path than the shown one, after leaving it or being blocked on it
+    # True if the person no longer follows the shown path, having left it or been blocked on it
     strays: bool = False
     gives_up_at: float = math.inf  # simulated time at which the suggested step is given up, s
 

@@ -21,7 +21,7 @@ class Perception:
 
     # distance at which half of the objects in full view are noticed, m
     half_distance: float = varies({"uniform": [6.0, 8.0]}, 0.1, 100.0, "m")
-    # scale of the logistic curve, m; three of these nearer, almost all objects are noticed
+    # scale of the logistic curve, m; three scales below `half_distance`, almost all objects are noticed
     distance_spread: float = varies(1.0, 0.01, 20.0, "m")
     looks_around: float = chance(0.8)  # probability of looking all around at a searched place
     # distance within which visible floor counts as searched, m; objects overlooked there are found only in
@@ -104,7 +104,7 @@ class Recollection:
         return new
 
     def forget(self, time: float, but: str | None = None) -> None:
-        """Forget objects that were seen too long ago, except `but`."""
+        """Forget objects that were last seen too long ago. The object `but` is kept."""
         for name in [n for n, until in self._until.items() if until < time and n != but]:
             self.drop(name)
 
