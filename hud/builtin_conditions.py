@@ -39,7 +39,7 @@ def optimal(view: TaskView) -> HudState:
 
 
 def guided(view: TaskView) -> HudState:
-    """Show `optimal` with four options that the paper does not have, which we expect to help."""
+    """Show `optimal` with four options that are not in the paper and that we expect to help."""
     added = (options.reroute, options.rims, options.pin, options.pointer)
     return functools.reduce(lambda state, apply: apply(view, state), added, optimal(view))
 

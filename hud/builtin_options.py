@@ -11,8 +11,8 @@ from hud.state import FLOORPLAN, ChecklistItem, HudState, Marker, MiniMap, Vec2
 from hud.task import Alternative, TaskStep, TaskView
 from hud.texts import HudTexts, filled
 
-REROUTE_CLEARANCE = 0.5  # m of path in front of the person that stay empty, so that nothing fills the view
-NEGLIGIBLE = 0.01  # m of regret; less is rounding
+REROUTE_CLEARANCE = 0.5  # length of path ahead of the person without breadcrumbs, to keep the view free, m
+NEGLIGIBLE = 0.01  # regret below which a step counts as optimal, m
 
 
 def bins(view: TaskView, state: HudState) -> HudState:
@@ -100,12 +100,12 @@ def _without_breadcrumbs(state: HudState) -> tuple[Marker, ...]:
 
 
 def _floor_positions(state: HudState, role: str) -> tuple[Vec2, ...]:
-    """Distinct floor positions of the markers of a role, in their order, m."""
+    """Floor positions of the markers of a role, m, in drawing order without duplicates."""
     return tuple(dict.fromkeys(marker.position[:2] for marker in state.markers if marker.role == role))
 
 
 def _steps(view: TaskView, state: HudState) -> list[TaskStep]:
-    """The step that each row stands for: one of the plan, or the next possible one with the row's object."""
+    """Return the step of each row: the planned step, or the next possible step with the row's object."""
     if any(item.number is not None for item in state.checklist):
         return [*view.steps_done, *view.plan]
     return [TaskStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]
@@ -113,7 +113,7 @@ def _steps(view: TaskView, state: HudState) -> list[TaskStep]:
 
 def _with_regret(item: ChecklistItem, alternative: Alternative | None, texts: HudTexts) -> ChecklistItem:
     past = item.done and item.number is not None
-    if alternative is None or past or item.current:  # the others are compared with the current step
+    if alternative is None or past or item.current:  # regrets are relative to the current step
         return item
     parts = item.detail.split("\n")
     shortest = min(range(len(parts)), key=lambda k: len(parts[k]))

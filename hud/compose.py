@@ -120,7 +120,7 @@ def _without_motion(state: HudState) -> HudState:
 
 
 def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tuple[Any, ...]]:
-    """Return, for each panel, its drawing function and the arguments that follow the stencils and the rectangle."""
+    """Return the drawing function of each panel and its arguments after `stencils` and `rect`."""
     hidden = panels.hidden_text(layout.first, len(state.checklist) - layout.stop, texts)
     header = (state.checklist_title, panels.count_text(state.checklist, texts))
     bins = state.bins[: len(layout.bin_rows)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 
 from hud.errors import ConditionError
 
-if TYPE_CHECKING:  # the command line lists the names, and must not load NumPy
+if TYPE_CHECKING:  # the command line imports this module and must not load NumPy
     from hud.state import HudState
     from hud.task import TaskView
 

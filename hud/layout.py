@@ -23,7 +23,7 @@ CONTEXT_ROWS = 2  # rows that stay visible above the current one
 
 @dataclass(frozen=True)
 class ListRow:
-    """Height of a list row, the width left for its text, both in px, and its detail broken into lines."""
+    """Layout of a list row: its height and the width of its text, px, and its detail broken into lines."""
 
     height: int
     text_width: int
@@ -38,7 +38,7 @@ class Layout:
     free: Rect  # area between the panels
     first: int  # index of the first visible row of the task list
     rows: tuple[ListRow, ...]  # visible rows of the task list
-    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, which starts with its first row
+    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, beginning with the first bin
     message_lines: tuple[str, ...]  # message broken into lines
 
     @property
@@ -48,7 +48,7 @@ class Layout:
 
 
 def unit_of(width: int, height: int) -> float:
-    """Return the scale, frame px per theme px, at which a frame of at least 320 x 240 px holds 640 x 480 theme px."""
+    """Return the largest scale, frame px per theme px, at which 640 x 480 theme px fit into the frame."""
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
@@ -58,7 +58,7 @@ def unit_of(width: int, height: int) -> float:
 
 
 def margins(width: int, height: int) -> tuple[int, int, int, int]:
-    """Return the space above, below, left and right of a picture, px, which holds all panels except long messages."""
+    """Return the margins around a picture (above, below, left, right; px) that hold all panels except long messages."""
     chips = theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP
     left, right = 2 * theme.MARGIN + theme.MAX_LIST_WIDTH, 2 * theme.MARGIN + theme.BINS_WIDTH_WIDE
     hands = theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN
@@ -121,7 +121,7 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
 
 
 def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
-    """Return the same as `visible_rows` for a list scrolled to row `first`, or less far near its end."""
+    """Return the visible rows as in `visible_rows`, scrolled to row `first` or as far as the list allows."""
     ends = np.cumsum(heights)
     last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
     first = min(max(first, 0), last_first, len(heights) - 1)
@@ -130,7 +130,7 @@ def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
 
 
 def _current_row(items: Sequence[ChecklistItem]) -> int:
-    """Return the index of the current row, else of the first row, or of the last one of a finished plan."""
+    """Return the index of the current row. Without one, return the last row of a plan or the first row of a list."""
     last = len(items) - 1 if items[-1].number is not None else 0
     return next((i for i, item in enumerate(items) if item.current), last)
 
@@ -245,5 +245,5 @@ class _PanelGrid:
         return Rect(self._left, top, self._between, inventory.y - self._gap - top)
 
     def _centred(self, width: int, left: int, span: int) -> int:
-        """Return the column that centres `width` px in the frame as far as the `span` px from `left` allow."""
+        """Return the left edge of an element of `width` px: centred, but kept within `span` px from `left`."""
         return min(max((self._width - width) // 2, left), left + span - width)

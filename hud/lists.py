@@ -7,7 +7,7 @@ from hud.markers import flagpole
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
 from hud.task import TaskObject, TaskView
 
-NEAR = 1.6  # m; an object nearer than this is about to leave the view at its lower edge
+NEAR = 1.6  # distance at which an object is about to leave the view at the bottom, m
 
 
 def in_sentence(label: str) -> str:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
 CHEST = 0.75  # height of the breadcrumbs at the person's end of the path, as a share of the eye height
-BREADCRUMB_RADIUS = 0.04  # m; 7 px across at 5 m in a 480 px frame
+BREADCRUMB_RADIUS = 0.04  # radius, m; appears 7 px wide at 5 m in a 480 px frame
 BREADCRUMB_SPACING = 0.28  # m along the floor path
 
 RIM_RADIUS = 1.3  # radius of the white rim, in radii of the breadcrumb
@@ -97,7 +97,7 @@ def flagpoles(state: HudState) -> dict[str, Vec2]:
         for marker in state.markers
         if marker.role == FLAGPOLE
         and marker.object is not None
-        and marker.shape != "box"  # a flag, which is not over the object
+        and marker.shape != "box"  # skips the flag, which is beside the pole
     }
 
 

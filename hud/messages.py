@@ -8,8 +8,8 @@ from hud.lists import in_sentence
 from hud.state import Message, MessageKind
 from hud.texts import HudTexts, filled
 
-SHOWN = 3.5  # s for which a message is opaque
-FADE = 0.5  # s in which it then disappears
+SHOWN = 3.5  # duration of full opacity, s
+FADE = 0.5  # duration of the fade-out after that, s
 
 _OK, _NO, _INFO = MessageKind.SUCCESS, MessageKind.REFUSAL, MessageKind.INFO
 

@@ -77,7 +77,7 @@ def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
 
 
 def draw_mark(stencils: Stencils, kind: Kind, step: int) -> Patch:
-    """Draw a mark. `step` is its direction, of `HEADING_STEPS`, counter-clockwise from the right."""
+    """Draw a mark. `step` is its direction, 0 to `HEADING_STEPS` - 1, counter-clockwise from the right."""
     half = math.ceil(HALF_SIZES[kind] * stencils.unit)
     canvas = Canvas(stencils, 2 * half + 1, 2 * half + 1)
     centre = half + 0.5

@@ -149,7 +149,7 @@ def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
 
 
 def draw_pointer(stencils: Stencils, rect: Rect, step: int) -> Patch:
-    """Draw an arrow on a disc. `step` is its direction, of `POINTER_STEPS`, counter-clockwise from the right."""
+    """Draw an arrow on a disc. `step` is its direction, 0 to `POINTER_STEPS` - 1, counter-clockwise from the right."""
     canvas = Canvas(stencils, rect.width, rect.height)
     centre, u = rect.width / 2.0, canvas.unit
     canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)

@@ -10,7 +10,7 @@ from hud.errors import FrameError
 from hud.state import Pointer, Vec3
 
 _IDENTITY, _ROUNDING = np.eye(3), 1e-6
-NEAR = 1e-6  # m; points at a smaller depth count as behind the eye
+NEAR = 1e-6  # depth below which points count as behind the eye, m
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from hud.theme import Face
 
 ELLIPSIS = "…"
 BUILT_IN_FONT = "sans"
-_SMALL = 10  # px; below this size, spaces and decimal points of the font are too narrow
+_SMALL = 10  # size below which the font's spaces and decimal points are too narrow, px
 _POINT = re.compile(r"(?<=\d)\.(?=\d)")
 _WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # a number and its unit "m" stay on one line
 

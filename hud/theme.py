@@ -49,7 +49,7 @@ LABEL: Final = Face(12, 600)
 BAR: Final = Face(14, 500)
 CHIP: Final = Face(14, 600)
 
-MIN_FRAME: Final = (320, 240)  # px; text is illegible in smaller frames
+MIN_FRAME: Final = (320, 240)  # smallest frame with legible text, px
 
 MARGIN: Final = 8  # distance of the panels from the edge of the frame
 GAP: Final = 6
@@ -76,11 +76,11 @@ NUMBER: Final = 19
 TARGET: Final = 20  # side of the receptacle's picture
 
 BINS_WIDTH: Final = 160
-BINS_WIDTH_WIDE: Final = 170  # in frames wider than 4 : 3
+BINS_WIDTH_WIDE: Final = 170  # width of the list of bins in frames wider than 4 : 3
 
 SLOT_WIDTH: Final = 118
-SLOT_WIDTH_LONG: Final = 133  # for names that would be shortened
-SLOT_WIDTH_EMPTY: Final = 86  # narrow, so that objects at the feet are visible between empty hands
+SLOT_WIDTH_LONG: Final = 133  # slot width for names that would otherwise be shortened
+SLOT_WIDTH_EMPTY: Final = 86  # narrow, to leave objects at the feet visible between empty hands
 SLOT_HEIGHT: Final = 40
 BETWEEN_HANDS: Final = 64
 
@@ -88,4 +88,4 @@ MESSAGE_LINES: Final = 3
 MESSAGE_ICON: Final = 26
 POINTER: Final = 36
 MAP_INSET: Final = 4
-MAX_MAP_HEIGHT: Final = 150  # leaves space for the bins if the house is deeper than wide
+MAX_MAP_HEIGHT: Final = 150  # leaves space for the list of bins if the house is deeper than wide

@@ -140,7 +140,7 @@ def _walk(observation: Observation, stride: float, world: World) -> Steps:
         if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        delay = braking * timestep / 2  # braking starts one step late, and changes in steps
+        delay = braking * timestep / 2  # compensates for the discrete steps, in which braking starts late
         speed = min(fastest, math.sqrt(2 * braking * left + delay**2) - delay, _GAIN * left)
         step = yield Move(forward=speed)
         now = float((step.observation.position - start) @ direction)

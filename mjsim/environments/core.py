@@ -280,7 +280,7 @@ def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[An
         seed, actions = progress
         core.reset(seed)
         for action in actions:
-            with contextlib.suppress(ActionError, PhysicsError):  # raised at the original step
+            with contextlib.suppress(ActionError, PhysicsError):  # also raised in the original run
                 core.step(action)
     return core
 

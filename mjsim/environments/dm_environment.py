@@ -46,7 +46,7 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
     @property
     def physics(self) -> Any:
-        """The state as a `dm_control.mujoco.Physics`, before the first reset that of the first episode.
+        """The current state as a `dm_control.mujoco.Physics`. Before the first reset, the start of the first episode.
 
         It is needed for `dm_control.viewer.launch(env)`.
         """

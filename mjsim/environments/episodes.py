@@ -19,7 +19,7 @@ from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-_COUNT_STREAM = 41  # key of the generator for the number of objects, independent of other choices by the seed
+_COUNT_STREAM = 41  # random stream for the number of objects, independent of the seed's other streams
 
 
 class CompiledEpisode:

@@ -23,8 +23,8 @@ from mjsim.values.person_parameters import PersonParameters
 T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
-DEFAULT_CACHE_SIZE = 8  # number of compiled episodes
-MAX_SLOTS = 1000  # largest number of rows of arrays, more than any house has objects
+DEFAULT_CACHE_SIZE = 8  # episodes kept compiled
+MAX_SLOTS = 1000  # largest number of object rows in an observation, more than any house has objects
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,7 @@ class TimeReward:
 
 
 def potential(scene: Scene, observation: Observation) -> float:
-    """Return minus a rough estimate of the time to the end, s: straight lines, one object at a time, 0 at the end."""
+    """Return minus the time to finish, s, estimated for straight walks with one object at a time. 0 at the end."""
     status = observation.object_status
     bins = np.array(
         [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]

@@ -28,7 +28,7 @@ class InteractiveViewer:
         gui, self._render, self._viewer_module, self._renderer_module = _load()
         try:
             self._window = gui.RenderWindow(width, height, "mjsim")
-        except Exception as error:  # GLFW and the window system raise many unrelated types here
+        except Exception as error:  # GLFW and the window system raise exceptions of many types
             raise ViewerError(f"no window could be opened ({error}); {_REMEDY}") from error
         self._viewport = self._renderer_module.Viewport(width, height)
         self._realtime = realtime

@@ -125,7 +125,7 @@ class Bounds(NamedTuple):
 
     @classmethod
     def of(cls, model: Any) -> "Bounds":
-        """Compute the bounds of a model. Unlike in MuJoCo, planes with a size are rectangles, as they are drawn."""
+        """Compute the bounds of a model. Unlike in MuJoCo, planes with a size are bounded, as they are when drawn."""
         radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
         plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
         finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
@@ -138,7 +138,7 @@ class Bounds(NamedTuple):
 def outside(
     view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Mask of spheres that are wholly outside a view, (n,), without some near corners. Radius 0 means unbounded."""
+    """Mask of spheres wholly outside a view, (n,). Some near its corners are missed. Radius 0 means unbounded."""
     right, up, backward = ((centres - view.position) @ view.rotation).T
     ahead, reach = -backward, radii + _MARGIN
     vertical, horizontal = view.half_height, view.half_height * aspect
@@ -156,7 +156,7 @@ def outside(
 def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
     """Hide the geoms of the mask `hidden`, (ngeom,), from a scene."""
     geoms = scene.geoms[: scene.ngeom]
-    # Geoms that are not the model's index the extra entry at the end.
+    # Geoms that do not belong to the model map to the extra entry at the end, which is False.
     owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]
     chosen = [geoms[index] for index in np.flatnonzero(np.append(hidden, False)[owners])] if owners else []
     types = [geom.type for geom in chosen]

@@ -27,7 +27,7 @@ EGL_REMEDY = (
     "`mjsim doctor` shows what is there"
 )
 TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
-MAX_START_TIME = 60.0  # default timeout for starting a driver, of which the slowest take a few seconds, s
+MAX_START_TIME = 60.0  # default timeout for starting a driver, s; the slowest drivers take a few seconds
 _MAIN_THREAD_ONLY = ("glfw", "cgl")
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 
@@ -105,7 +105,7 @@ class _ProcessContext:
         try:
             with self.current():
                 return True
-        except Exception:  # PyOpenGL raises errors of many types
+        except Exception:  # PyOpenGL raises exceptions of many types
             return False
 
     def _ensure(self) -> None:
@@ -131,7 +131,7 @@ class _ProcessContext:
             return None
         egl = self._egl
         context = egl.eglGetCurrentContext()
-        # Our own context is current if a signal interrupted an earlier drawing just before its release.
+        # Our own context may still be current if a signal interrupted drawing before the context was released.
         if not context or context.address == self._gl._context.address:
             return None
         surfaces = egl.eglGetCurrentSurface(egl.EGL_DRAW), egl.eglGetCurrentSurface(egl.EGL_READ)
@@ -178,7 +178,7 @@ def _start() -> tuple[ModuleType, Any]:
             answers.put((module, module.GLContext(1, 1)))
         except RenderError as error:
             answers.put(error)
-        except Exception as error:  # drivers and PyOpenGL raise many unrelated types here
+        except Exception as error:  # drivers and PyOpenGL raise exceptions of many types
             answers.put(RenderError(f"no OpenGL context ({error}); {EGL_REMEDY}"))
 
     if chosen_gl() in _MAIN_THREAD_ONLY:

@@ -51,7 +51,7 @@ class EnvironmentReport:
     platform: str  # operating system and processor
     versions: Mapping[str, str | None]  # distribution -> version, or None if not installed
     broken: Mapping[str, str]  # distribution -> error at import
-    hidden: tuple[str, ...]  # hints about packages that other software hides
+    hidden: tuple[str, ...]  # hints about packages that are shadowed by others of the same name
     cache: str  # folder and size of compiled code
     egl_vendors: tuple[str, ...]  # names of EGL vendor files
     gl: "GlInfo | None"  # driver, or None if no context can be created
@@ -165,7 +165,7 @@ def _how_to_install(name: str) -> str:
 def _import_error(module: str) -> str | None:
     try:
         importlib.import_module(module)
-    except Exception as error:  # libraries built for another NumPy raise many types
+    except Exception as error:  # libraries built for another NumPy raise exceptions of many types
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
     return None
 

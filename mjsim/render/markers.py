@@ -1,4 +1,4 @@
-"""Markers: decorative geoms at places in the house, added for one frame and hidden by walls or not."""
+"""Markers: decorative geoms in the house that are added for one frame. Walls hide them, except x-ray markers."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024
-# A marker emits most of its colour and reflects a little light, so it appears solid but alike in every room.
+# A marker emits most of its colour and reflects a little light: it looks solid, and the same in every room.
 _EMITTED = 0.62
 _LIT = 0.32
 _HIDDEN_OPACITY = 0.3  # opacity of x-ray markers behind something
 _AMBIENT = 0.3  # ambient light that MuJoCo adds to a scene without lights
-_DEPTH_TOLERANCE = 1e-4  # difference of depth by rounding between two passes
-_OUTLINE = 1.4  # radius of the dark sphere behind an outlined one, as a multiple
+_DEPTH_TOLERANCE = 1e-4  # depth difference between two passes that may be due to rounding
+_OUTLINE = 1.4  # radius of the dark sphere behind an outlined one, relative to its radius
 _OUTLINE_RGBA = (0.03, 0.06, 0.20, 1.0)
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
@@ -54,7 +54,7 @@ class MarkerLike(Protocol):
 
     @property
     def x_ray(self) -> bool:
-        """True if it also shows, dimmed, through walls."""
+        """True if the marker also shows, dimmed, through walls."""
         ...
 
 
@@ -116,7 +116,7 @@ def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> l
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
         return []
-    for marker in markers:  # also outside the view, so that a mistake is found in every view
+    for marker in markers:  # checks markers outside the view too, so that errors do not depend on the view
         _numbers(marker, "rgba", 4)
     centres = np.array([_numbers(marker, "position", 3) for marker in markers])
     radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])

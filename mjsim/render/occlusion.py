@@ -14,9 +14,7 @@ from mjsim.render.cameras import Bounds, ViewVolume
 from mjsim.support.kernels import inlined, kernel
 
 _MIN_HALF_SIZE = 0.4  # smallest half size of the faces of boxes that are tested, m
-_TESTED = (
-    40  # number of tested boxes, those that appear largest first, since others hide nothing more in a house
-)
+_TESTED = 40  # number of tested boxes, largest in the view first; more boxes hide nothing else in a house
 _MARGIN = 0.01  # tolerance, far above rounding errors in single precision, m
 
 
@@ -66,7 +64,7 @@ class BoxOccluders:
         centre, normal = positions - view.position, axes[rows, self._thin]
         across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
-        # If it is nearer, the near plane could cut a hole into the box.
+        # The near plane could cut a hole into a box nearer than this.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)
@@ -109,9 +107,9 @@ def _outside_or_covered(
     rotations: NDArray[np.float64],
     boxes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Mask of the boxes (c,) that are outside one side of the view, or inside all planes of one shadow.
+    """Mask of the boxes (c,) that are outside the view, or wholly inside the shadow of an occluder.
 
-    Takes inward normals of the view (4, 3) and the shadows (k, 5, 3), offsets of the latter, m, and frames and boxes.
+    Takes inward normals of the view (4, 3) and the shadows (k, 5, 3), the shadows' offsets, m, and the boxes' frames.
     """
     result = np.zeros(len(away), np.bool_)
     for c in range(len(away)):

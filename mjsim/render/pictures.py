@@ -22,12 +22,12 @@ from mjsim.values.errors import AssetError, RenderError
 
 SUPERSAMPLING = 3
 FILL = 0.92  # share of the picture's side that its subject fills
-# The camera is at the front right, where the near side of a receptacle faces -y. It is higher for flat objects.
+# The camera looks from the front right (receptacles face -y), and from higher up at flat objects.
 _AZIMUTH = np.deg2rad(28.0)
 _ELEVATION = np.deg2rad(32.0)
 _ELEVATION_FLAT = np.deg2rad(52.0)
 _FLAT = 0.3  # largest height of flat objects, as a share of their width
-# From the upper left of the picture, and a weaker light so that shaded sides differ
+# A main light from the upper left, and a weaker one that distinguishes the shaded sides
 _LIGHTS = (
     DirectionalLight((0.75, 0.35, -0.75), diffuse=0.62, ambient=0.42),
     DirectionalLight((-0.7, 0.6, -0.2), diffuse=0.28),
@@ -166,7 +166,7 @@ def render_floorplan(
         raise RenderError(
             f"a floor plan needs bounds with min < max and a positive scale, got {bounds} m at {pixels_per_metre}/m"
         )
-    # Rounding first makes 12.8 m at 60/m 768 pixels despite binary fractions.
+    # Rounding before `ceil` removes float errors, so that 12.8 m at 60/m give 768 pixels and not 769.
     width, height = (int(np.ceil(round(s * pixels_per_metre, 6))) for s in (xmax - xmin, ymax - ymin))
     if max(width, height) * _PLAN_PROFILE.supersampling > MAX_SIDE:
         raise RenderError(
@@ -196,7 +196,7 @@ def _person_geoms(model: Any) -> NDArray[np.bool_]:
 
 
 def largest_scale(bounds: tuple[float, float, float, float]) -> float:
-    """Return the largest scale for drawing bounds (xmin, ymin, xmax, ymax, m), in pixels per metre."""
+    """Return the largest scale, pixels per metre, at which bounds (xmin, ymin, xmax, ymax), m, can be drawn."""
     xmin, ymin, xmax, ymax = bounds
     return (MAX_SIDE / _PLAN_PROFILE.supersampling - 1) / max(xmax - xmin, ymax - ymin)
 

@@ -168,7 +168,7 @@ class Rasteriser:
         hidden: NDArray[np.bool_],
         lowest: bool = False,
     ) -> Layer:
-        """Draw the scene without the mask `hidden` (ngeom,). The `lowest` layer has sky and contact shadows."""
+        """Draw the scene without the geoms in `hidden` (ngeom,). The `lowest` layer has sky and contact shadows."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         scene.flags[_Flag.mjRND_SKYBOX] &= lowest
@@ -229,7 +229,7 @@ def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8
     """Convert a drawing, rows from the bottom, to a frame of `size` (width, height), rows from the top."""
     if drawn.shape[1::-1] == size:
         return np.asarray(cv2.flip(drawn, 0), dtype=np.uint8)
-    # For a slight reduction, interpolation takes a third of the time of averaging areas, within 0.3 dB.
+    # For a slight reduction, interpolation takes a third of the time of area averaging and differs by at most 0.3 dB.
     slight = drawn.shape[1] < 1.5 * size[0]
     method = cv2.INTER_LINEAR_EXACT if slight else cv2.INTER_AREA
     return np.asarray(cv2.flip(cv2.resize(drawn, size, interpolation=method), 0), dtype=np.uint8)

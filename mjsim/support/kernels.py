@@ -58,7 +58,7 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
     folder, chosen = cache_folder(Path(function.__code__.co_filename)), config.CACHE_DIR
     if folder is not None:
-        config.CACHE_DIR = str(folder)  # read when decorating; kernels of other packages keep their folder
+        config.CACHE_DIR = str(folder)  # numba reads it when decorating; restored below for other packages
         try:
             return compiler(cache=True)(function)
         except RuntimeError:  # numba cannot cache it

@@ -164,7 +164,7 @@ def _hashes(golden: Path) -> Mapping[str, str]:
 def _store(frame: Image, path: Path, key: str) -> None:
     same = path.is_file() and np.array_equal(
         _read(path), frame
-    )  # hashes of other drivers become invalid otherwise
+    )  # a changed image invalidates the hashes of other drivers
     hashes = {**(_hashes(path) if same else {}), key: _digest(frame)}
     if not same:
         _write(path, frame)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mjsim.values.actions import StepAction
 
-_HEALTH = 7  # numbers of a `HealthSample`
+_HEALTH = 7  # number of values in a `HealthSample`
 
 
 class ObjectStatus(enum.Enum):

@@ -86,7 +86,7 @@ class PersonParameters:
     def __post_init__(self) -> None:
         for name, (low, high, unit) in RANGES.items():
             _check(name, getattr(self, name), low, high, unit)
-            object.__setattr__(self, name, float(getattr(self, name)))  # kernels are compiled for one type
+            object.__setattr__(self, name, float(getattr(self, name)))  # kernels accept only floats
         for group in GROUPS:
             object.__setattr__(self, group, _checked(group, getattr(self, group)))
 
