@@ -22,12 +22,12 @@ CHECK_ROWS = 1 << 16  # largest table that `check` fills, in about 2 s
 VERIFY_ROWS = 1 << 20  # largest table that `verify_optimal` fills, in about 30 s
 MAX_STATES = 30_000_000  # largest number of states that `verify_optimal` visits
 
-# Location, objects left (bits), and the bins of what is carried.
+# Location, remaining objects (bit mask), and bins of the carried objects.
 State = tuple[int, int, tuple[int, ...]]
 
 
 def check(problem: RoutingProblem, plan: Plan) -> float:
-    """Replay a plan against the constraints of equation 1 (PAPER section 2), and derive a lower bound of all tours, m.
+    """Check a plan against the constraints of equation 1 (PAPER section 2), and derive a lower bound on tour length, m.
 
     Up to seven objects, every order of visits is tried. Beyond, the bound follows from a spanning tree or from the
     certificate's table if that has at most 2^16 rows. Otherwise it is 0. A solver's search is not repeated, so the
@@ -41,7 +41,7 @@ def check(problem: RoutingProblem, plan: Plan) -> float:
 
 
 def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, Relaxation | None]:
-    """Do the same as `check` with tables of at most `max_rows`. Also return the relaxation if its table was filled."""
+    """Check like `check`, with tables of at most `max_rows`. Also return the relaxation if its table was filled."""
     _check_numbers(plan, replayed(problem, plan))
     rounding, certificate = allowance(problem, plan), plan.certificate
     if len(problem.shipments) + len(problem.onboard) <= EXHAUSTIVE_OBJECTS:
@@ -61,7 +61,7 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
         relaxation = Relaxation(problem, group, prices)
         derived = relaxation.root
     _refuse(certificate.root * certificate.unit, derived, rounding, "certificate's root")
-    if certificate.proof is not Proof.RELAXATION:  # the only one with a search behind it
+    if certificate.proof is not Proof.RELAXATION:  # with it, a search may have raised the bound
         _refuse(plan.lower_bound, derived, rounding, "lower bound")
     return derived, relaxation
 
@@ -82,7 +82,7 @@ def shortest_tour(
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
 
     def farthest(here: int, left: int, carried: tuple[int, ...]) -> float:
-        """Return the longest single trip left, a lower bound of the rest."""
+        """Return the longest remaining single trip, which is a lower bound on the rest of the tour."""
         trips = [direct[here][a] + direct[a][b] for k, (a, b) in enumerate(jobs) if left >> k & 1]
         return max([*trips, *(direct[here][j] for j in carried)], default=0.0)
 
@@ -192,7 +192,7 @@ class Verified:
 
     cost: float  # length of its feasible tour, m
     lower_bound: float  # no tour is shorter than this, m
-    optimal: bool  # True if the bound is the length of the tour, to twice the tolerance of the problem
+    optimal: bool  # True if bound and tour length agree within twice the problem's tolerance
     states: int  # number of states visited beyond the certificate's table
     why: str = ""  # reason why a claim of the plan is not verified, empty if all are
 

@@ -6,7 +6,7 @@ class PlannerError(Exception):
 
 
 class NavMeshError(PlannerError):
-    """Obstacles, bounds or sizes do not make a navmesh."""
+    """The obstacles, bounds or sizes of a navmesh are invalid."""
 
 
 class NotNavigableError(PlannerError):

@@ -34,7 +34,7 @@ class ShortestPath:
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Points on the navmesh, m, (m, 2), the island of each, (m,), and the vertices that they see."""
+    """Points on the navmesh (n, 2), m, the island of each, (n,), and the vertices that they see."""
 
     points: NDArray[np.float64]
     island: NDArray[np.int64]
@@ -79,7 +79,7 @@ class Geodesics:
         return ShortestPath(path, length)
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances between all pairs of points (m, 2), m: (m, m), symmetric, zero diagonal, m.
+        """Return the symmetric matrix (n, n) of geodesic distances between points (n, 2), all in m.
 
         Raises NotNavigableError if no navigable point is within `max_snap` of a point, and UnreachableError if two
         points are on different islands.
@@ -91,23 +91,23 @@ class Geodesics:
         return result
 
     def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances from one point (2,) to points (m, 2), m: (m,), m. Raises as `distances`."""
+        """Return the geodesic distances (n,) from one point (2,) to points (n, 2), all in m. Raises as `distances`."""
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
         return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances from points (s, 2) to points (t, 2), m: (s, t), m. Raises as `distances`."""
+        """Return the geodesic distances (s, t) from points (s, 2) to points (t, 2), all in m. Raises as `distances`."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
         return self._between(source, target)
 
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return points (m, 2), m, snapped if they are not navigable, and the island of each."""
+        """Return points (n, 2), m, snapped if they are not navigable, and the island of each, (n,)."""
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
             islands[k] = self.navmesh.island_of(point) or 0
-            # Snap also points that are navigable only by tolerance: from inside an obstacle, no vertex is tangent.
+            # Also snap points navigable only within the tolerance, because no tangents start inside an obstacle.
             array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 
@@ -127,7 +127,7 @@ class Geodesics:
                 self._remembered.clear()
             graph = self._graph
             view = visible_vertices(x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE)
-            self._remembered[x, y] = view  # another thread may clear the cache at once
+            self._remembered[x, y] = view  # `view` is returned because another thread may clear the cache now
         return view
 
     def _between(self, sources: _Query, targets: _Query) -> NDArray[np.float64]:

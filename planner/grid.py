@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-MARGIN = 1e-3  # m; a segment is also listed in cells that it misses by less, in case of rounding errors
+MARGIN = 1e-3  # tolerance for listing segments in cells that they narrowly miss, m
 
 
 class GridFrame(NamedTuple):
@@ -39,7 +39,7 @@ class GridFrame(NamedTuple):
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the columns and rows of points (m, 2), m, as (2, m). Points outside get the nearest cell."""
+        """Return the columns and rows (2, n) of points (n, 2), m. Points outside get the nearest cell."""
         steps = (points - (self.x_min, self.y_min)) / self.resolution
         cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
         return cells.T

@@ -22,7 +22,7 @@ class IntegerDistances:
 
     unit: float  # m per unit
     tie: int  # largest difference between tours that count as equal, units
-    rounding: float  # largest rounding of a leg, units; 0 if the unit is exact
+    rounding: float  # largest rounding error of a leg, units; 0 if the unit is exact
     used: Sequence[int]  # locations that tours visit
     # rounded distances, symmetric, 0 for locations that no tour visits, (k, k)
     legs: NDArray[np.int64]

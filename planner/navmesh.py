@@ -21,7 +21,7 @@ from planner.grid import GridFrame, crossed_cells
 TOLERANCE = 1e-4  # depth by which a path may cut into an inflated obstacle, m
 SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary, in case of rounding errors, m
 ARC_SEGMENTS = 8  # segments per quarter circle; paths differ by 0.01 % from those around true circles
-BLOCKED, MIXED = -1, -2  # cells off all islands, and cells that an outline crosses
+BLOCKED, MIXED = -1, -2  # codes of cells outside all islands, and of cells that an outline crosses
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class NavMesh:
     solid: MultiPolygon
     cells: NDArray[np.int32]
     _inner: NDArray[np.object_] = field(repr=False)  # islands shrunk by `SNAP_CLEARANCE`
-    _outer: NDArray[np.object_] = field(repr=False)  # islands grown by their tolerance
+    _outer: NDArray[np.object_] = field(repr=False)  # islands grown by half of `TOLERANCE`
 
     @classmethod
     def build(
@@ -205,7 +205,7 @@ def _cells(frame: GridFrame, islands: NDArray[np.object_], outer: NDArray[np.obj
 
 
 def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the island of each point (m, 2), m, by the exact polygons, or `BLOCKED`."""
+    """Return the island, or `BLOCKED`, of each point (n, 2), m, according to the exact polygons."""
     found = np.full(len(points), BLOCKED, dtype=np.int32)
     for index in reversed(range(len(outer))):
         found[shapely.intersects_xy(outer[index], points)] = index

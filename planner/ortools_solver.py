@@ -18,7 +18,7 @@ FIRST_SOLUTIONS = (1, 10)  # limits of the first searches of `improve`
 DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
 MAX_INSERTED = 250  # largest number of nodes for which insertion is worth its time
 MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, s
-MAX_SECONDS = 60.0  # time limit of a search that is limited by solutions but finds no more, s
+MAX_SECONDS = 60.0  # time limit, s, of a search that is limited by solutions, in case it finds too few
 
 
 @dataclass(frozen=True)
@@ -108,11 +108,11 @@ def _search(
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
     if limit.stop is not None:
-        # The search also releases the interpreter lock here.
+        # At each check of the limit, OR-Tools also releases the interpreter lock.
         routing.AddSearchMonitor(routing.solver().CustomLimit(limit.stop.is_set))
     solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MAX_INSERTED else None
     if solution is None:
-        # Insertion fails with full hands, because it inserts pairs before single nodes. Otherwise, time ran out.
+        # Insertion fails if the hands are full, because it inserts pairs before single nodes, or if time runs out.
         greedy = nearest_first(problem)
         node = {visit: k + 1 for k, visit in enumerate(visit_of)}
         first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)

@@ -31,8 +31,8 @@ class Certificate:
 
     proof: Proof
     unit: float  # m per unit
-    # bound without a search, units: the optimum of the table or of all tours, the relaxation at the start, or the
-    # length of the spanning tree. A higher lower bound of the plan depends on a complete search by the solver.
+    # lower bound without a search, units: the optimum (full table, exhaustive), the relaxation's bound at the start,
+    # or the spanning tree's length. A plan's lower bound may be higher if the solver completed a search.
     root: int
     # groups of shipments that the relaxation counts together, each shipment in one group
     groups: tuple[tuple[int, ...], ...] = ()

@@ -14,7 +14,7 @@ from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
 from planner.plan import Certificate, Plan, Status, Visit, VisitKind
 
-MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # m; range within which lengths and units of tours are normal floats
+MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # range in which tour lengths and units are normal floats, m
 ASYMMETRY = 1e-12  # relative difference of a distance between both directions that counts as rounding
 
 

@@ -123,7 +123,7 @@ def _decode(text: str | bytes, kind: type[T], hint: str) -> T:
         return found
     except UnicodeError as error:
         raise ProblemError(f"not UTF-8 ({error}); {hint}") from error
-    except ValueError as error:  # contains the path of the value, and the expected and the given type
+    except ValueError as error:  # the message names the value's path and both types
         raise ProblemError(f"{error}; {hint}") from error
     except RecursionError as error:
         raise ProblemError(f"nested too deeply; {hint}") from error

@@ -18,9 +18,9 @@ from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
 RADIUS = 1.0  # m
-MIN_RADIUS = 0.1  # m; no pass is tried with a smaller radius
-MAX_ROWS = 1 << 14  # largest table of the bound of a pass
-MAX_STATES = 3_000_000  # largest number of states of a pass, in about 200 MB
+MIN_RADIUS = 0.1  # radius below which no further pass is tried, m
+MAX_ROWS = 1 << 14  # maximum table rows for a pass's lower bound
+MAX_STATES = 3_000_000  # maximum number of states in a pass, about 200 MB
 SAME = 1e-6  # m
 
 
@@ -31,7 +31,7 @@ class Regret:
     visit: Visit
     cost: float  # length of the rest of the task if this visit is next, m
     regret: float  # excess of that over the least such cost, m
-    proven: bool  # True if the numbers are exact, or if `capped`, true lower bounds
+    proven: bool  # True if cost and regret are proven: exact, or lower bounds if `capped`
     capped: bool = False  # True if cost and regret are only lower bounds
 
 
@@ -176,7 +176,7 @@ def one_by_one(
         cost = float(problem.distances[problem.start, problem.location(visit)]) + plan.cost
         found.append((cost, visit, plan.status is Status.OPTIMAL))
     least = min((cost for cost, _, _ in found), default=0.0)
-    proven = all(proven for _, _, proven in found)  # every regret depends on the least cost
+    proven = all(proven for _, _, proven in found)  # any unproven cost makes every regret unproven
     found.sort(key=lambda entry: entry[0])
     return tuple(Regret(visit, cost, cost - least, proven) for cost, visit, _ in found)
 
@@ -188,7 +188,7 @@ def _ranked(
     longest: float = math.inf,
     least: Costs | None = None,
 ) -> tuple[Regret, ...]:
-    """Return regrets from costs in units of `unit` m, the best first. `least` bounds costs above `longest`."""
+    """Return regrets, best first, from costs in units of `unit` m. Costs above `longest` become lower bounds."""
     found = []
     for visit in possible_next(problem):
         cost, capped = costs[visit], costs[visit] > longest
@@ -212,7 +212,7 @@ def _beyond_table(
 def _around_best(
     problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...] | None:
-    """Return the regrets within the radius of a proven plan, from one pass.
+    """Return the regrets up to `radius` above the cost of a proven plan. One pass finds them all.
 
     None if the pass is too large or there is no proven plan.
     """

@@ -64,7 +64,7 @@ class Relaxation:
         self._prices = prices
         size = np.bincount(group, minlength=1)
         strides = np.concatenate([[1], np.cumprod(size + 1)])
-        self._stride = strides[group]  # difference of rows before and after a pick
+        self._stride = strides[group]  # decrease of the row index when an object is picked
         rows = np.arange(strides[-1])
         self._rest = self._filled(group, [rows // s % (k + 1) for s, k in zip(strides, size, strict=False)])
         here, after = self._begin()

@@ -127,7 +127,7 @@ class Planner:
             then(route, first or rest is None)
 
         if self.mode is Mode.THREAD:
-            self._source.check(state)  # here, so that the error ends the session at the right time
+            self._source.check(state)  # in the caller's thread, so that an impossible task fails at once
         self.do(answer)
 
     def do(self, job: Callable[[Route | None], None]) -> None:

@@ -16,8 +16,8 @@ from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
-MOVED = 0.3  # m; an object pushed farther than this since the last plan requires a new plan
-TIE = 0.01  # m; tours that differ by less count as equal, because rounding to 0.1 mm can add up to this
+MOVED = 0.3  # how far an object may be pushed before a new plan is needed, m
+TIE = 0.01  # difference below which tours count as equal, m; rounding to 0.1 mm can add up to this
 PROOF_LIMIT = SolveLimit(seconds=20.0)
 
 
@@ -28,7 +28,7 @@ class _BackgroundSearch:
     problem: RoutingProblem
     plans: Iterator[Plan]  # better and better plans
     stop: threading.Event  # set to stop the search
-    shown: tuple[Visit, ...] = ()  # the shown visits from the state of the problem on
+    shown: tuple[Visit, ...] = ()  # visits of the shown route that remain in `problem`
     # new plans, or the exception that ended the search
     found: "queue.SimpleQueue[Plan | Exception]" = field(default_factory=queue.SimpleQueue)
 
@@ -133,7 +133,7 @@ class SolverSource(PlanSource):
             self._warm = self._warm.updated(search.problem, plan)
         best = plans[-1]
         new = remaining(best.visits, state)
-        if new is None:  # its first visits were not made, so search again from here
+        if new is None:  # the plan begins with visits that were not made: search again from here
             self._show(self._new_search(state, route), rest)
             return None
         if self.problems.length(state, new) < self.problems.length(state, rest) - TIE:

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Protocol, cast
 
 from planner.errors import PlannerError
 
-if TYPE_CHECKING:  # options of commands name solvers, and must not load NumPy
+if TYPE_CHECKING:  # the command line imports this module and must not load NumPy
     from planner.plan import Plan
     from planner.problem import RoutingProblem
 
-# Name -> module and class. A new planner is a module and a line here.
+# Name -> module and class. To add a planner, add its module and an entry here.
 SOLVERS = {
     "exact": ("planner.exact.solver", "ExactSolver"),
     "ortools": ("planner.ortools_solver", "OrToolsSolver"),
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 60_000_000  # states of the exact search, for offline use: about 30 s at 30 objects
+PATIENT_WORK = 60_000_000  # budget of the exact search for offline use, states; about 30 s with 30 objects
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.route import XY, TaskState
 
-RESOLUTION = 1e-4  # m; precision of geodesics
+RESOLUTION = 1e-4  # precision of geodesics, m
 
 
 class TaskProblems:
@@ -21,8 +21,8 @@ class TaskProblems:
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
         self._capacity = capacity
-        self._snapped: dict[XY, XY] = {}  # snapped place of each visit
-        self._row: dict[XY, int] = {}  # row of each place in the distances of the last problem
+        self._snapped: dict[XY, XY] = {}  # navigable point for each position
+        self._row: dict[XY, int] = {}  # row of each place in `_distances`
         self._distances: NDArray[np.float64] = np.zeros((0, 0))
 
     def problem(self, state: TaskState) -> RoutingProblem:
@@ -71,7 +71,7 @@ class TaskProblems:
         return float(x), float(y)
 
     def _places(self, state: TaskState) -> dict[Visit, XY]:
-        """Return the navigable position of each visit that may be left."""
+        """Return the navigable position of each visit that may remain."""
         wanted = {Visit(VisitKind.PICK, name): at for name, at in state.loose.items()}
         for name in (*state.loose, *state.carried):
             wanted[Visit(VisitKind.PLACE, name)] = state.deliveries[name]

@@ -18,8 +18,8 @@ from mjsim.support.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
-SLACK = 1e-9  # m; rounding errors of lengths are smaller
-REPEATED = 1e-9  # m; corners nearer to each other count as one
+SLACK = 1e-9  # bound on the rounding errors of lengths, m
+REPEATED = 1e-9  # distance below which two corners count as one, m
 
 
 class Edges(NamedTuple):
@@ -185,7 +185,7 @@ def search_from(
     size = len(graph.vertices)
     paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))
     last, best = -1, np.inf
-    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # key and vertex; this entry stays last
+    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); this sentinel stays last
     for k in range(views.starts[point], views.starts[point + 1]):
         vertex = views.seen[k]
         paths.over[vertex] = views.lengths[k]
@@ -210,7 +210,7 @@ def search_from(
 
 @kernel
 def earlier(paths: Paths, vertex: int) -> float:
-    """Return the length of the path to the vertex before a vertex, m, or 0 if that is the start."""
+    """Return the path length at a vertex's predecessor, m, or 0 if the predecessor is the start."""
     before = paths.before[vertex]
     return float(paths.over[before]) if before >= 0 else 0.0
 

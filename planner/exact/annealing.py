@@ -41,7 +41,7 @@ def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
 
 @kernel
 def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
-    """Return the length from object i (-1: the root) over up to two bins (m: none) to object x (-1: the end)."""
+    """Return the length from object i (-1: root) via bins `b` and `then` (m: none) to object x (-1: end)."""
     m = inst.bins.shape[0]
     if b == m:
         if x < 0:
@@ -81,7 +81,7 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
 
 @inlined
 def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
-    """Compute the row `after` of pick x from the row `before` of pick i."""
+    """Compute the costs `after` at pick x from the costs `before` at pick i. See `decode`."""
     m = inst.bins.shape[0]
     c = inst.home[i]
     from_i, from_x, between = inst.to_bin[i], inst.to_bin[x], inst.bins[c]
@@ -90,7 +90,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
     nothing = before[m] + over_c
     for d in range(m):
         after[d] = before[d] + over_c
-        if d != c:  # otherwise both objects would be left at bin c
+        if d != c:  # if d == c, both objects would be left at bin c
             keep_own = min(keep_own, before[d] + from_i[d] + from_x[d])
         both = between[d] + min(from_i[d] + from_x[c], from_i[c] + from_x[d])
         nothing = min(nothing, before[d] + both)

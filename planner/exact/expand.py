@@ -18,7 +18,7 @@ from planner.exact.table import INFINITE, CostTable
 from planner.solvers import Deadline
 
 PLACE_BITS = 12
-SLICE = 1 << 12  # states expanded between two checks of the deadline, in about 5 ms
+SLICE = 1 << 12  # states expanded between two checks of the deadline, which takes about 5 ms
 CARRYING, EMPTY = range(2)  # stages of a layer: states with an object in hand, states with empty hands
 STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices of the progress in a layer
 
@@ -44,7 +44,7 @@ def row_of(table: CostTable, left: int) -> int:
 
 
 class LegEnd(NamedTuple):
-    """The end of a leg: objects left (bits), their row of the table, length so far with multipliers, and parent."""
+    """The end of a leg: remaining objects (bit mask), their table row, length so far with multipliers, and parent."""
 
     left: int
     row: int
@@ -56,7 +56,7 @@ class LegEnd(NamedTuple):
 def offer_bin(
     inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, b: int, d: int, limit: int
 ) -> None:
-    """Offer the state at bin b with an object for d (d = b: none), unless its total reaches the limit."""
+    """Add the state at bin b with an object for bin d in hand (d = b: none) if its total is below the limit."""
     total = arrival.cost + table.bin[arrival.row, b, d]
     if total < limit:
         place = b * inst.bins.shape[0] + d
@@ -67,7 +67,7 @@ def offer_bin(
 def offer_second(
     inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, j: int, d: int, limit: int
 ) -> None:
-    """Pick j with an object for d in hand, and offer the states at both bins. The leg ends at j, before the pick."""
+    """Pick j with an object for bin d in hand, and add the states at both bins. `arrival` is at j, before the pick."""
     c = inst.home[j]
     left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
     cost = arrival.cost + table.multipliers[j]
@@ -80,7 +80,7 @@ def offer_second(
 
 @inlined
 def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, i: int, limit: int) -> None:
-    """Pick i with empty hands, and offer the state there. The leg ends at i, before the pick."""
+    """Pick i with empty hands, and add the state there. `arrival` is at i, before the pick."""
     cost = arrival.cost + table.multipliers[i]
     total = cost + table.object[arrival.row - table.stride[i], i]
     if total < limit:
@@ -110,7 +110,7 @@ def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, lim
 def expand(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
-    """Offer all successors of a layer's states. Return None if the deadline passed before that was done."""
+    """Add all successors of a layer's states. Return None if the deadline passes before that."""
     progress = np.array([0, 0, 0, INFINITE, 0, -1])
     while True:
         here, after = expand_some(inst, table, here, after, limit, width, progress)
@@ -133,7 +133,7 @@ def expand_some(
     """Expand a slice of a layer: first states with an object in hand, then states with empty hands.
 
     `progress`, (6,), contains the stage, the numbers of expanded states and of all states of the stage, and the last
-    three fields of `Expanded`. Offered totals are below `limit`. `width` states of the next layer will be kept.
+    three fields of `Expanded`. Totals of added states are below `limit`. `width` states of the next layer will be kept.
     """
     if progress[STAGE] == CARRYING and progress[DONE] == 0:
         progress[OF] = here.size[0]
@@ -161,7 +161,7 @@ def expand_some(
 def expand_carrying(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int]:
-    """Offer the successors of states `first` to `last` with an object in hand. This layer must have enough space.
+    """Add the successors of states `first` to `last` with an object in hand. This layer must have enough space.
 
     Return the next layer, the smallest total dropped from it, and the number of expanded states.
     """
@@ -198,9 +198,9 @@ def expand_carrying(
 def expand_empty(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int, int]:
-    """Offer the successors of states `first` to `last` with empty hands.
+    """Add the successors of states `first` to `last` with empty hands.
 
-    Return the same as `expand_carrying`, and the index of the end of the shortest complete tour, or -1.
+    Return the values of `expand_carrying`, then the index of the end of the shortest complete tour, or -1.
     """
     n, m = inst.to_bin.shape
     smallest, expanded, end = INFINITE, 0, -1

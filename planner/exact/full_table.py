@@ -13,7 +13,7 @@ from planner.exact.table import CostTable, Solution, fill_layers, new_table, wal
 from planner.plan import Certificate, Proof
 
 COMPILER = "numba"
-SMALL_TABLE = 1 << 23  # bytes: 14 objects and 6 bins, filled in 10 ms by kernels and in 50 ms by NumPy
+SMALL_TABLE = 1 << 23  # bytes; 14 objects and 6 bins, which kernels fill in 10 ms and NumPy in 50 ms
 
 
 def full_table_bytes(inst: Instance) -> int:
@@ -40,7 +40,7 @@ def filled_table(inst: Instance) -> CostTable:
 
 
 def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
-    """Return the length of a shortest tour by a full table, and its actions as in `Solution`.
+    """Follow a full table. Return the length of a shortest tour and its actions as in `Solution`.
 
     `row` is the table row of the objects left at the root.
     """

@@ -18,7 +18,7 @@ MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
 STEP_ROWS = 60_000  # approximate number of rows filled by one fit of a large table
-SLICE = 1 << 13  # rows filled between two checks of the deadline, in about 3 ms
+SLICE = 1 << 13  # rows filled between two checks of the deadline, which takes about 3 ms
 STEP, ROW, BEST = range(3)  # indices of the progress of an ascent
 
 
@@ -40,7 +40,7 @@ class Bound:
     instance: Instance
     table: CostTable  # relaxed cost-to-go
     root: int  # bound at the root, units
-    # deviation of relaxed tours from one pick per object, weighted towards recent tours, (n,)
+    # deviation from one pick of each object in relaxed tours, averaged with more weight on recent tours, (n,)
     violation: NDArray[np.float64]
 
     @property
@@ -53,7 +53,7 @@ def first_bound(instance: Instance, upper: int) -> Bound:
     n = len(instance.home)
     table = new_table(instance, np.zeros(n, np.int64))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
-    return cast(Bound, bound)  # without a deadline it is not None
+    return cast(Bound, bound)  # without a deadline, `fit` never returns None
 
 
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:

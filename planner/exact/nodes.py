@@ -87,7 +87,7 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 @kernel
 def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
-    """Return the least number not exceeded by at least `count` of the first `size` values, (room,), by bisection."""
+    """Return the `count`-th smallest of the first `size` entries of `values`, (room,), by bisection."""
     low, high = INFINITE, -INFINITE
     for k in range(size):
         low, high = min(low, values[k]), max(high, values[k])
@@ -130,7 +130,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 
 @kernel
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
-    """Make space for more states, if necessary by dropping states that cannot be among the best `width` later."""
+    """Make space for `more` states. If needed, drop states that can no longer be among the best `width`."""
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
         nodes, smallest = keep_best(nodes, 2 * width)

@@ -39,11 +39,11 @@ def improving_tours(
     yield Solution(actions, min(lower, upper), _certificate(bound))
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
-        # An unfinished pass proves nothing, and one hardly wider than the last proves little more.
+        # An unfinished pass proves nothing, so the width is one that the remaining work allows, but above the last one.
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS and not by_bin:  # only once, because later tables are larger
+        if rows >= BIN_ROWS and not by_bin:  # once, at the first table of this size
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)

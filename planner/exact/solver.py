@@ -14,7 +14,7 @@ from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
 
 TABLE_RATE = 500e6  # approximate speed at which a full table is filled, bytes/s
-DEFAULT_WORK = 4_000_000  # states, expanded in about 4 s including tables; suits sessions, which plan often
+DEFAULT_WORK = 4_000_000  # states, about 4 s including tables; short because sessions plan often
 MAX_OBJECTS = 40
 
 

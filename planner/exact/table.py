@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from planner.exact.instance import FAR, Instance
 from planner.plan import Certificate
 
-BIN_ROWS = 50_000  # largest table that counts objects by bin, enough for 30 objects and 6 bins
+BIN_ROWS = 50_000  # maximum rows of a table grouped by bin, enough for 30 objects and 6 bins
 SPARE = 8  # entries after the last row, because kernels read eight at a time
-# Largest leg and price, in units, with which tours of 40 objects fit into int32, and largest price for int64.
+# Largest leg and largest price with which tours of 40 objects fit into int32, and largest price for int64, units.
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
 INFINITE = 1 << 60  # longer than any sum of lengths
 
@@ -43,12 +43,12 @@ class CostTable(NamedTuple):
 
     group: NDArray[np.int64]  # group of each object, numbered from 0, (n,)
     size: NDArray[np.int64]  # number of objects of each group, (groups,)
-    stride: NDArray[np.int64]  # difference of rows before and after a pick of each object, (n,)
-    # rows one after the other, flat: for each b, V(., b, d) for all d, then V(., d, b) for all d; then Y; at the
-    # end, `SPARE` entries
+    stride: NDArray[np.int64]  # decrease of the row index when an object is picked, (n,)
+    # flat array of rows. Each has V(., b, d) for all d and V(., d, b) for all d, for every b, followed by Y.
+    # `SPARE` entries follow the last row.
     entries: NDArray[np.integer[Any]]
-    bin: NDArray[np.integer[Any]]  # E and V, (rows, m, m), entry [b, d]; a view of the entries
-    # Y, (rows, n), a view of the entries, valid only if not all objects of the group of i are left
+    bin: NDArray[np.integer[Any]]  # view of E and V in `entries`, (rows, m, m), indexed [row, b, d]
+    # view of Y in `entries`, (rows, n), valid at i only in rows in which an object of i's group has been picked
     object: NDArray[np.integer[Any]]
     multipliers: NDArray[np.int64]  # price of a pick, (n,)
     dearest: int  # largest absolute value of a multiplier that fits the type of the entries

@@ -75,7 +75,7 @@ class Legs(NamedTuple):
     to_bin: Entries  # from each object to bins, (n lanes,)
     from_bin: Entries  # from bins to each object with its price, (n lanes,)
     bins: Entries  # between bins, (m lanes,)
-    # from each object to its bin, then from each object to each object with its price, ((1 + n) places,)
+    # from each object to its bin, then between objects with the price of the next pick, ((1 + n) places,)
     between: Entries
     # place of each object in a row of `between`; the objects of each bin start at a multiple of eight, (n,)
     place: NDArray[np.int64]
@@ -139,7 +139,7 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
     n, m = inst.to_bin.shape
     wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
     legs, left = legs_of(inst, table), left_of(table, first)
-    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # objects, and their W less its price
+    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # objects left; W without their prices
     empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V
     holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y
     for row in range(first, last):
@@ -180,7 +180,7 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
 def _hold(
     legs: Legs, picked: NDArray[np.int64], count: int, second: Entries, empty: Entries, holding: Entries
 ) -> None:
-    """Compute Y of a row from its W and E, in the places of the legs."""
+    """Compute Y of a row from W (`second`) and E (`empty`). `holding` is indexed like `legs.between`."""
     places, wide = holding.size, empty.size
     holding[:] = legs.far
     for eight in range(legs.bin_of.size):

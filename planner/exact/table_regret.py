@@ -47,7 +47,7 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Return the costs of all next visits, units. Costs up to `longest` are exact, and others are some larger number.
+    """Return the costs of all next visits, units. Costs up to `longest` are exact. Others are only known to exceed it.
 
     Every state on a tour of at most that length is visited, layer by layer. A sweep back then finds the shortest rest
     of the task from each. `visits` are the possible next ones: places of carried objects, then picks. The result is
@@ -77,15 +77,15 @@ def costs_by_pass(
         rest[k] = sweep(instance, layers[k], after, after_rest)
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    # If the only hand is full, `found` ends with picks that are not in `visits`.
+    # If a person with only one hand carries an object, `found` ends with picks that are not in `visits`.
     return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}
 
 
 @kernel
 def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
-    """Return the length of the rest from a state, given `rest` of all nodes, (states,).
+    """Look up the length of the rest from a state in `rest`, (states,).
 
-    `INFINITE` if it is not a node.
+    `INFINITE` if the state is not a node.
     """
     k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
     return int(rest[k]) if k >= 0 else INFINITE

@@ -96,7 +96,7 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
         return None
     left = [before.number[name] for name in problem.names[:n]]
     if any(k >= len(before.shipments) for k in left):
-        return None  # an object that was carried when the table was filled is loose now
+        return None  # an object that is now loose was carried when the table was filled
     places = [problem.place(k) for k in range(len(problem.names))]
     visits = [*map(problem.pick, range(n)), *places]
     here, there = problem.stops(visits)[1:], before.stops(visits)[1:]

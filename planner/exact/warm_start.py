@@ -16,7 +16,7 @@ from planner.problem import RoutingProblem
 
 
 class Start(NamedTuple):
-    """A warm start in the numbering of an instance."""
+    """A warm start with objects numbered as in an instance."""
 
     group: NDArray[np.int64]  # group of each object, numbered from 0, (n,)
     multipliers: NDArray[np.int64]  # price of picking each object, units, (n,)
