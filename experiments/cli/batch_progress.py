@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from experiments.trials.trial_reader import OnRead
 
-MAX_SHARDS_SHOWN = 100  # in the list of shards to repeat
+MAX_SHARDS_SHOWN = 100  # length limit of the list of shards to rerun
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -86,7 +86,7 @@ def run_with_progress(
 
 @contextmanager
 def _progress_bars() -> "Iterator[tuple[Progress, OnRead]]":
-    """Yield progress bars, and a function that shows how many finished trials were read."""
+    """Yield progress bars, and a callback that shows the progress of reading finished trials."""
     from experiments.cli.terminal import counting_bars
 
     with counting_bars("{task.description}") as bars:

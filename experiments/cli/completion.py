@@ -18,7 +18,7 @@ examples:
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "completion",
-        help=None,  # lets completion list this command
+        help=None,  # even None makes the completion script include the command
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -22,7 +22,7 @@ EXTRAS = {
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "doctor",
-        help=None,  # lets completion list it
+        help=None,  # even None makes the completion script include the command
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -45,13 +45,13 @@ def require_extra(extra: str) -> None:
 
 
 def add_checkout_command(commands: Any, name: str, module: str) -> None:
-    """Add the subcommand of a module that may exist only in the source checkout, or one that reports its absence."""
+    """Add a subcommand of the source checkout. If its module is not installed, the subcommand reports this."""
     try:
         importlib.import_module(module).add_parser(commands)
     except ModuleNotFoundError as error:
         if not module.startswith(str(error.name)):
             raise
-        # Without a prefix for options, the parser accepts any arguments.
+        # No argument starts with a null character, so the parser accepts all options as positional arguments.
         parser = commands.add_parser(
             name, help="needs the source checkout", add_help=False, prefix_chars="\0"
         )

@@ -1,4 +1,4 @@
-"""The end of a failed command: an error line, an exit code and, if the fault may be in mjsim, a report."""
+"""Error handling of commands: an error line, an exit code and, for faults in mjsim or custom code, a report."""
 
 import os
 import platform
@@ -32,7 +32,7 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
     code, text = exit_code(error), message(error)
     if code == USAGE_ERROR and (
         location := user_code_location(error.__cause__)
-    ):  # custom code was not loadable
+    ):  # the custom code could not be loaded
         code, text = FAILED, f"{text}{location}; traceback in {_report(error, words)}"
     elif code is None:
         text = f"internal error ({type(error).__name__}: {text}); please send in the report {_report(error, words)}"
@@ -50,7 +50,7 @@ def exit_code(error: Exception) -> int | None:
     from mjsim.values.errors import MjsimError, PhysicsError, RenderError
     from planner.errors import PlannerError
 
-    # Errors such as a full disk or a missing driver, which no other command line would avoid
+    # Errors that other arguments would not avoid, such as a full disk or a missing driver
     failures = (PhysicsError, RenderError, ReplayError, UserCodeError, OSError, MemoryError, ImportError)
     if isinstance(error, failures):
         return FAILED

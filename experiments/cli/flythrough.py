@@ -65,7 +65,7 @@ def film_house(
     with counting_bars("frames of the film") as bars:
         bar = bars.add_task("frames", total=None)
         return write_flythrough(
-            house.in_language(language, house.texts),  # captions have only labels, no HUD texts
+            house.in_language(language, house.texts),  # captions use labels but no HUD texts
             path,
             film or FilmConfig(),
             seconds=seconds,

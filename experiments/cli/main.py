@@ -36,7 +36,7 @@ COMMANDS = {
     "doctor": "show versions and check that rendering works",
     "completion": "print a completion script for a shell",
 }
-MODULES = {"import": "import_"}  # modules that cannot have the name of their command
+MODULES = {"import": "import_"}  # command that is a Python keyword -> its module
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # not in the wheel
 
 DESCRIPTION = """\
@@ -70,7 +70,7 @@ examples:
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """Return the parser, with the options of the loaded commands or, without any, a line about each command."""
+    """Return the parser with the options of the `loaded` commands. If there are none, it only lists all commands."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -91,7 +91,7 @@ def parser(*loaded: str) -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked up only then, for a fast start."""
+    """Prints the version. It is looked up only on request because that takes time."""
 
     def __init__(self, option_strings: Sequence[str], dest: str) -> None:
         super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
@@ -114,13 +114,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line. Exit codes: 0 success, 1 failure, 2 bad input, 70 a bug in mjsim, 128 + n signal n."""
     words = sys.argv[1:] if argv is None else list(argv)
     if argv is None and not sys.warnoptions:
-        warnings.simplefilter("ignore")  # those of libraries mean nothing to users
+        warnings.simplefilter("ignore")  # library warnings are not meant for users
     postpone_gl()
-    if sys.stderr is None:  # closed: messages must not go to standard output
+    if sys.stderr is None:  # closed; `print` would write messages to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
     if argv is None:
         faulthandler.enable(all_threads=False)  # reports file and line if the process crashes
-    if sys.stdout is None:  # closed: writing must fail, or output would be lost silently
+    if sys.stdout is None:  # closed; make writes fail instead of losing output silently
         os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
@@ -150,7 +150,7 @@ def _run(words: list[str]) -> int:
         sys.path.append(here)  # for custom participants, conditions and planners
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
-        commands.error(f"{bad} has no value")  # argparse would read an empty list
+        commands.error(f"{bad} has no value")  # argparse would parse it as an empty list
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

@@ -20,15 +20,15 @@ from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solvers import SOLVERS
 
-PERSON_VALUES = {  # the most used parameters of a person, each with an option
+PERSON_VALUES = {  # the most common parameters of a person, each with its own option
     "walking_speed": "preferred walking speed",
     "turning_speed": "fastest turn of the body",
     "reach": "largest distance, from the body's axis, for picking and placing",
     "field_of_view": "horizontal field of view of the picture and of the participant's perception",
     "reading_time": "how long the participant stands and reads before each visit",
 }
-PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the page of `mjsim play`
-# The settings that run, batch and play have in common
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the browser page of `mjsim play`
+# Settings shared by run, batch and play
 TRIAL_OPTIONS = tuple(
     name
     for name in SETTINGS
@@ -89,7 +89,7 @@ def add_command(
     description: str,
     summary: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a subcommand. `summary` is its line in a list of subcommands (`mjsim --help` has its own)."""
+    """Add a subcommand. `summary` is its line in the parent's help, except for `mjsim`, which uses `COMMANDS`."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=summary, description=description, formatter_class=HelpFormatter
     )
@@ -113,7 +113,7 @@ def add_call_limit(parser: argparse.ArgumentParser) -> None:
 
 
 class _CallLimit(argparse.Action):
-    """Sets an environment variable, which workers inherit, because the limit is not a setting of a trial."""
+    """Passes the limit to workers in an environment variable, because it is not a setting of a trial."""
 
     def __call__(self, _parser: Any, _namespace: Any, value: Any, _option: Any = None) -> None:
         os.environ[CALL_LIMIT] = str(value)
@@ -135,7 +135,7 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     parser.add_argument(option, **{**arguments, **changes})
 
 
-NAMES: dict[str, Callable[[], str]] = {  # setting -> its possible values, for its help
+NAMES: dict[str, Callable[[], str]] = {  # setting -> function that lists its possible values for the help
     "user": lambda: (
         f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
         "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
@@ -165,7 +165,7 @@ def add_task_options(parser: argparse.ArgumentParser, objects: int) -> None:
 
 
 def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
-    """Add the settings that run, batch and play have in common. Options without a default are None if not given."""
+    """Add the settings shared by run, batch and play. Options without a default are None if not given."""
     for name in TRIAL_OPTIONS:
         add_setting(parser, name, **({"default": defaults[name]} if name in defaults else {}))
     usual = PersonParameters()
@@ -211,7 +211,7 @@ def add_frame(
     profile: str = FAST.name,
     otherwise: str = "",
 ) -> None:
-    """Add `--size` and `--profile` with these defaults. `otherwise` describes the size if there is no default."""
+    """Add `--size` and `--profile` with these defaults. `otherwise` tells in the help what applies without a size."""
     default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
         "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"

@@ -141,7 +141,7 @@ class _PlanningThread(threading.Thread):
         self.answered = False
         self._error: BaseException | None = None
         self._stop_planning = threading.Event()
-        self._over = threading.Event()  # not `join`, which ends when a signal arrives
+        self._over = threading.Event()  # used instead of `join`, which a signal would end
         self._planner, self._problem = planner, problem
         self._since, self._seconds = started, seconds
 
@@ -150,7 +150,7 @@ class _PlanningThread(threading.Thread):
             for plan in self._plans():
                 self.answered = (
                     self.best is not None or self._seconds is None
-                )  # with a time limit, the first plan is greedy
+                )  # with a time limit, the first plan is greedy and does not count
                 self.best = plan
         except BaseException as error:  # custom planners can raise anything
             self._error = error
@@ -158,7 +158,7 @@ class _PlanningThread(threading.Thread):
             self._over.set()
 
     def _plans(self) -> Iterator[Plan]:
-        """Yield better and better plans, within the time limit or a large limit on the exact planner's work."""
+        """Yield successively better plans, within the time limit or a large limit on the exact planner's work."""
         seconds = self._seconds
         if seconds is not None:
             from planner.greedy_solver import first_plan  # imported late for a fast start

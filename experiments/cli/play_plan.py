@@ -60,11 +60,11 @@ def plan_of_play(
     if questions:
         shown.insert(shown.index(STORY) + 1, COMPREHENSION)
     texts = _texts(arguments.language, questions)
-    # A fixed episode is not repeated because the result page shows its shortest way.
+    # A fixed episode is played only once, because the result page reveals its shortest path.
     again = task.episode is None
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
-        """Give each visit its own order seed, so that the arrangement of hands varies."""
+        """Give each visit its own order seed, so that the order of the task list varies."""
         order, house = task.order_seed + place.person_id - 1, place.house_seed
         seeds = {"order_seed": order % (MAX_SEED + 1), "house_seed": house % (MAX_SEED + 1)}
         return trials_of(msgspec.structs.replace(task, **seeds))

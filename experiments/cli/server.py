@@ -65,12 +65,12 @@ async def serve(
     print(url, *(url_of(at) for _, at in others), sep="\n", flush=True)
     if not arguments.no_open:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    # Uvicorn servers pass a signal on, from the last started to the first.
+    # The server started last handles a signal first. Each server then passes it to the one started before.
     await asyncio.gather(*(http_server(one).serve([at]) for one, at in ((app, listener), *others)))
 
 
 def http_server(app: Any) -> Any:
-    """Return a server of an ASGI application, with the limits of all our servers."""
+    """Return an HTTP server for an ASGI application, with the limits common to all servers of mjsim."""
     import uvicorn  # imported late for a fast start
 
     from experiments.web.protocol import MAX_TEXT

@@ -31,7 +31,7 @@ participants is marked as such: it is not evidence about people."""
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "study",
-        help=None,  # lets completion list the command
+        help=None,  # even None makes the completion script include the command
         description=DESCRIPTION,
         formatter_class=HelpFormatter,
     )

@@ -85,7 +85,7 @@ def _recruiter(study: "Study") -> "Recruiter":
 
     try:
         return recruiter(study.settings.recruitment)
-    except ConfigError:  # listed as a problem of the file
+    except ConfigError:  # the check lists it as a problem of the study file
         return OpenLink()
 
 
