@@ -38,7 +38,7 @@ def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
         database.executescript(
             f"PRAGMA auto_vacuum=FULL; PRAGMA locking_mode=EXCLUSIVE; PRAGMA synchronous=FULL; {_SCHEMA};"
         )
-        if path.exists():  # otherwise another process adopted it before it was locked
+        if path.exists():  # if missing, another process renamed it before it was locked
             return database
         database.close()
 
@@ -59,7 +59,7 @@ def pack(run: Path, database: sqlite3.Connection) -> None:
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
-    """Rename finished archives to their final names. Return the number of archives still being written.
+    """Give finished archives their final names. Return the number of archives still being written.
 
     A run that a killed writer did not commit is rolled back.
     """
@@ -70,7 +70,7 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
                 database.execute(_SCHEMA)
                 database.execute("BEGIN EXCLUSIVE")
                 empty = database.execute("SELECT 1 FROM sqlar").fetchone() is None
-                if path.exists():  # otherwise another process adopted it first
+                if path.exists():  # if missing, another process renamed it first
                     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
                     path.unlink() if empty else path.rename(path.with_name(path.name[1:]))
         except sqlite3.Error as error:

@@ -27,8 +27,8 @@ TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "object_position": ("f8", (OBJECTS, 3)),  # m
     "object_quaternion": ("f8", (OBJECTS, 4)),  # wxyz
     "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
-    # Kind (0 move, 1 pick, 2 place), object index or -1, forward and left (m/s), turn and look (rad/s). Object index
-    # n + i is entry i of `unknown_objects`, the names in actions that match none of the n objects.
+    # Kind (0 move, 1 pick, 2 place), object index or -1, speeds forward and left (m/s), turning and looking (rad/s).
+    # With n objects, index n + i denotes entry i of `unknown_objects`: names in actions that match no object.
     "action": ("f8", (6,)),
     # Fields of `HealthSample`, NaN if not measured
     "penetration_m": ("f8", ()),
@@ -37,7 +37,7 @@ TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "weld_error_rad": ("f8", (2,)),
     "settle_s": ("f8", ()),
 }
-# Extra columns while a record is being written: hash of the state, number of log entries before the control step
+# Columns needed only while a record is written: state hash, and number of log entries before the control step
 _WRITTEN = {"state_hash": ("u8", ()), "logged": ("i8", ())}
 HEALTH = ("penetration_m", "trunk_penetration_m", "weld_error_m", "weld_error_rad", "settle_s")
 STATUSES = (ObjectStatus.LOOSE, ObjectStatus.CARRIED, ObjectStatus.DELIVERED)
@@ -75,7 +75,7 @@ def row_type(objects: int) -> np.dtype[Any]:
 
 
 def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield name and values, shape (n, ...), of the columns that states determine."""
+    """Yield the name and the values, shape (n, ...), of each column that is computed from states."""
     columns = states._asdict()
     health = columns.pop("health")
     yield from columns.items()

@@ -109,7 +109,7 @@ class ScrollEvent(LoggedEvent, frozen=True):
     rows: int
 
 
-TYPES = tuple(LoggedEvent.__subclasses__())  # without `OutcomeEvent`, which has a type for each kind
+TYPES = tuple(LoggedEvent.__subclasses__())  # excludes `OutcomeEvent`, defined below, and its subtypes
 
 
 class OutcomeEvent(LoggedEvent, frozen=True):

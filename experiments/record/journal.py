@@ -159,7 +159,7 @@ def _intact(content: bytes, path: Path) -> tuple[tuple[Header | JournalEntry, ..
 
 
 def _lock(file: int, path: Path) -> None:
-    """Wait until no other process has the file open. A worker that lost its server takes a moment to end."""
+    """Lock the file. Wait if another process has it open, such as a worker that is still ending after its server."""
     until = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:

@@ -15,11 +15,11 @@ from mjsim.values.actions import EventKind
 from mjsim.values.motion_parameters import GROUPS
 
 REGRETFUL_M = 0.01  # smaller regrets are ties
-COSTLY_M = 0.1  # smallest cost of a deviation that counts in `nd_regret_10cm`
+COSTLY_M = 0.1  # `nd_regret_10cm` counts deviations with a larger regret
 # Fields of the start event that describe the record, not the settings of the trial
 PROVENANCE = {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order"}
 PROVENANCE |= {"person", "behaviour"}
-# Fields of `metrics.json` that do not follow from log and trajectory. Only the file's checksum protects them.
+# Fields of `metrics.json` that cannot be computed from log and trajectory. Only the file's checksum protects them.
 CIRCUMSTANCES = ("frames_sha256", "renderer", "wall_s")
 # Metric -> kind of event that it counts
 COUNTED = {
@@ -154,7 +154,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 
 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
-    """Return the participant's values, except those of the hands, as columns such as `person_walking_speed`."""
+    """Return the participant's parameters, without the groups, as columns such as `person_walking_speed`."""
     logged: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
     body = {f"person_{name}": value for name, value in logged["person"].items() if name not in GROUPS}
     model = logged.get("behaviour") or {}
@@ -200,7 +200,7 @@ def _over_familiarisation(events: Sequence[Event], completion: float) -> float |
 
 
 def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dict[int, float]:
-    """Return the known regrets in metres by number of the visit, logged with the visit or in a later `regret` event."""
+    """Return the known regrets in metres by visit number. They are logged with the visit or in a later event."""
     found = {k: visit.get(name) for k, visit in enumerate(visits)}
     found |= {e["visit"]: e[name] for e in events if e["event"] == "regret" and name in e}
     return {k: float(regret) for k, regret in found.items() if regret is not None}

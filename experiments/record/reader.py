@@ -67,7 +67,7 @@ class Record:
         return int(np.searchsorted(self._offsets, self.recording["log_size"][step]))
 
     def events_of(self, step: int) -> tuple[Event, ...]:
-        """Return the events logged at a control step. Those before the first step count to it."""
+        """Return the events logged at a control step. Step 0 includes all earlier events."""
         return self.events[self.events_before(step) if step else 0 : self.events_before(step + 1)]
 
     @cached_property
@@ -117,9 +117,7 @@ class Record:
         return decode_action(self.trajectory["action"][step], [*self.names, *unknown])
 
     def observation(self, step: int) -> Observation:
-        """Return the state before a control step. Eye height and velocity are nominal because the assistant ignores
-        them.
-        """
+        """Return the state before a control step, with nominal eye height and velocity (unused by the assistant)."""
         row = {name: column[step] for name, column in self.trajectory.items() if name in TRAJECTORY_COLUMNS}
         left, right = (None if i < 0 else self.names[i] for i in row["hands"])
         return Observation(
@@ -173,7 +171,7 @@ def assemble(
     checkpoints: Mapping[int, WorldState],
     participant: Any = None,
 ) -> Record:
-    """Build a record from rows of `columns.row_type`, a log, unknown names in actions, and checkpoints by step."""
+    """Build a record. `rows` have type `columns.row_type`. `unknown` lists names in actions that match no object."""
     trajectory = {name: np.ascontiguousarray(rows[name]) for name in TRAJECTORY_COLUMNS}
     log_size, log_hash = log.at([*rows["logged"], log.entries])
     recording = {

@@ -73,11 +73,11 @@ class EventLog:
 
     @property
     def event_counts(self) -> NDArray[np.int64]:
-        """Number of filled-in lines among the first k lines, for each k, shape (entries + 1,)."""
+        """Cumulative number of filled-in lines: value k counts those among the first k lines, shape (entries + 1,)."""
         return np.cumsum([0, *map(bool, self._lines)])
 
     def at(self, entries: list[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
-        """Return size and hash of the content after each number of `entries`, both of shape (n,).
+        """Return size and hash of the log cut off after each number of lines in `entries`, both of shape (n,).
 
         Sizes are in bytes, hashes are the first 64 bits of SHA-1.
         """

@@ -13,7 +13,7 @@ from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
 SHOWN_NAMES = 3  # number of existing files that an error names
-SAMPLE = 100  # folders of a batch that are inspected; inspecting all takes long on a network file system
+SAMPLE = 100  # number of inspected folders of a batch; inspecting all is slow on a network file system
 TRIALS = "trials"  # folder of runs in the folder of a batch
 PACKED = ".sqlar"  # suffix of an archive of runs
 VISIT = "visit.json"  # file in the folder of each visit of `mjsim play`
@@ -114,7 +114,7 @@ def check_file(path: Path, *, replace: bool = False) -> None:
 
 @contextmanager
 def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = None) -> Iterator[Path]:
-    """Yield a working folder, which is moved to `path` when the block ends, even by an error.
+    """Yield a working folder that is moved to `path` at the end of the block, even after an error.
 
     A folder without metrics is deleted instead.
 
@@ -210,7 +210,7 @@ def _existing(folder: Path) -> Path:
 
 def _check_writable(folder: Path) -> None:
     try:
-        with tempfile.TemporaryFile(dir=folder):  # has no name, so nothing can be left behind
+        with tempfile.TemporaryFile(dir=folder):  # an unnamed file cannot be left behind
             pass
     except OSError as error:
         raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error

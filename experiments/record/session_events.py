@@ -76,8 +76,7 @@ class ParticipantEvent(LoggedEvent, frozen=True):
 
 
 class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
-    """A phase before the task started; the task clock stays at 0. Logs of tasks without earlier phases have no such
-    event.
+    """A pre-task phase started. The task clock stays at 0. Tasks without such phases have no such event.
 
     Attributes:
         phase: `story`, `flythrough` or `training`.
@@ -87,7 +86,7 @@ class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
 
 
 class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
-    """A phase before the task ended.
+    """A pre-task phase ended.
 
     Attributes:
         phase: As in `phase_begun`.

@@ -35,13 +35,13 @@ class Mismatch:
 
 
 def damage(record: Record) -> list[Mismatch]:
-    """List contradictions between a record and its own lengths and hashes, by control step."""
+    """Check a record against its own lengths and hashes. Return the mismatches, sorted by control step."""
     checks = (_lengths, _actions, _log, _checkpoints, _lines, _settings)
     return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step)
 
 
 def derived_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
-    """Yield differences between the plans and metrics on disk and those that follow from a verified record."""
+    """Compare the plans and metrics on disk with those computed from a verified record. Yield the mismatches."""
     plans = record.plans
     yield from _derived(directory, record, records.PLAN, lambda found: _plan_fault(found, plans))
     yield from _derived(directory, record, records.METRICS, lambda found: _metrics_fault(found, record))

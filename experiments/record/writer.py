@@ -29,7 +29,7 @@ from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, mo
 from mjsim.world.world import World
 
 FIRST_CAPACITY = 4096  # rows allocated at first; doubled when full
-NOTHING_FILMED = "none: nothing was filmed"  # recorded as the renderer of a run without a film
+NOTHING_FILMED = "none: nothing was filmed"  # value of `renderer` in a run without a film
 
 
 class RecordWriter:
@@ -116,7 +116,7 @@ class RecordWriter:
         return int(self._columns["state_hash"][self._length - 1])
 
     def pass_checkpoint(self, world: World, now: Observation) -> Observation:
-        """If a checkpoint is due, take it and restore the world from it. Return the resulting observation."""
+        """If a checkpoint is due, take it and restore the world from it. Return the new observation, else `now`."""
         if not self._due(world, now.busy):
             return now
         state = self.checkpoints[self.step] = world.state()
@@ -124,7 +124,7 @@ class RecordWriter:
         return world.restore(state)
 
     def steps_to_checkpoint(self, world: World) -> int:
-        """Return the number of control steps until the next checkpoint is due by the rule, at least 1."""
+        """Return the number of control steps until a checkpoint can be due, at least 1."""
         return max(1, self._last_checkpoint + _period(world) - self.step)
 
     def commit(self, participant: Any = None) -> None:
@@ -137,7 +137,7 @@ class RecordWriter:
         ]
         events = self.log.events[self._committed :]
         rows = self._rows[: self._length]
-        rows["logged"] = self.log.event_counts[rows["logged"]]  # the journal has no empty lines of the log
+        rows["logged"] = self.log.event_counts[rows["logged"]]  # the journal omits empty log lines
         self._journal.append(
             JournalEntry(rows.tobytes(), list(map(json.dumps, events)), self._unknown, states, participant)
         )
@@ -225,7 +225,7 @@ def save_record(
     try:
         _write(folder, record, metrics)
     except OSError as error:
-        if record.participant is not None:  # it was read from a journal, which still holds it
+        if record.participant is not None:  # the record came from a journal, which still has it
             raise
         shutil.rmtree(folder, ignore_errors=True)
         metrics["frames_sha256"] = None
