@@ -58,7 +58,7 @@ class Assistant:
         )
         self._deliveries = deliveries(self._house, self._episode)
         self._paths = PathsToNext(self._house.geodesics)
-        self._path_from: Observation | None = None  # start of paths that are still to be computed
+        self._path_from: Observation | None = None  # state from which paths are still to be computed, if any
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
         self.is_custom = is_own(self._show)
@@ -98,15 +98,15 @@ class Assistant:
         return self._planner.pending
 
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
-        """Process a walk during which nothing happened, with the same result as `observe` of each step.
+        """Process a walk without events. The result is the same as if `observe` were called at every step.
 
-        `positions`, (n, 2), are those of the person after every control step, m. `observation` is the state at the end.
+        `positions` are those of the person after every control step, m, shape (n, 2). `observation` is the final state.
         """
         if (places := self._places_to_follow(observation)) is not None:
             self._paths.path.follow(positions, *places)
 
     def observe_recorded(self, observation: Observation, events: Sequence[Event]) -> None:
-        """Observe a recorded control step by the events that were logged in it, and the state after it."""
+        """Observe the state after a recorded control step, and the events logged during the step."""
         for event in events:
             if event["event"] == "attempt" and event["refusal"] is not None:
                 self.show_message(event["refusal"], observation.time, event["object"])
@@ -129,7 +129,7 @@ class Assistant:
         self._board.scroll(rows)
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
-        """Return the present HUD state. Conditions need the eye camera to point to a goal out of view."""
+        """Return the current HUD state. With `camera`, the eye camera, conditions can point to a goal out of view."""
         view = self._board.view(
             observation,
             ahead=PlanView(self._board, observation, lambda: self._planner.route, self._paths_to),
@@ -148,7 +148,7 @@ class Assistant:
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
-        """Return the visits that are possible next, the best first, or nothing until their regrets are known."""
+        """Return the possible next visits, best first. The result is empty until their regrets are known."""
         return tuple(
             Choice(
                 visit,
@@ -161,7 +161,7 @@ class Assistant:
         )
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not known in time."""
+        """Log the regrets that were not yet known when their visits were logged."""
         self._log.finish(time)
 
     def task_state(self, observation: Observation) -> TaskState:
@@ -175,7 +175,7 @@ class Assistant:
         )
 
     def _plan(self, observation: Observation) -> None:
-        """Keep to the plan, or make a new one if the task is no longer as planned."""
+        """Keep the plan as long as the task follows it, otherwise make a new one."""
         before = self._planner.replans if self.shows_plan else 0
         self._log.plan(
             observation.time, self.task_state(observation), self._last_visit_at, shown=self.shows_plan
@@ -194,7 +194,7 @@ class Assistant:
     def _places_to_follow(
         self, observation: Observation
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return `_places` of the next visit, or None if no path to it was asked for."""
+        """Return `_places` of the next visit, or None if no condition has asked for a path to it."""
         if self._path_from is not None or (visit := self._planner.next) is None:
             return None
         return self._places(observation, visit)
@@ -205,7 +205,7 @@ class Assistant:
     def _places(
         self, observation: Observation, visit: Visit
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the end of the path to a visit, and the goal of the visit, m, both of shape (2,)."""
+        """Return the end of the path to a visit, and the goal of the visit, both in m, shape (2,)."""
         goal = self._goal(observation, visit)
         if visit.kind is VisitKind.PICK:
             return goal, goal
@@ -213,7 +213,7 @@ class Assistant:
 
 
 def deliveries(house: House, episode: Episode) -> dict[str, XY]:
-    """Return the place where a person stands to deliver each object, m, by name."""
+    """Return by object name the place (m) where a person stands to deliver the object."""
     return {name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()}
 
 

@@ -14,13 +14,13 @@ from mjsim.house.compiled.house import compiled_house
 from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
 
-EYE_HEIGHT = PersonParameters().eye_height  # m; the film is the same for all people
+EYE_HEIGHT = PersonParameters().eye_height  # of the default person, because everyone sees the same film
 STEP = 0.04  # time between two rows, s
 SPEED = 1.3  # m/s
 TURNING = math.radians(75.0)  # rad/s
-LOOK_AHEAD = 0.8  # m; the moving camera looks at the point of the path this far ahead
-BIN_TIME = 2.0  # s for which the camera rests on a bin
-BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m before the end of the path, tried in turn until the bin is seen
+LOOK_AHEAD = 0.8  # m; how far ahead on its path the moving camera looks
+BIN_TIME = 2.0  # how long the camera rests on a bin, in seconds
+BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m to the end of the path, tried until the bin is seen
 SMOOTHING = 0.25  # standard deviation of the Gaussian filter, s
 _FIELD = FieldOfView.of(PersonParameters())
 
@@ -39,7 +39,7 @@ class CameraPath:
         return len(self.headings) * STEP
 
     def at(self, times: NDArray[np.float64]) -> "CameraPath":
-        """Return the rows at these times, s, shape (m,)."""
+        """Return the camera path sampled at these times (s), shape (m,)."""
         rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
         bins = tuple(self.bins[row] for row in rows)
         return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)
@@ -47,7 +47,7 @@ class CameraPath:
 
 @dataclass(frozen=True, eq=False)
 class _Stop:
-    """A place (2,), m, from which the camera looks at a bin, or around if `bin` is None."""
+    """A place on the floor from which the camera looks at a bin, or around if `bin` is None."""
 
     place: Point
     bin: str | None = None
@@ -112,8 +112,8 @@ class _Camera:
 def camera_path(house: House) -> CameraPath:
     """Return the path through a house. Calls with the same house return the same path.
 
-    In each room the camera looks around from the middle viewpoint, then goes to the bins of the room, always to the
-    nearest one left. It continues in the nearest room left.
+    In each room the camera looks around from the middle viewpoint, then visits the room's bins, each time the
+    nearest one left. It continues with the nearest room left.
     """
     stops = {room: _stops(house, room) for room in house.viewpoints}
     room = next(iter(stops))
@@ -130,7 +130,7 @@ def camera_path(house: House) -> CameraPath:
 
 
 def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: float) -> dict[str, float]:
-    """Return the time at which a viewer of the film first sees each bin, s, by receptacle key.
+    """Return by receptacle key the time (s) at which a viewer of the film first sees each bin.
 
     The viewer looks every `interval` s. Bins that are not seen are missing.
     """
@@ -158,7 +158,7 @@ def _stops(house: House, room: str) -> list[_Stop]:
 
 
 def _bin_place(house: House, start: Point, key: str) -> Point:
-    """Return a place on the path to a bin from which the bin is seen, m, (2,)."""
+    """Return the place (m, shape (2,)) on the path to a bin from which the camera looks at the bin."""
     points = np.asarray(house.geodesics.shortest_path(start, house.approaches[key]).points)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     compiled, bin_ = compiled_house(house.catalogue), house.receptacles[key]
@@ -183,7 +183,7 @@ def _visit(camera: _Camera, house: House, stops: Sequence[_Stop]) -> None:
 
 
 def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
-    """Yield the first stop, then always the nearest one left."""
+    """Yield the first stop, then repeatedly the nearest remaining one."""
     left = list(stops)
     stop = left.pop(0)
     yield stop

@@ -23,10 +23,10 @@ class Familiarisation:
     """The phases before the task."""
 
     ended: tuple[dict[str, Any], ...]  # fields of the `phase_ended` event of each phase, in order
-    seen: frozenset[str] | None  # keys of the bins that were seen; None if all are known
+    seen: frozenset[str] | None  # keys of the bins that the participant has seen, or None if all are known
 
     def trained(self, events: Sequence[Event]) -> "Familiarisation":
-        """Return this familiarization with a training that logged these events. The bin used in it is known."""
+        """Return a copy that includes a training with these events. The bin used in the training counts as seen."""
         used = {event["receptacle"] for event in events if event["event"] == "placed"}
         end = {"phase": TRAINING, "duration_s": events[-1]["t"], "reason": events[-1]["reason"]}
         return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
@@ -82,5 +82,5 @@ def story_text(path: Path | None = None) -> str:
 
 
 def reading_time(text: str) -> float:
-    """Return the time in which an adult reads a text silently, s."""
+    """Return the time (s) in which an adult reads a text silently."""
     return 60.0 * len(text.split()) / READING_SPEED

@@ -31,7 +31,7 @@ def write_flythrough(
     seconds: float | None = None,
     on_progress: OnFrames = lambda *_: None,
 ) -> str:
-    """Write the film of a house atomically, and return the SHA-256 of its frames, which equal arguments reproduce.
+    """Write the film of a house atomically. Return the SHA-256 of its frames, the same for equal arguments.
 
     The film takes `seconds`, at least 1 s, or by default as long as the camera path. `on_progress` is called with the
     numbers of drawn frames and of all frames. Raises ConfigError if the film is too short.

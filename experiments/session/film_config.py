@@ -36,7 +36,7 @@ class FilmConfig:
 
     @property
     def margins(self) -> tuple[int, int, int, int]:
-        """Space above, below, left and right of the picture, px, such that frames have even sizes."""
+        """Margins (px) above, below, left and right of the picture. They make the frame size even."""
         if not self.beside:
             return 0, 0, 0, 0
         from hud.layout import margins  # imported late, because the command line imports this module

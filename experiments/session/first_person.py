@@ -141,7 +141,7 @@ class TrialFilm:
         except RecordError as error:
             self._give_up(error)
         if self._renderer is not None:
-            with contextlib.suppress(RenderError):  # a driver that is gone has nothing to free
+            with contextlib.suppress(RenderError):  # nothing is left to free if the driver has failed
                 self._renderer.close()
         if self.failure is not None:
             self._path.unlink(missing_ok=True)

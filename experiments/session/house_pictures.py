@@ -16,11 +16,11 @@ from mjsim.values.person_parameters import PersonParameters
 
 SIZE = (960, 640)  # px
 FIELD = math.radians(62.0)  # vertical field of view, wider than a person's to show a room from its corner
-SCALE, MARGIN = 70.0, 0.4  # scale of the plan, px/m, and margin around it, m
+SCALE, MARGIN = 70.0, 0.4  # scale of the plan (px/m) and margin around it (m)
 TEXT, LINE = 13, 16  # font size and line height on the plan, px
-TARGET_HEIGHT = 0.9  # m; views are directed to this height above the middle of a room
+TARGET_HEIGHT = 0.9  # m; height of the point in the middle of a room at which views aim
 PLACES = 3000  # number of sampled places to stand
-SMALL, FAR = (96, 64), 4.0  # size of the depth images in which views are compared, px, and largest depth, m
+SMALL, FAR = (96, 64), 4.0  # size (px) and maximum depth (m) of the depth images that rank the views
 
 
 def draw_house(house: House, folder: Path) -> list[Path]:
@@ -43,7 +43,7 @@ def draw_house(house: House, folder: Path) -> list[Path]:
 def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:
     """Draw the house from above with names and areas of the rooms, RGB.
 
-    The plan fills `within`, width and height in px. Without it, the scale is fixed.
+    The plan fills the size `within` (width and height, px). Without it, the scale is fixed.
     """
     x0, y0, x1, y1 = house.bounds
     bounds = x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
@@ -63,7 +63,7 @@ def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[n
 
 
 def _write_over(plan: NDArray[np.uint8], lines: tuple[str, ...], x: int, y: int) -> None:
-    """Write lines of text centred at a pixel, on lightened ground."""
+    """Write lines of text, centred at a pixel, on a lightened background."""
     widths = [_width(text) for text in lines]
     half, top = max(widths) // 2 + 3, y - len(lines) * LINE // 2
     ground = plan[max(top, 0) : top + len(lines) * LINE + 4, max(x - half, 0) : x + half]
@@ -98,7 +98,7 @@ def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]
 def _corner_views(
     house: House, room: str, places: NDArray[np.float64], center: NDArray[np.float64]
 ) -> list[CameraPose]:
-    """Return views to the middle of a room (2,), m, from the farthest place (n, 2) in each quarter around it."""
+    """Return views of a room from its corners: from the farthest of the `places` in each quadrant around the center."""
     offsets = places - center
     quarters = (offsets > 0) @ (1, 2)
     mine = [np.flatnonzero(quarters == quarter) for quarter in range(4)]

@@ -17,7 +17,7 @@ CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in a claimed length or
 
 
 def planner_named(name: str, *, exact: bool = True) -> Solver:
-    """Return the planner of this name. A custom one is checked, and with `exact` the exact planner bounds its tours.
+    """Return the planner of this name. Custom plans are checked and, with `exact`, bounded by the exact planner.
 
     Raises PlannerError if there is no such planner.
     """
@@ -28,8 +28,8 @@ def planner_named(name: str, *, exact: bool = True) -> Solver:
 class OwnPlanner:
     """A custom planner, whose plans are replayed before use.
 
-    Length, bound and status of the returned plans are computed here. A wrong length is an error. `exact` bounds the
-    tours. Without it, the bound is that of the check.
+    Length, bound and status of its plans are computed again, and a wrong length is an error. The bound is that of the
+    planner `exact` or, without it, of the check.
     """
 
     def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
@@ -88,7 +88,7 @@ class OwnPlanner:
                     f"the lower bound of {said.lower_bound:.6f} m exceeds the cost of {cost:.6f} m"
                 )
             bound = check(problem, Plan(visits, cost, 0.0, Status.FEASIBLE, said.seconds))
-        except Exception as error:  # the plan may contain anything
+        except Exception as error:  # a custom plan can contain anything, so any error can occur
             raise UserCodeError(
                 f"{self._what} gave a plan that does not hold: {describe(error)}{where}"
             ) from error
@@ -106,7 +106,7 @@ def _copied(problem: RoutingProblem) -> RoutingProblem:
 
 
 def _bounded(problem: RoutingProblem, plan: Plan, cost: float, bound: float) -> Plan:
-    """Return a plan with this length and bound, m."""
+    """Return the plan with this length and bound (m)."""
     optimal = cost - bound <= problem.tolerance(cost)
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(plan.visits, cost, cost if optimal else bound, status, float(plan.seconds))

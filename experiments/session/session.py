@@ -22,7 +22,7 @@ from mjsim.world.world import World
 
 # Logged events whose cause is outside the simulation.
 EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display", "draw")
-FINAL_HOLD = 1.6  # s for which the viewer sees the world after the last delivery
+FINAL_HOLD = 1.6  # how long the viewer sees the world after the last delivery, in seconds
 
 
 class Viewer(Protocol):
@@ -164,10 +164,10 @@ class Session:
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once, for one control step or as many as a path or a wait takes."""
+        """Let the participant act once. Paths and waits can take many control steps, other actions take one."""
         self._observe()
         if self.assistant.is_custom:
-            self._hud_state()  # a faulty condition ends the session even if nothing is shown
+            self._hud_state()  # so that a faulty condition ends the session even without a viewer
         world = self._world
         percept = SessionPercept(
             self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked
@@ -274,7 +274,7 @@ class Session:
         self._log_events(step.events)
 
     def _record_end(self, reason: str) -> None:
-        """Record the last state. After the last delivery, show it for a moment, which does not count."""
+        """Record the last state. After the last delivery, show it for a moment that is not part of the record."""
         if reason == ALL_DELIVERED:
             self.assistant.show_message("finished", self._now.time)
         self.record.append(self._now, self._world.health_sample, self._world.state_hash(), Steps(IDLE))
@@ -301,7 +301,7 @@ class Session:
             self.assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
-        """Return the present HUD state, which is computed once per state."""
+        """Return the current HUD state, which is computed once per world state."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
             self._hud = self._now, self.assistant.hud_state(self._now, camera)

@@ -1,4 +1,4 @@
-"""The paths to the next visit that a HUD may show: the plan's segment, and the path from the person."""
+"""Paths to the next visit that a HUD can show: one as planned, and one from the person's position."""
 
 import math
 
@@ -9,8 +9,8 @@ from experiments.participants.base import Point
 from mjsim.world.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
 
-TOLERANCE = 0.6  # m; a new path is shown if the person is farther from the path
-MAX_GOAL_SHIFT = 0.25  # m; a new path is shown if the goal was pushed farther
+TOLERANCE = 0.6  # m; a new path is shown if the person is farther than this from the path
+MAX_GOAL_SHIFT = 0.25  # m; a new path is shown if the goal was pushed farther than this
 
 
 class ShownPath:
@@ -46,7 +46,7 @@ class ShownPath:
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
     def follow(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
-        """Show a new path wherever the person has left the last one. `positions` are successive ones, m, (n, 2)."""
+        """Show a new path each time the person has left the path. `positions` are successive, in m, shape (n, 2)."""
         off = -1
         while self._rerouted and self._points is not None:
             off = first_off_path(self._points, positions, off + 1, TOLERANCE)
@@ -65,14 +65,14 @@ class ShownPath:
 
 
 class PathsToNext:
-    """The paths to the next visit: the plan's `segment` from the last visit, and the `path` from the person."""
+    """Paths to the next visit: the planned `segment` from the last visit, and the `path` from the person."""
 
     def __init__(self, geodesics: Geodesics) -> None:
         self.segment = ShownPath(geodesics, rerouted=False)
         self.path = ShownPath(geodesics, rerouted=True)
 
     def begin(self, last_visit: Point, position: Point, target: Point, goal: Point) -> None:
-        """Lead to another visit. All positions are in m, shape (2,), as in `ShownPath`."""
+        """Show paths to another visit. All positions are in m, shape (2,), as in `ShownPath`."""
         self.segment.begin(last_visit, target, goal)
         self.path.begin(position, target, goal)
 

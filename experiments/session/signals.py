@@ -11,7 +11,7 @@ from typing import Any, NoReturn, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 T = TypeVar("T")
-CHECK_TIMEOUT_S = 2.0  # a trial that has not checked for signals after this time is interrupted
+CHECK_TIMEOUT_S = 2.0  # a trial that does not check for signals within this time is interrupted
 
 
 class Stopped(KeyboardInterrupt):

@@ -22,7 +22,7 @@ from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
 
-READING_TIME = 2.0  # s for which a message is shown before the announcement of a new plan replaces it
+READING_TIME = 2.0  # how long a message is shown before a new plan may be announced, in seconds
 REPLANNED = "replanned"
 
 
@@ -31,7 +31,7 @@ def task_step(visit: Visit) -> TaskStep:
 
 
 class _Shown(NamedTuple):
-    """A message by its key, the time since which it is shown, s, and its object."""
+    """A message in the message bar: its key, the time (s) at which it appeared, and its object."""
 
     key: str
     since: float
@@ -107,14 +107,14 @@ class TaskBoard:
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or refusal from `time`, s, in place of the last one."""
+        """Show a message about an event or refusal at `time` (s), in place of the previous one."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:
             self._replanned_at = None
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Announce a new plan made at `time`, s, once the last message was shown for `READING_TIME`."""
+        """Announce a new plan made at `time` (s), after the previous message has been shown for `READING_TIME`."""
         self._replanned_at = time
 
     def view(
@@ -168,7 +168,7 @@ class TaskBoard:
         )
 
     def _shown(self, time: float) -> "_Shown":
-        """Return the message of the bar at a time, s, whether or not it has faded."""
+        """Return the latest message at a time (s), even if it has already faded from the message bar."""
         if self._replanned_at is None:
             return self._latest
         since = max(self._replanned_at, self._latest.since + READING_TIME)

@@ -16,9 +16,9 @@ from planner.service import Planner
 
 
 class TaskLog:
-    """Requests plans and logs them in every condition, because deviations count in all of them (PAPER section 6).
+    """Requests and logs plans. It does so even in conditions that show none, to measure deviations (PAPER section 6).
 
-    A line gets its place in the log at once, and its content when the planner has answered.
+    Lines of the log are reserved at once and filled in when the planner has answered.
     """
 
     def __init__(
@@ -85,12 +85,12 @@ class TaskLog:
         self._last_visit_at = position
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not known in time."""
+        """Log the regrets that were not yet known when their visits were logged."""
         for (number, names), regret in self._planner.finish():
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
     def _distance_to(self, state: TaskState, made: Visit) -> float:
-        """Return the planner's distance from the place of the last visit to the place of this one, m.
+        """Return the planner's distance (m) from the place of the last visit to the place of this one.
 
         The place of a delivery is in front of the bin.
         """
@@ -116,7 +116,7 @@ class TaskLog:
         }
 
     def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
-        """Return the regrets of a visit and of the suggested one. The next visit of a proven plan has none."""
+        """Return the regrets of a visit and of the suggested one. The next visit of an optimal plan has regret 0."""
         proven = route is not None and route.plan.status is Status.OPTIMAL
         suggested = route.next if route else None
         names: dict[Visit, tuple[str, ...]] = {made: ("regret_m",)}
@@ -131,7 +131,7 @@ class TaskLog:
 
 
 def _plan_fields(route: Route) -> dict[str, Any]:
-    """Return the fields of a plan in the log. Cost and bound are those of the state that it was made for."""
+    """Return the log fields of a plan. Cost and bound refer to the state for which the plan was made."""
     return {
         "cost_m": round(route.plan.cost, 6),
         "lower_bound_m": round(route.plan.lower_bound, 6),
@@ -149,7 +149,7 @@ def _rounded(metres: float | None) -> float | None:
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:
-    """Return a lower bound of the walk in any order of visits, m. `tour` is one of all tours between their places, m.
+    """Return a lower bound (m) on walking for any order of visits. `tour` (m) bounds it without reaching for objects.
 
     A person who picks and places from a distance can save that distance on the way to a place and again on the way from
     it, except after the last visit. Objects are assumed to stay in place, and arms to reach over free floor only.
@@ -164,7 +164,7 @@ def reach_bound(tour: float, house: House, episode: Episode) -> float:
 
 
 def _extent(receptacle: ReceptacleGeometry) -> float:
-    """Return the distance on the floor from a receptacle's approach to the farthest point of its volume, m."""
+    """Return the horizontal distance (m) from a receptacle's approach to the farthest point of its volume."""
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * receptacle.half_size
     floor = (corners @ receptacle.rotation.T + receptacle.center)[:, :2]
     return float(np.linalg.norm(floor - receptacle.approach, axis=1).max())

@@ -72,7 +72,7 @@ def _call_limit() -> float:
 
 @contextmanager
 def _time_limit(limit: float) -> Iterator[None]:
-    """Interrupt the block after a time, s. 0 means no limit. Has no effect outside the main thread."""
+    """Interrupt the block after a time (s). 0 means no limit. Has no effect outside the main thread."""
     if not limit or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -100,7 +100,7 @@ def is_own(code: object) -> bool:
 def make_participant(
     name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
 ) -> Participant:
-    """Make a participant for a house, with these values of its model's parameters if it has any.
+    """Make a participant for a house. `behaviour` sets the parameters of the participant model, if it has any.
 
     Raises ConfigError if there is no such participant, and UserCodeError if a custom one is faulty.
     """

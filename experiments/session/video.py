@@ -20,7 +20,7 @@ QUEUE_LENGTH = 8  # frames
 class VideoWriter:
     """Writes frames to an MP4 file. Use it as a context manager to complete the file.
 
-    Width and height, px, must be even (4:2:0 chroma). Raises RecordError if they are not, or the encoder failed.
+    Width and height (px) must be even (4:2:0 chroma). Raises RecordError if one is odd, or if the encoder failed.
     """
 
     def __init__(self, path: Path, *, width: int, height: int, fps: int = 25) -> None:
@@ -69,7 +69,7 @@ class VideoWriter:
     def _encode(self) -> None:
         try:
             self._encode_all()
-        except BaseException as failure:  # handed to the writing thread, which raises it
+        except BaseException as failure:  # raised later, in the thread that adds frames
             self._failure = failure
             while self._queue.get() is not None:
                 pass

@@ -34,12 +34,12 @@ from mjsim.house.compiled.house import MAX_HOUSES
 from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
-RETRIES = 5  # how often a trial is repeated because its machine was lost, before it runs alone
+RETRIES = 5  # how often a trial is rerun after the loss of its machine before it is run alone
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """Numbers of trials done and failed in this call, and done by an earlier call, and the latest failure."""
+    """Numbers of trials that this call has finished, that earlier calls finished, and that failed; the last failure."""
 
     done: int
     resumed: int
@@ -93,13 +93,13 @@ def run_batch(
             noted.add(line)
             on_note(line)
 
-    out = out.absolute() if executor == RAY else out  # machines have different current folders
+    out = out.absolute() if executor == RAY else out  # the current folder may differ on other machines
     check_batch_folder(out)
     trials = design.trials if shard is None else shard.of(design).trials
     inputs = check_trials(trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     label = "" if shard is None else shard.label
-    adopt(out / TRIALS, label)  # archives of a killed batch
+    adopt(out / TRIALS, label)  # recovers the archives of a killed batch
     own = None if shard is None else {trial_name(*trial) for trial in zip(trials, inputs, strict=True)}
     readers = workers or os.cpu_count() or 1
     reader = TrialReader(out, workers=readers, on_read=on_read, names=own, label=label)
@@ -153,7 +153,7 @@ def _results(
 ) -> Iterator[StoredTrial | str]:
     """Yield each trial that succeeds, or an error message. Trials whose process may die are run last, one by one.
 
-    Trials are run house by house, because making a house takes longer than many a trial.
+    Trials are run house by house, because making a house takes longer than many trials.
     """
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
@@ -175,7 +175,7 @@ def _results(
 
 
 def _died(path: Path) -> Path:
-    """Return the marker of a trial during which a process died, perhaps because of another trial."""
+    """Return the marker file of a trial that was running when a process died. Another trial may have been the cause."""
     return path.with_name(f".{path.name}.died")
 
 
@@ -203,7 +203,7 @@ def _together(
             (path, config), error = running.pop(future), future.exception()
             if isinstance(
                 error, ConfigError | ConnectionError
-            ):  # of the cluster; errors of trials are strings
+            ):  # from the cluster, because trials return their errors as strings
                 raise error
             if isinstance(error, LostMachineError) and lost[path] < RETRIES:
                 lost[path], left[path] = lost[path] + 1, config
@@ -232,7 +232,7 @@ _archive = functools.cache(new_archive)  # one per process, open until the proce
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
     """Run a trial and read it. Return an error as text, because not every exception can be pickled.
 
-    The trial runs in the work folder of the batch. With `archives`, the prefix of their names, it is packed.
+    The trial runs in the work folder of the batch. If `archives`, a prefix of archive names, is given, it is packed.
     """
     with nullcontext(out.parent) if archives is None else work_folder(folder) as parent:
         run = parent / out.name
@@ -244,7 +244,7 @@ def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> 
             finally:
                 if archives is not None and is_run(run):
                     pack(run, _archive(out.parent, archives))
-                    if is_run(out):  # an earlier run that ended early
+                    if is_run(out):  # an earlier, incomplete run
                         shutil.rmtree(out)
         except Exception as error:  # an error in one trial must not stop the others
             return _failure(error).replace(str(run), str(out))

@@ -1,8 +1,10 @@
 """The folder of a batch.
 
-OUT/trials/NAME      one run directory per trial OUT/trials/ARCHIVE.sqlar    packed trials, many in one file
-OUT/outdated/NAME    trials that were run again because something that they depend on has changed OUT/trials.parquet,
-OUT/trials.csv    one row per trial OUT/.rows.jsonl.gz   cache of rows (`trial_reader`)
+OUT/trials/NAME                  run directory of a trial
+OUT/trials/ARCHIVE.sqlar         packed trials, many in one file
+OUT/outdated/NAME                trials that were run again because something that they depend on has changed
+OUT/trials.parquet, trials.csv   one row per trial
+OUT/.rows.jsonl.gz               cache of rows (`trial_reader`)
 """
 
 import functools
@@ -158,7 +160,7 @@ def write_rows(
 
 
 def in_order(trials: Sequence[TrialConfig], found: Sequence[StoredTrial]) -> list[StoredTrial]:
-    """Return the complete trials, those of the design first and in its order."""
+    """Return the complete trials. Those of the design come first, in its order."""
     order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
     complete = [trial for trial in found if trial.complete]
     return sorted(complete, key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
@@ -169,7 +171,7 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
-    """Yield lines about unexpected content and gaps of the tables."""
+    """Yield notes about trials that the tables leave out or that may not be comparable."""
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (

@@ -133,7 +133,7 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
 
 
 def _may_be_small(trial: TrialConfig) -> bool:
-    """Return True for houses that may lack room for the points. Those of the package have room for the default."""
+    """Return True if the house may be too small for the points. Houses of this package fit the default number."""
     custom = parse_house(trial.house).kind != "shipped"
     return trial.episode is None and (custom or trial.points > POINTS)
 
@@ -171,7 +171,7 @@ def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters
 
 
 def _may_not_fit(trial: TrialConfig) -> bool:
-    """Return True unless the default participant meets a condition of this package, which always works."""
+    """Return False only for the default participant in a condition of this package, as these always work together."""
     return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in CONDITIONS
 
 

@@ -56,7 +56,7 @@ def factorial(
     seeds: Sequence[int],
     **same: Any,
 ) -> Design:
-    """Combine all values, with the seed changing fastest. All trials have the `same` other fields of `TrialConfig`."""
+    """Combine all values, with the seed varying fastest. `same` has the `TrialConfig` fields that all trials share."""
     for name, values in (("objects", objects), ("assistance", assistance), ("user", users), ("seeds", seeds)):
         if not values:
             raise ConfigError(f"a batch needs at least one value for --{name}")
@@ -84,7 +84,7 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     houses: str | list[str] | None = None  # names, or generated homes such as "generated:0:200?rooms=5"
 
     def each(self) -> list[dict[str, Any]]:
-        """Return seeds and house of every trial. Short lists are repeated.
+        """Return the seeds and house of each trial. Shorter lists are repeated.
 
         Further trials of a person take houses, or house seeds, at even distances in these lists, so that a house that
         comes first for one person comes second for another.
@@ -126,7 +126,7 @@ class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
     cells: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1)]
     all_cells: dict[str, Any] = msgspec.field(default_factory=dict)
     exclusions: Exclusions | None = None
-    study: dict[str, Any] = msgspec.field(default_factory=dict)  # read by `experiments.study.file`
+    study: dict[str, Any] = msgspec.field(default_factory=dict)  # parsed by `experiments.study.file`
 
 
 def read_design(path: Path) -> Design:

@@ -70,7 +70,7 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A person excluded by id, and the reason."""
 
-    id: Name | int  # value in one of the columns `IDS`
+    id: Name | int  # the person's value in one of the columns `IDS`
     reason: Reason
 
 

@@ -1,6 +1,6 @@
 """What a trial depends on besides its settings: files, source code and libraries, by hash or version.
 
-A resumed batch compares them with the present ones, and runs trials again if something has changed.
+A resumed batch compares them with the current ones, and reruns trials for which something has changed.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def code_versions(modules: Iterable[str] = ()) -> dict[str, str]:
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:
-    """Return 16 hex digits over a trial's settings and inputs. Paths of files do not count, but their content does."""
+    """Hash a trial's settings and inputs to 16 hex digits. The content of files counts, their paths do not."""
     settings = {name: value for name, value in config.settings().items() if name not in PATHS}
     return hashlib.sha256(json.dumps([settings, sorted(inputs.items())]).encode()).hexdigest()[:16]
 
@@ -70,7 +70,7 @@ def plugins(config: TrialConfig) -> tuple[str, ...]:
 
 @functools.cache
 def plugin_digest(module: str) -> str:
-    """Return 16 hex digits over the source of a module: its file, or the whole top-level package."""
+    """Hash the source of a module to 16 hex digits: its file, or the whole top-level package."""
     spec = importlib.util.find_spec(module.partition(".")[0])
     if spec is None:
         return ""

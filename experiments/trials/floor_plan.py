@@ -27,10 +27,10 @@ CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC7
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
 PIXELS_PER_METRE = 90  # scale, unless the house is large
-MAX_SIDE = 1920  # longest side of the picture of the house, px
-MARGIN, ROW, COLUMN = 28, 24, 240  # frame around the house, line and column of the legend, px
-DASH, PERIOD = 8, 15  # of a dashed line, px
-_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # a line in the legend, px
+MAX_SIDE = 1920  # longest side of the house picture (px)
+MARGIN, ROW, COLUMN = 28, 24, 240  # frame around the house, and row and column of the legend (px)
+DASH, PERIOD = 8, 15  # length and spacing of dashes (px)
+_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # ends of a sample line in the legend (px)
 _SHIFT = 4  # fractional bits of coordinates in OpenCV
 
 _Points = NDArray[np.float64]
@@ -73,7 +73,7 @@ def task_picture(
 def _drawn_task(
     house: House, episode: Episode, lines: Mapping[str, tuple[_Points, str]], start: _Points
 ) -> "_Drawing":
-    """Draw all but the title. `lines` has paths and colours by their text in the legend; planned ones are dashed."""
+    """Draw everything but the title. `lines` maps legend texts to paths and colours. Planned paths are dashed."""
     drawing = _Drawing(house)
     for points, colour in lines.values():
         drawing.line(points, colour, dashed=colour == PLANNED)
@@ -96,7 +96,7 @@ def _drawn_task(
 
 
 def planned_path(house: House, episode: Episode, plan: Event, seen: Observation | None = None) -> _Points:
-    """Return the path (k, 2), m, of a `plan` event made for the observation `seen`, or else for the start."""
+    """Return the path, m, shape (k, 2), of a `plan` event from the person's place in `seen`, by default the start."""
     if seen is None:
         places = {o.name: np.array(o.position[:2]) for o in episode.objects}
         here = np.array([episode.start.x, episode.start.y])

@@ -132,7 +132,7 @@ def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> li
 def _shards(
     trials: Sequence[TrialConfig], missing: Iterable[TrialConfig], folders: Iterable[Path]
 ) -> dict[Shard, int]:
-    """Count missing trials by shard. The number of shards is the most frequent one among the files of rows."""
+    """Count missing trials by shard. The number of shards is the one that most row files have in their names."""
     files = Counter(
         int(match[1])
         for folder in folders

@@ -30,12 +30,12 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 def check_person(described: Distributions) -> None:
     """Check distributions with the median person. Raises a `ConfigError` if a distribution is invalid."""
-    if described:  # otherwise it is the default person
+    if described:  # without distributions, it is the default person
         _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
 def view_limits(text: str) -> tuple[float, float]:
-    """Parse `1.2,1.9`, the limits of the field of view, rad, that a person may choose."""
+    """Parse `1.2,1.9`, the limits (rad) of the field of view that a person may choose."""
     least, most, _ = RANGES["field_of_view"]
     try:
         low, high = map(float, text.split(","))

@@ -20,7 +20,7 @@ from experiments.session.signals import SIGNALS
 
 TRIAL_BYTES = 300_000_000  # memory of a trial with compiled kernels
 QUEUED_PER_CORE = 2
-PERIOD_S = 5.0  # between two checks of the cluster
+PERIOD_S = 5.0  # time between two checks of the cluster
 HEAD_TIMEOUT_S = 60.0  # how long the head of the cluster may take to restart
 END_S = 10.0  # how long cancelled calls may take to end
 # By default, Ray ends this process without a message after a minute without the head, and sends usage statistics.
@@ -160,7 +160,7 @@ class _Cluster:
         return dict(cores.keys()), sum(cores.values())
 
     def _watch(self) -> None:
-        """Until the end, update the number of cores. Fail all calls if the head of the cluster does not answer."""
+        """Update the number of cores until `end`. Fail all calls if the head of the cluster stops answering."""
         address = self._ray.get_runtime_context().gcs_address
         answered = time.monotonic()
         while time.monotonic() - answered < HEAD_TIMEOUT_S:
@@ -174,7 +174,7 @@ class _Cluster:
             f"the head of the Ray cluster at {address} does not answer; start it and try again"
         )
         while not self._ended.wait(0.1):
-            with suppress(InvalidStateError, KeyError):  # a call has just ended, or none is running
+            with suppress(InvalidStateError, KeyError):  # the call has just ended, or no call is running
                 self._running.popitem()[0].set_exception(lost)
 
 

@@ -55,9 +55,8 @@ class Shard:
 def shard_numbers(trials: Sequence[TrialConfig], count: int) -> list[int]:
     """Return the shard of each trial, from 1 to `count`.
 
-    It depends only on the number of trials and on their houses. A shard gets whole houses as far as possible, because
-    making a house takes longer than many a trial. Within a house, trials are shuffled, so that shards take similar
-    times.
+    The result depends only on the number of trials and their houses. Shards get whole houses where possible, because
+    making a house takes longer than many trials. Trials of a house are shuffled, so that shards take similar times.
     """
     houses = {house: k for k, house in enumerate(dict.fromkeys(trial.house for trial in trials))}
     order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _shuffle_key(k)))

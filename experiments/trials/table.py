@@ -133,7 +133,7 @@ def trial_columns() -> Columns:
 
 
 def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
-    """Return type and description of the fields that a class itself defines. All must be in its docstring."""
+    """Return type and description of a class's fields, without inherited ones. Its docstring must describe them all."""
     texts, hints = _attributes(kind), typing.get_type_hints(kind)
     names = (
         [field.name for field in dataclasses.fields(kind)]

@@ -18,7 +18,7 @@ from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solvers import DEFAULT_SOLVER
 
-SECONDS_PER_OBJECT = 150.0  # several times as long as the slowest searcher takes
+SECONDS_PER_OBJECT = 150.0  # several times what the slowest participant, `searcher`, needs
 SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
 DRAWN_BY = ("auto", "browser", "server")
@@ -26,7 +26,7 @@ MAX_SEED = 2**63 - 1  # largest integer in tables
 
 
 def _about(description: str, **extra: Any) -> msgspec.Meta:
-    """Describe a setting. `extra` has `metavar` and `choices` of its option, and `path` if designs resolve it."""
+    """Describe a setting. `extra` has `metavar` and `choices` of its option, and `path` if the setting is a path."""
     return msgspec.Meta(description=description, extra=extra)
 
 
@@ -230,7 +230,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def view_limits(self) -> tuple[float, float] | None:
-        """Limits of the field of view, rad, that a person may choose, or None without a choice."""
+        """Limits (rad) of the field of view that a person may choose, or None without a choice."""
         return None if self.field_of_view_range is None else view_limits(self.field_of_view_range)
 
     @property

@@ -25,7 +25,7 @@ from mjsim.support.files import replacing, source_digest
 
 ROWS = ".rows.jsonl.gz"
 UNSTAMPED: Stamp = ()
-POOL_FROM = 500  # number of unread trials from which worker processes are worth their start-up time
+POOL_FROM = 500  # number of unread trials from which worker processes save time
 
 OnRead = Callable[[int, int], None]  # called with the numbers of trials read and to be read
 
@@ -72,7 +72,7 @@ class TrialReader:
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
-        """Add a trial that was read elsewhere. One that was packed afterwards has the stamp `UNSTAMPED`."""
+        """Add a trial that was read elsewhere. Its stamp is `UNSTAMPED` if it was packed after that."""
         self._known[trial.path.name] = trial
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
@@ -110,7 +110,7 @@ class TrialReader:
             with suppress(BrokenProcessPool), worker_pool(self._workers) as pool:
                 for result in pool.map(_read, unread, chunksize=20):
                     yield next(left), result
-        for path in left:  # all, or those that a broken pool has left
+        for path in left:  # all paths, or those that a broken pool did not read
             yield path, _read(path)
 
     def _trial(self, row: _CachedRow) -> StoredTrial:

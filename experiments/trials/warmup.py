@@ -40,13 +40,13 @@ def compile_kernels(house: House | None = None) -> None:
 
 
 def plan() -> None:
-    """Plan a tour by the full table and by the search, with regrets, and again from a warm start."""
+    """Solve a problem by the full table and by search, with regrets, then again from a warm start."""
     places = np.random.default_rng(0).random((16, 2))
     distances = np.linalg.norm(places[:, None] - places[None], axis=2)
-    for resolution in (1e-4, None):  # tables in 32 bits, and in 64
+    for resolution in (1e-4, None):  # 32-bit tables, then 64-bit tables
         shipments = tuple(Shipment(4 + k, 1 + k % 3) for k in range(12))
         tour = RoutingProblem(distances, 0, shipments, (), 2, resolution=resolution)
-        for table_bytes in (ExactSolver.table_bytes, 0):  # the full table, and the search
+        for table_bytes in (ExactSolver.table_bytes, 0):  # by the full table, then by search
             ExactSolver(table_bytes=table_bytes).solve(tour)
             regrets(tour, ExactSolver(table_bytes=table_bytes))
         searching = ExactSolver(table_bytes=0)

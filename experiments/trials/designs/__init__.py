@@ -24,7 +24,7 @@ def study_path(name: str) -> Path:
 
 
 def read_study(path: Path, people: int | None = None) -> Design:
-    """Read the simulated participants of a study file, all or the first `people`, with cells taking turns.
+    """Read the simulated participants of a study file, alternating between cells. `people` limits their number.
 
     Raises:
         ConfigError: The file, the number, or a trial for a person is invalid.

@@ -28,12 +28,12 @@ from experiments.session.assistant import WORLD_EVENTS
 from experiments.session.familiarise import watch_flythrough
 from experiments.trials.replay.replayer import Replayer
 
-# Events that follow from the physics and the assistant. Plans and regrets are taken from the log without a new search;
-# only the hashes of the log protect them.
+# Events that a replay computes again. Plans and regrets are taken from the log without a new search, so only the hashes
+# of the log protect them.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
 REGRETS = frozenset({"regret_m", "suggested_regret_m"})
 SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # checked by simulating the run again
-DERIVED = (records.PLAN, records.METRICS)  # follow from those
+DERIVED = (records.PLAN, records.METRICS)  # computed from these files
 
 
 def simulated_mismatches(replayer: Replayer) -> Iterator[Mismatch]:

@@ -25,7 +25,7 @@ _TOP_DOWN_FOV = math.radians(
     20.0
 )  # narrow, so that the camera is far away and walls hide little of the floor
 _FREE_FOV = math.radians(50.0)
-_MARGIN = 1.12  # because the tops of walls are nearer to the camera than the floor
+_MARGIN = 1.12  # extra camera distance, because the tops of walls are nearer than the floor
 _ORBIT_PERIOD_S = 90.0
 _ELEVATION = math.radians(52.0)
 _BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that no object in a house has

@@ -22,7 +22,7 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
-MAX_WIDTH = 1280  # widest view in a film that has the shape of a page, px
+MAX_WIDTH = 1280  # maximum width (px) of the view in a film with the shape of the person's page
 
 Point = tuple[float, float, float]
 
@@ -33,8 +33,8 @@ class ReplayFilm:
 
     Attributes:
         path: Video file to write.
-        config: Frame size and render profile, or None for the shape of the person's page, else the default size, with
-            `profile`.
+        config: Frame size and render profile. With None, frames have the shape of the person's page if there was
+            one, else the default size.
         camera: `first-person` (with the HUD), `top-down`, or `free`.
         eye: Position of a free camera, m, or None to circle the house.
         target: Target of a free camera, m, or None for the middle of the floor.
@@ -149,7 +149,7 @@ def replay(
 
 
 def _mismatches(replayer: Replayer) -> list[Mismatch]:
-    """Return all differences of a replay and of files, by step. The least specific, checksums, come last."""
+    """Return all mismatches of a replay and of files, by step. Checksums come last, being the least specific."""
     directory, record = replayer.directory, replayer.record
     simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
     found = sorted(simulated, key=lambda mismatch: mismatch.step)
@@ -177,7 +177,7 @@ def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
 
 
 def as_seen(record: Record, profile: str) -> FilmConfig:
-    """Return film settings like the page on which the browser drew last, or the defaults."""
+    """Return film settings that match the page on which the browser last drew the view, or the defaults."""
     views = [
         event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
     ]
