@@ -1,4 +1,4 @@
-"""The study file: a design (docs/batches.md) with a table `[study]`. Errors name the line."""
+"""The study file: a batch design (docs/batches.md) plus a `[study]` table. Error messages name the line."""
 
 import hashlib
 import itertools
@@ -28,9 +28,8 @@ PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
-Site = Annotated[
-    str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")
-]  # origin: scheme, host and port
+# an origin: scheme, host and port
+Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]
 
 HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be addressed without TLS
 
@@ -43,24 +42,24 @@ class Pay(_Table, frozen=True):
     """Payment of participants, in units of the currency."""
 
     currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
-    reward: Money = 0.0  # for the whole study
+    reward: Money = 0.0  # for completing the study
     screen_out: Money = 0.0  # for screened-out participants
-    bonus_for_all: Money = 0.0  # for putting all objects away
+    bonus_for_all: Money = 0.0  # additional payment for putting all objects away
     fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee, as a share of the pay
     wage: Money = 0.0  # hourly wage below which `mjsim study check` reports the pay as too low
-    partial: bool = False  # pay a share to participants who leave after the task has started
+    partial: bool = False  # True to pay part of the reward to participants who leave during or after the task
 
 
 class Recruitment(_Table, frozen=True):
     """Recruitment platform, with the codes and ids that it expects."""
 
     platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
-    completed: Code = ""  # completion codes of the platform
+    completed: Code = ""  # completion codes, as set up on the platform
     screened_out: Code = ""
     no_consent: Code = ""
     study_id: Code = ""  # the platform's study id; participants of its other studies are refused
-    sites: tuple[Site, ...] = ()  # origins of the platform's pages; an ExternalQuestion is embedded in them
-    api_url: str = ""  # the platform's API, if not the default
+    sites: tuple[Site, ...] = ()  # origins of the platform's pages, which embed an ExternalQuestion
+    api_url: str = ""  # URL of the platform's API, if not the default
 
     def __post_init__(self) -> None:
         url = urlsplit(self.api_url)
@@ -71,7 +70,7 @@ class Recruitment(_Table, frozen=True):
 
 
 class StudySettings(_Table, frozen=True):
-    """The table `[study]`."""
+    """Contents of the `[study]` table."""
 
     name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
     title: str
@@ -112,7 +111,7 @@ class StudySettings(_Table, frozen=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the design, with one trial per place."""
+    """A cell of the design, with the trial of each wanted participant."""
 
     trials: Sequence[TrialConfig]
 
@@ -122,13 +121,13 @@ class Cell:
         return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
 
     def trial(self, place: int) -> TrialConfig:
-        """Return the trial of a place, counted from 0. Places beyond the last repeat the trials."""
+        """Return the trial for the place with this index. Indexes beyond the last trial wrap around."""
         return self.trials[place % len(self.trials)]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study file that was read and checked, with its texts."""
+    """A validated study file with its texts."""
 
     path: Path
     sha256: str  # hash of the file
@@ -232,7 +231,7 @@ def at_line(path: Path, text: str, message: str) -> str:
 
 
 def line_of(text: str, wanted: str) -> int | None:
-    """Return the line of a key such as `study.pay.reward`, or else of its innermost table in the file."""
+    """Return the line of a key such as `study.pay.reward`, or of its nearest enclosing table if it is missing."""
     table, best, depth = "", None, 0
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):

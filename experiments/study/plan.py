@@ -17,10 +17,10 @@ from experiments.visit.store import Assignment, CellQuota
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
-    """Return the plan of a study's visits, with its film and, by default, its own platform.
+    """Return the visit plan of a study. `film` shows the house; `platform` replaces the study's platform.
 
     Raises:
-        ConfigError: A setting that the platform needs is missing.
+        ConfigError: A setting that the platform requires is missing.
     """
     settings = study.settings
     platform = platform or recruiter(settings.recruitment)

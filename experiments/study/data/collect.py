@@ -1,4 +1,4 @@
-"""The tidy table of a study with people: one row per participant, from the store and the runs."""
+"""The tidy table of a study with people: one row per participant, from the database and the runs."""
 
 import csv
 import hashlib
@@ -51,7 +51,7 @@ class Collected:
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
     """Collect the rows of all participants of a study whose runs are in `folder`.
 
-    Platform ids are left out, and so are participants who asked for their data to be deleted.
+    Platform ids and participants who asked for their data to be deleted are left out.
     """
     people = [person for person in await store.people() if not person.delete_wanted]
     check_people(study, people)
@@ -99,7 +99,7 @@ def check_people(study: Study, people: Sequence[PersonRow]) -> None:
 
 
 def collect_visits(folder: Path) -> Collected:
-    """Collect the finished tasks in one or several folders of `mjsim play`. Links are left out."""
+    """Collect the finished tasks of visits under a folder of `mjsim play`. Participants' links are left out."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     under_way = 0
@@ -128,17 +128,17 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 
 
 def person_name(person: PersonRow) -> str:
-    """Return the name of a participant in tables, such as `p00012`."""
+    """Return the name by which tables refer to a participant, such as `p00012`."""
     return f"p{person.id:05d}"
 
 
 def visit_name(folder: str) -> str:
-    """Return the name in tables of a visit without a store, from the name of its folder."""
+    """Return the name by which tables refer to a visit of `mjsim play`, such as `v1b9c03af`."""
     return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
 
 
 def person_number(name: str) -> int:
-    """Return the number of a participant from a name such as `p00012`. Raises ConfigError for any other text."""
+    """Parse the participant's number from a name such as `p00012`. Raises ConfigError for any other text."""
     found = _NAME.fullmatch(name)
     if found is None:
         raise ConfigError(f"{name!r} is no person; tables name people like p00012")
@@ -163,10 +163,10 @@ def _about(person: PersonRow, trial: TrialRow, phases: Sequence[PhaseRow]) -> di
 
 
 def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]:
-    """Return columns of final answers.
+    """Return a participant's final answers by table column.
 
-    They are named `likert_NAME` for scales, `answer_NAME` for other survey items and `PHASE_NAME` for numbers of other
-    phases.
+    Columns are named `likert_NAME` for scales, `answer_NAME` for other survey items and `PHASE_NAME` for numeric
+    answers of other phases.
     """
     given = {(answer.phase, answer.item): answer.value for answer in answers if answer.final}
     columns: dict[str, Any] = {}

@@ -9,14 +9,14 @@ import msgspec
 
 from mjsim.support.files import write_text_atomically
 
-INDEX = "copies.jsonl"  # in the study's folder; tables and exports have a list of their own
+INDEX = "copies.jsonl"  # in the study's folder; folders of tables and exports have their own
 
 DATABASES = ("backup", "database")
 Kind = Literal["backup", "database", "export", "table", "analysis", "film", "page", "metrics"]
 
 
 class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A copy: its kind, path and time, and the part of the study's folder that it was made from."""
+    """A file or folder made from study data. `source` is the part of the study's folder that it was made from."""
 
     kind: Kind
     path: str
@@ -25,7 +25,7 @@ class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
-    """Record a copy; call it before the copy is written."""
+    """Record a copy in a folder's list. Call this before writing the copy."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     line = msgspec.json.encode(Copy(kind, str(path.absolute()), made, source)) + b"\n"
     with (folder / INDEX).open("ab") as file:
@@ -33,7 +33,7 @@ def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
 
 
 def note_derived(source: Path, kind: Kind, path: Path) -> None:
-    """Record a file made from a run or table if its folder, or a parent of it, has a list of copies."""
+    """Record a file made from a run or table in the nearest parent folder that has a list of copies, if any."""
     source = source.absolute()
     for folder in (source, *source.parents):
         if (folder / INDEX).is_file():
@@ -41,7 +41,7 @@ def note_derived(source: Path, kind: Kind, path: Path) -> None:
 
 
 def copies(folder: Path) -> list[Copy]:
-    """Return all recorded copies, each path once."""
+    """Return the recorded copies. If a path was recorded several times, the last record counts."""
     path = folder / INDEX
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = [msgspec.json.decode(line, type=Copy) for line in lines if line.endswith(b"}")]

@@ -56,7 +56,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
 
 async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who: str) -> list[str]:
     async def gone(other: Store) -> bool:
-        # After an older backup is restored, the number may belong to another participant.
+        # Compare times of arrival too: after a backup is restored, the number may belong to another participant.
         same = {one.id for one in await other.people() if one.created == person.created} & {person.id}
         for number in same:
             await other.erase(number, who, unpaid=True)
@@ -70,7 +70,7 @@ async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who:
 async def change_databases(
     store: Store, folder: Path, work: Callable[[Store], Awaitable[bool]], name: str
 ) -> list[str]:
-    """Change the listed backups and restored databases of a study. Return one line per changed or missing copy."""
+    """Apply `work` to the listed backups and restored databases. Return one line per changed or missing copy."""
     study, told = await store.study(), []
     for copy in copies(folder):
         path = Path(copy.path)
@@ -83,9 +83,9 @@ async def change_databases(
 
 
 def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
-    """Remove a participant, under all their names, from the listed files of a folder. Return one line per file."""
+    """Remove a participant, by any of `names`, from the listed files of a folder. Return one line per file."""
     told, deleted, listed = list[str](), set[str](), copies(folder)
-    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not list it
+    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not record analyses
         listed.append(Copy("analysis", str(usual), ""))
     for place in {folder, *(Path(copy.path).parent for copy in listed)}:
         for left in place.glob(f"{WORK}*"):

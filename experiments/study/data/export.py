@@ -46,7 +46,7 @@ OWN = {
 
 @dataclass(frozen=True)
 class Variable:
-    """A column of the codebook.
+    """A table column, as described in the codebook.
 
     Attributes:
         levels: Values with their meanings, for columns with few values.
@@ -81,8 +81,8 @@ class Exported:
 async def export(study: Study, store: Store, folder: Path, out: Path, *, replace: bool = False) -> Exported:
     """Write an export to `out` atomically.
 
-    Participants are numbered. Platform ids, links, their hashes and addresses are left out, and so are participants who
-    did not consent or asked for their data to be deleted.
+    Participants are numbered. The export contains no platform ids, links, hashes of links or addresses, and no
+    participants who did not consent or who asked for their data to be deleted.
 
     Raises:
         RecordError: `out` exists and cannot be replaced, or no participant has finished the task.
@@ -153,7 +153,7 @@ async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
 
 
 def _answers(study: Study, answers: Iterable[Answer]) -> Iterable[dict[str, Any]]:
-    """Yield the rows of answers. Free texts are left out, and so are other values of pages unless they are numbers."""
+    """Yield one row per answer. Free texts are left out, and so is non-numeric data that belongs to no item."""
     kinds = {(name, item.name): item.kind for name, section in study.texts.items() for item in section.items}
     for answer in answers:
         kind, value = kinds.get((answer.phase, answer.item)), answer.value

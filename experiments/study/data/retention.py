@@ -51,7 +51,7 @@ async def forget_old(
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
     played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
-    # Participants whose runs are on another host are forgotten there.
+    # Skip participants whose runs are on another host, which deletes the data itself.
     places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
     kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
@@ -79,7 +79,7 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
 
 
 async def _names(store: Store, people: Sequence[PersonRow]) -> dict[int, str]:
-    """Return new folder names by participant. The hash of a link would allow a participant to be recognized."""
+    """Return a new folder name for each participant. The old one, the hash of the link, would identify them."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
@@ -96,10 +96,10 @@ async def _forget(store: Store, visits: Path, people: Sequence[PersonRow], names
         return bool(identified)
 
     await change_databases(store, visits.parent, gone, "them")
-    for person in people:  # files made from a folder of visits contain the hash of the link
+    for person in people:  # files made from visit folders contain the hash of the link
         traces = (person.token_hash, visit_name(person.token_hash))
         await asyncio.to_thread(remove_from_files, visits.parent, traces)
-    for person in people:  # after an interruption, some folders are already renamed
+    for person in people:  # an interrupted run may have renamed some folders already
         if (folder := visits / person.token_hash).is_dir():
             await asyncio.to_thread(folder.rename, visits / names[person.id])
     await store.forget(numbers, [names[number] for number in numbers], WHO)

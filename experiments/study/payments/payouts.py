@@ -30,10 +30,10 @@ class Sent:
 
 
 class Sender:
-    """Sends owed payments. The name of the study is part of their keys on the platform.
+    """Sends owed payments to the platform, under keys that begin with the name of the study.
 
-    Each attempt is recorded in the ledger before the platform is asked. If the outcome of an attempt is unknown, the
-    platform is asked for it before the payment is sent again, but not until its lists are up to date.
+    Each attempt is recorded in the ledger before the request is sent. If the outcome of an attempt is unknown, the
+    payment is sent again only after the platform's lists are up to date and do not show it.
     """
 
     def __init__(self, study: str, store: Store, payer: Payer) -> None:
@@ -46,14 +46,14 @@ class Sender:
             if done is None:
                 attempt = await self._ledger.begin_sending(last.key)
                 if attempt is None:
-                    continue  # another process was faster
+                    continue  # another process is already sending it
                 done = await self._send(last.key, await self._order(last, attempt))
             yield done
             if done.stops:
                 return
 
     async def _settle(self, last: PaymentEvent) -> Sent | None:
-        """Resolve an attempt without an outcome. Return None if the platform did not pay."""
+        """Find out if an attempt with an unknown outcome was paid. Return None if it was not."""
         later = last.at + max(IN_DOUBT_AFTER, self._payer.listed_after)
         if later > await self._ledger.now():
             again = f"{later:%Y-%m-%d %H:%M} UTC"
@@ -88,7 +88,7 @@ class Sender:
         return Sent(key, "paid", reference)
 
     async def _made_before(self, order: Order) -> str | None:
-        """Return the platform's reference of a payment that it refused because it had been made, such as by hand."""
+        """Return the platform's reference if it refused a payment that was made before, for example by hand."""
         try:
             return await _understood(self._payer.find(order))
         except (DeclinedError, UnsureError):

@@ -1,4 +1,4 @@
-"""The interface of recruitment platforms for payments, and their HTTP client."""
+"""The payment interface of recruitment platforms, and an HTTP client for their APIs."""
 
 import asyncio
 import os
@@ -12,18 +12,16 @@ import httpx
 from experiments.errors import ConfigError, ExperimentError
 from experiments.visit.store.values import PaymentKind
 
-TIMEOUT = 30.0  # for a response, in seconds; less than the ten minutes after which another process may retry
-TRIES, LONGEST_WAIT = (
-    4,
-    60.0,
-)  # retries of rate-limited requests, and the longest delay before one, in seconds
+TIMEOUT = 30.0  # response timeout, in seconds; less than the ten minutes after which others may retry
+# number of attempts at a rate-limited request, and the longest delay between two of them, in seconds
+TRIES, LONGEST_WAIT = 4, 60.0
 LISTED_AFTER = timedelta(minutes=10)
 MAX_TEXT = 300  # maximum length of a platform's message
 TOO_MANY = 429
 
 
 class DeclinedError(ExperimentError):
-    """The platform did not carry out the request. The message has its reason."""
+    """The platform did not carry out the request. The message gives the reason."""
 
 
 class StoppedError(DeclinedError):
@@ -61,7 +59,7 @@ class Order:
         return f"{self.cents // 100}.{self.cents % 100:02}"
 
     def id(self, name: str) -> str:
-        """Return one of the platform's ids of the participant.
+        """Return one of the ids that the platform sent, by the name of its query parameter.
 
         Raises:
             DeclinedError: The participant did not come from the platform, or the ids are erased.
@@ -75,7 +73,7 @@ class Payer(Protocol):
     """Client of a recruitment platform. Its methods raise DeclinedError and UnsureError.
 
     Attributes:
-        listed_after: Time after a request until the platform's lists are sure to show its outcome.
+        listed_after: Time after which the platform's lists reliably show the outcome of a request.
         shortest_reason: Minimum length of the reason for a rejection, in characters.
     """
 
@@ -83,11 +81,11 @@ class Payer(Protocol):
     shortest_reason: int
 
     async def find(self, order: Order) -> str | None:
-        """Return the platform's reference of the payment, or None if it has not made it."""
+        """Look for the payment on the platform. Return its reference, or None if it has not been made."""
         ...
 
     async def send(self, order: Order) -> str:
-        """Pay, and return the platform's reference. Raises UnsureError if the platform may have paid."""
+        """Make the payment and return its reference. Raises UnsureError if the platform may have paid."""
         ...
 
     async def close(self) -> None: ...
@@ -125,7 +123,7 @@ class Api:
             raise DeclinedError(f"the platform says {said}")
         try:
             return answer.json() if answer.content else None
-        except ValueError as error:  # perhaps the page of a proxy
+        except ValueError as error:  # such as the error page of a proxy
             raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:

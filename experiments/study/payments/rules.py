@@ -16,7 +16,7 @@ from experiments.visit.store.values import PaymentKind
 
 @dataclass(frozen=True)
 class Due:
-    """A payment that follows from the rules."""
+    """A payment required by the rules."""
 
     person_id: int
     kind: PaymentKind
@@ -29,7 +29,7 @@ class Due:
 def due(
     study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """Return the payments by the rules of the study file, in order of arrival.
+    """Return the payments required by the study file's rules, in the participants' order of arrival.
 
     Active and rejected participants get nothing.
     """
@@ -65,7 +65,7 @@ def due(
 
 
 def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[Due]:
-    """Return payments that are not in the ledger. Recorded payments stay, even if the rules have changed."""
+    """Return the payments that are not in the ledger yet. Recorded payments are final, even if the rules change."""
     known = {event.key for event in history}
     once = {event.person_id for event in history if event.kind in ONCE}
     return [
@@ -83,7 +83,7 @@ async def decide(store: Store, payments: Sequence[Due]) -> int:
 
 
 async def reject(store: Store, person: PersonRow, currency: str, why: str) -> None:
-    """Record the rejection of a finished participant. The platform receives it with the payments.
+    """Record the rejection of a finished participant. It is sent to the platform with the payments.
 
     Raises:
         StoreError: The participant did not finish, or a payment is already decided.

@@ -1,4 +1,4 @@
-"""Recruitment platforms, one module each, with a common interface for arrival and one for payment."""
+"""Recruitment platforms. Each module has a recruiter for arrivals and a client for payments."""
 
 from collections.abc import Mapping, Sequence
 
@@ -23,7 +23,7 @@ def recruiter(settings: Recruitment) -> Recruiter:
     """Return the recruiter of a study's platform.
 
     Raises:
-        ConfigError: A setting that the platform needs is missing.
+        ConfigError: A setting that the platform requires is missing.
     """
     for name in NEEDED.get(settings.platform, ()):
         if not getattr(settings, name):

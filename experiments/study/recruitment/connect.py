@@ -39,7 +39,7 @@ class Connect:
             return InvalidLink(f"{PROJECT} is not that of this study")
         return Candidate(ids[PERSON], ids)
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code suffices
         if how != "finished":
             return WayBack(gives_back=True)
         return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
@@ -57,7 +57,7 @@ class ConnectPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Look the payment up by the assignment's status or the sum of its bonuses."""
+        """Find the payment by the assignment's status or the sum of its bonuses."""
         listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
         mine: Mapping[str, Any] = next(
             (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}

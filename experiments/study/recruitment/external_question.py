@@ -34,7 +34,7 @@ class ExternalQuestion:
         self.embedded_by, self._task = settings.sites, settings.study_id
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Return a Preview before the task is accepted. A form is only sent to one of the platform's sites."""
+        """Return a Preview if the task is not accepted yet. The query must name a site from the study file."""
         if query.get(ASSIGNMENT) == PREVIEW:
             return Preview()
         ids = {name: query.get(name, "") for name in self.parameters}
@@ -71,7 +71,7 @@ class ExternalQuestionPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Look the payment up by the assignment's status or the key in the reason of a bonus."""
+        """Find the payment by the assignment's status, or by its key in the reason for a bonus."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
         if done is not None:

@@ -41,7 +41,7 @@ class Prolific:
             return InvalidLink(f"{STUDY} is not that of this study")
         return Candidate(ids[PERSON], ids)
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code says all
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code suffices
         code = self._codes.get(how, "")
         if not code:
             return WayBack(gives_back=True)
@@ -52,8 +52,8 @@ class ProlificPayer:
     """Approves and rejects submissions, and pays bonuses. An approval makes the platform pay the study's reward.
 
     Screened-out participants get the amount that the platform's study sets for them. A partial payment is a bonus.
-    Bonuses can also be paid for a returned submission. Paying a prepared bonus twice pays twice, and a payment is
-    listed only after some minutes. So the submission's list of bonuses decides whether one was paid.
+    Bonuses can also be paid for a returned submission. The platform would pay a prepared bonus twice if asked twice, so
+    the submission's list of bonuses, which is some minutes late, decides whether a bonus was paid.
     """
 
     listed_after = timedelta(hours=1)
@@ -66,7 +66,7 @@ class ProlificPayer:
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
-        """Look the payment up by the submission's status or the amounts of its bonuses."""
+        """Find the payment by the submission's status or the amounts of its bonuses."""
         submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
         done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
         if done is not None:
@@ -94,7 +94,7 @@ class ProlificPayer:
         await self._api.close()
 
     async def _prepare(self, order: Order) -> str:
-        """Prepare a bonus, which does not pay it yet, and return its number."""
+        """Prepare a bonus without paying it, and return its number."""
         row: Mapping[str, Any] = {
             "study_id": order.id(STUDY),
             "csv_bonuses": f"{order.id(SUBMISSION)},{order.amount}",
