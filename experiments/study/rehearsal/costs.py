@@ -20,12 +20,11 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases.base import Phase
 
-CHOOSING = (
-    2.65  # time to answer an item, in seconds: think, point, click (Card, Moran and Newell, CACM 23, 1980)
-)
+# time to answer an item, in seconds: think, point, click (Card, Moran and Newell, CACM 23, 1980)
+CHOOSING = 2.65
 WRITING = 20.0  # time to write a free-text answer, in seconds (a guess)
 PEOPLE = 2  # number of simulated participants per cell
-GUEST = "guest"  # participant if the file names no simulated one
+GUEST = "guest"  # simulated participant, if the study file names none
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class TrialDurations:
 
 
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
-    """Run trials of simulated participants, and leave their runs in `folder`."""
+    """Simulate trials of each cell, write their runs to `folder`, and return mean durations."""
     trials = [_simulated(cell, study.path) for cell in study.cells]
     house = House.load(trials[0][0].house)
 
@@ -72,7 +71,7 @@ def durations(
 ) -> dict[str, float]:
     """Return the expected duration of each phase, in seconds.
 
-    It adds reading, answering, the film and trials (the mean of all cells), and is at least the phase's minimum time.
+    This is the time for reading, answering, the film and trials (averaged over cells), or the minimum time if longer.
     """
     found = {}
     for phase in phases:
@@ -95,8 +94,8 @@ class Cost:
     Attributes:
         rewards: Rewards of all wanted participants.
         bonuses: Bonuses, if every participant gets one.
-        fee: Platform fee on both, or None if the file does not state one.
-        hourly: Reward per hour, for the announced minutes.
+        fee: Platform fee on rewards and bonuses, or None if the study file states none.
+        hourly: Reward per hour, if the study takes the announced minutes.
     """
 
     rewards: float
@@ -106,7 +105,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """Upper limit of the cost, without payments for screened-out participants."""
+        """Upper bound of the cost, excluding payments to screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 
@@ -118,7 +117,7 @@ def cost(study: Study) -> Cost:
 
 
 def detectable(study: Study) -> dict[str, float]:
-    """Return the smallest partial eta squared per effect that is detected with a power of 80 % at a level of 5 %."""
+    """Return the smallest detectable partial eta squared of each effect, with 80 % power at a level of 5 %."""
     conditions = {cell.trials[0].assistance for cell in study.cells}
     levels = {cell.trials[0].objects for cell in study.cells}
     if len(conditions) * len(levels) != len(study.cells) or study.people <= len(study.cells):

@@ -1,4 +1,4 @@
-"""A dry run: a rehearsal in a temporary folder, with one participant for each way out of a study."""
+"""A dry run: a short rehearsal with one participant for each way in which a visit can end."""
 
 import asyncio
 import socket
@@ -31,13 +31,13 @@ from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
 from experiments.web.server.pool import WorkerPool
 
-MINIMUM_S = 1.0  # upper limit of minimum times, in seconds
+MINIMUM_S = 1.0  # cap on the minimum times of phases, in seconds
 TASK_S = 1.0  # duration of the task, in seconds
-PLACES = 10  # number by which places are multiplied, so that every participant gets one
-FACTOR = 1e6  # speed-up of reading
-TIMEOUT_S = 400.0  # HTTP timeout, in seconds; kernels may be compiled first
+PLACES = 10  # how often the trials of a cell are repeated, so that every participant gets a place
+FACTOR = 1e6  # factor by which reading is sped up
+TIMEOUT_S = 400.0  # HTTP timeout, in seconds; long, since code may have to be compiled
 
-Photograph = Callable[[str, str], Awaitable[None]]  # takes a name and a URL
+Photograph = Callable[[str, str], Awaitable[None]]  # called with a name and a URL
 
 
 @dataclass
@@ -51,10 +51,10 @@ class Walked:
 async def dry_run(
     study: Study, platform: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
 ) -> Walked:
-    """Send simulated participants through a study: one to the end, and one to each other exit.
+    """Send simulated participants through a study. One finishes it, and the others leave early, each in its own way.
 
-    Every phase must refuse wrong and early forms, and accept a correct one once. Minimum times are at most one second,
-    and the task ends after a second.
+    Every phase must refuse wrong and early forms, and accept a correct form only once. Minimum times are at most one
+    second, and the task ends after a second.
     """
     study = rehearsed(_shortened(study), 1.0)
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
@@ -162,7 +162,7 @@ class _Text(HTMLParser):
         super().__init__()
         self.words, self._hidden = 0, 0
 
-    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - of the base
+    def handle_starttag(self, tag: str, attrs: Any) -> None:  # noqa: ARG002 - required by HTMLParser
         self._hidden += tag in ("head", "script", "noscript")
 
     def handle_endtag(self, tag: str) -> None:

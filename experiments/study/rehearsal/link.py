@@ -1,4 +1,4 @@
-"""The WebSocket client of a simulated participant, which plays a trial over a good or bad connection."""
+"""The WebSocket client with which a simulated participant plays trials."""
 
 import asyncio
 import contextlib
@@ -14,8 +14,8 @@ from websockets.typing import Origin
 from experiments.study.rehearsal.player import STEPS, SimulatedPlayer
 
 ANSWER_TIMEOUT = 2.0  # time to wait for a new state before sending the next input, in seconds
-DELAYED = 15  # number of delayed messages
-OPENING_TIMEOUT = 600.0  # how long another page may hold the session, in seconds
+DELAYED = 15  # number of inputs that a slow connection delays
+OPENING_TIMEOUT = 600.0  # how long to wait until a session is ready, in seconds
 VIEW = {"type": "view", "width": 1280, "height": 720, "codec": "none"}
 
 
@@ -24,7 +24,7 @@ class LostError(Exception):
 
 
 class Link:
-    """A connection to a trial, made by `connected`. `decisions` counts the inputs sent."""
+    """A connection to a trial, opened by :func:`connected`. `decisions` counts the inputs sent."""
 
     def __init__(self, socket: ClientConnection, player: SimulatedPlayer) -> None:
         self._socket, self._player = socket, player
@@ -35,7 +35,7 @@ class Link:
         self.refused: list[str] = []
 
     async def occupied(self) -> None:
-        """Wait until the server reports that another page has the session."""
+        """Wait until the server reports that another page holds the session."""
         await self._wait(lambda: self._occupied, OPENING_TIMEOUT)
 
     def cut(self) -> None:
@@ -44,7 +44,7 @@ class Link:
     async def play(self, decisions: int, delay: float) -> bool:
         """Play until the trial is saved or `decisions` inputs were sent. Return True if it was saved.
 
-        `delay` is the delay of the first messages, in seconds.
+        `delay` is the time by which the first inputs are delayed, in seconds.
 
         Raises:
             LostError: The connection is lost.
@@ -130,7 +130,7 @@ class Link:
 async def connected(
     base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
 ) -> AsyncIterator[Link]:
-    """Connect a page to a trial, and disconnect it at the end."""
+    """Connect to a trial like a browser page, and disconnect at the end."""
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:
         link = Link(socket, player)

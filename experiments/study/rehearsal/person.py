@@ -22,9 +22,9 @@ from experiments.visit.texts.items import Item
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
 READING = 15.0  # mean reading time of a page, in seconds of study time
 AWAY = 600.0  # longest absence of a returning person, in seconds of study time
-DELAY = 0.2  # delay of the first messages of a bad connection, in seconds
-CUTS = 3  # number of cuts of a bad connection per trial
-TRIES = 20  # attempts to connect to a trial or to submit a form
+DELAY = 0.2  # delay of the first inputs on a bad connection, in seconds
+CUTS = 3  # how often a bad connection is cut per trial
+TRIES = 20  # number of attempts to connect to a trial or to submit a form
 QUEUED = 'http-equiv="refresh"'  # marks the queue page
 QUEUE_PAUSE = 3.0  # polling period of the queue page, in seconds
 PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
@@ -63,18 +63,16 @@ class Surroundings:
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
     house: House
-    parameters: Mapping[
-        str, str
-    ]  # parameters of the platform's links; an empty value stands for an id of the person
+    parameters: Mapping[str, str]  # query parameters of links; a person's id replaces empty values
     minimum: Mapping[str, float]  # minimum times on the server, in seconds
     attempts: int  # allowed attempts at the comprehension check
-    factor: float  # speed-up of waiting
-    hasty: bool = False  # also submit forms before their minimum time, which the server must refuse
-    watch: Watch = _ignore  # receives the name of each page and the page
+    factor: float  # factor by which waiting is sped up
+    hasty: bool = False  # True to also submit forms too early, which the server must refuse
+    watch: Watch = _ignore  # called with the name of each page and the response
 
 
 class SimulatedPerson:
-    """Visits the study according to the plan."""
+    """A simulated person who visits the study as planned."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed
@@ -84,7 +82,7 @@ class SimulatedPerson:
         self._headers = {"Origin": around.base, "X-Forwarded-For": f"10.0.{number // 250}.{number % 250 + 1}"}
 
     async def begin(self) -> None:
-        """Start a visit, or start it twice if planned so, and store its link."""
+        """Start a visit and store its link. If two starts are planned, both must give the same link."""
         number = self._planned.number
         ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
         await self._around.watch("welcome", await self._get("/", ids))
@@ -97,7 +95,7 @@ class SimulatedPerson:
             self.rehearsed.link = link
 
     async def go(self) -> None:
-        """Continue from the current page to the end."""
+        """Go through the study from the current page to the end, and store the outcome."""
         self.rehearsed.outcome = await self._go()
 
     async def _go(self) -> str:
@@ -145,7 +143,7 @@ class SimulatedPerson:
             self._fault(f"the page says {page.status_code}")
             return "stuck"
         how = self._planned.leaves
-        # A trial may be over before its participant leaves it.
+        # A trial may end before the moment at which its participant was to leave. The visit then finishes.
         return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
@@ -188,7 +186,7 @@ class SimulatedPerson:
         return how
 
     async def _play(self, trial: str, leaves: bool) -> bool:
-        """Play a trial, reconnecting after planned breaks. Return False if the person leaves during it."""
+        """Play a trial, reconnecting after planned interruptions. Return False if the person leaves during it."""
         planned, rng = self._planned, self._rng
         breaks = [(moment(trial, rng), "cut") for _ in range(CUTS * planned.bad)]
         breaks += [(moment(trial, rng), "second page")] * planned.twice
@@ -261,7 +259,7 @@ MARK = "Rehearsal: drawn at random"
 
 
 def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a form that the phase accepts. It is empty for a custom phase without items."""
+    """Return a form that the phase accepts. For a custom phase without items, it has no answers."""
     example: dict[str, Any] = getattr(phase, "example", dict)()
     items = phase.items if isinstance(phase, FormPhase) else ()
     points = len(phase.texts.scale) if isinstance(phase, FormPhase) else 0
@@ -272,7 +270,7 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
     """Return a form that the phase must refuse, or None if it accepts any.
 
-    It has a wrong answer to a question with a right one, or else no answers.
+    It answers a question wrongly if one has a right answer. Otherwise all answers are missing.
     """
     example: dict[str, Any] = getattr(phase, "example", dict)()
     for item in phase.items if isinstance(phase, FormPhase) else ():

@@ -19,20 +19,20 @@ from mjsim.support.files import write_text_atomically
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # window sizes, in pixels
-MAX_HEIGHT = 6000  # longest screenshot, in pixels
-SETTLE = 1.5  # time for scripts of a page to run, in seconds
+MAX_HEIGHT = 6000  # maximum height of a screenshot, in pixels
+SETTLE = 1.5  # time for a page's scripts to run, in seconds
 LOADING = 120.0  # timeout for loading a trial, in seconds
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
 START = 120.0  # timeout for the start of the browser, in seconds
 
 
 def browser() -> str | None:
-    """Return the first Chromium found on the path, or None."""
+    """Return the path of an installed Chromium, or None."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 class Camera:
-    """Takes screenshots of pages into a folder."""
+    """Takes screenshots of pages and saves them in a folder."""
 
     def __init__(self, socket: ClientConnection, folder: Path) -> None:
         self._socket, self._folder = socket, folder
@@ -58,7 +58,7 @@ class Camera:
             clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
-        await self._ask("Page.navigate", url="about:blank")  # releases the session of a trial
+        await self._ask("Page.navigate", url="about:blank")  # makes the server release a trial's session
 
     async def _settle(self) -> None:
         loop = asyncio.get_running_loop()
@@ -92,7 +92,7 @@ async def camera(program: str, folder: Path) -> AsyncIterator[Camera]:
     with TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         options = ["--headless", "--remote-debugging-port=0", f"--user-data-dir={profile}"]
         options += ["--hide-scrollbars", "--no-first-run", "--enable-unsafe-swiftshader"]
-        if os.geteuid() == 0:  # Chromium's sandbox refuses root
+        if os.geteuid() == 0:  # Chromium's sandbox does not work for root
             options.append("--no-sandbox")
         quiet = asyncio.subprocess.DEVNULL
         process = await asyncio.create_subprocess_exec(program, *options, stdout=quiet, stderr=quiet)

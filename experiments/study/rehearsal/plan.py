@@ -1,4 +1,4 @@
-"""The plan of a rehearsal: its simulated people, and when they leave, return, reload or lose the connection."""
+"""The plan of a rehearsal: when simulated people arrive, leave, return, reload or lose the connection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,9 +13,9 @@ from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
 from experiments.visit.recruiter import Recruiter
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails", "gives up"]
-STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # parameter names of platforms
+STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # query parameters of links
 RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of all people
-HOW = (0.6, 0.2, 0.2)  # shares of the ways of leaving: vanish, withdraw, withdraw and delete
+HOW = (0.6, 0.2, 0.2)  # probabilities of vanishing, withdrawing, and withdrawing with deletion
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Planned:
         reloads_in: Phase in which the person reloads the page, or None.
         bad: True if the connection is delayed and cut.
         twice: True if forms are submitted twice at once, links opened twice, and trials opened in a second page.
-        wrong: True if a question about the task is first answered wrongly.
+        wrong: True if each form is first submitted with a mistake.
     """
 
     number: int
@@ -50,7 +50,7 @@ def plan_people(
     """Plan the people of a rehearsal, in order of arrival. The same seed gives the same people.
 
     Args:
-        people: Number of arrivals, a Poisson process.
+        people: Number of people. Their arrivals are a Poisson process.
         per_minute: Mean number of arrivals per minute of study time.
     """
     found, arrives = [], 0.0
@@ -87,19 +87,19 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 
 
 def moment(phase: str, rng: np.random.Generator) -> int:
-    """Draw a number of decisions after which something happens in a trial."""
+    """Draw the number of inputs after which a planned interruption of a trial happens."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
 
 
 def link_parameters(study: Study, platform: Recruiter) -> dict[str, str]:
-    """Return the parameters of the platform's links; an empty value stands for an id of the participant."""
+    """Return the query parameters of the platform's links. Those that identify a participant are empty."""
     settings = study.settings.recruitment
     own = {**dict.fromkeys(STUDY_IDS, settings.study_id), SUBMIT_TO: next(iter(settings.sites), "")}
     return {name: own.get(name, "") for name in platform.parameters}
 
 
 def rehearsed(study: Study, factor: float) -> Study:
-    """Return the study with its people marked as simulated and all waiting times divided by `factor`."""
+    """Return a copy of the study for simulated people, with all waiting times divided by `factor`."""
     settings = study.settings
     away = ("abandoned_after", "timed_out_after")
     shorter = {name: getattr(settings.limits, name) / factor for name in away}

@@ -12,24 +12,24 @@ from planner.errors import UnreachableError
 STEP = 0.04  # duration of a control step, in seconds
 STEPS = 16  # control steps per input
 NEAR = 0.15  # distance at which a corner of the path is reached, in metres
-ALIGNED = 0.7  # largest heading error while walking, in radians
+ALIGNED = 0.7  # largest heading error at which the player walks, in radians
 SEEN = 0.8  # distance at which a viewpoint counts as visited, in metres
-STUCK = 0.05  # shortest progress within `STUCK_AFTER` inputs, in metres
+STUCK = 0.05  # progress within `STUCK_AFTER` inputs below which the player is stuck, in metres
 STUCK_AFTER = 6
-BACKWARDS = 3  # number of backward inputs after being stuck
+BACKWARDS = 3  # number of backward inputs after getting stuck
 PRESS_GAP = 15  # shortest time between two presses, in control steps
 
 
 class SimulatedPlayer:
-    """Tidies up along shortest paths.
+    """A player that puts objects away, walking along shortest paths.
 
-    It follows the display's goal. Without one, it walks to the nearest known object or bin, or else searches the house.
+    It walks to the goal on the display. Without one, it walks to the nearest known object or bin, or searches.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._models: dict[str, str] = {}
-        self._places: dict[str, tuple[float, float]] = {}  # positions of objects that are not in their bins
+        self._places: dict[str, tuple[float, float]] = {}  # known positions of objects outside their bins
         self._held: tuple[str | None, str | None] = (None, None)
         self._goal: tuple[float, float] | None = None
         self._reach: Any = None
@@ -56,7 +56,7 @@ class SimulatedPlayer:
                 self._take_snapshot(message)
 
     def act(self) -> dict[str, Any]:
-        """Return the input for the next control steps, without its number and step."""
+        """Return the input for the next control steps, without the fields `number` and `step`."""
         state = self.state
         if state is None or state["busy"]:
             return {}

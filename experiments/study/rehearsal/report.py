@@ -22,7 +22,7 @@ from experiments.visit.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
-STATUS: dict[str, Leaving] = {  # status by outcome
+STATUS: dict[str, Leaving] = {  # expected status in the database, by outcome
     "finished": "finished",
     "withdraws": "withdrawn",
     "withdraws and deletes": "withdrawn",
@@ -94,8 +94,8 @@ async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, 
     """Check that a rehearsal of this study file has passed, and record that in the audit log.
 
     Args:
-        folder: Folder of a rehearsal, or None if the audit log has its success already.
-        without: True to record instead that no rehearsal is wanted.
+        folder: Folder of a rehearsal, or None if its success is already in the audit log.
+        without: True to go on without a rehearsal, which is recorded instead.
 
     Raises:
         ConfigError: No rehearsal of this version of the study file has passed.

@@ -22,9 +22,9 @@ from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
-WORKERS = "20"  # number of concurrent trials; they may run late
+WORKERS = "20"  # number of concurrent trials, which need not run in real time
 END_TIMEOUT = 60.0  # timeout for stopping the server, in seconds
-HTTP_TIMEOUT = 120.0  # timeout of requests, in seconds
+HTTP_TIMEOUT = 120.0  # timeout for requests, in seconds
 
 
 class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -35,7 +35,7 @@ class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     seed: int
     per_minute: float  # arrivals per minute of study time
     dropouts: float  # share of people who leave early
-    factor: float  # speed-up of waiting
+    factor: float  # factor by which waiting is sped up
 
 
 async def rehearse(
@@ -45,7 +45,7 @@ async def rehearse(
     film: Path | None,
     on_person: Callable[[Rehearsed], None],
 ) -> list[Rehearsed]:
-    """Run all unfinished people. Return every result, in order.
+    """Simulate all people who have not finished yet. Return the results of all people, in order.
 
     Args:
         film: Film of the house, or None to let the server make it.
@@ -72,7 +72,7 @@ async def rehearse(
 
 
 def read_people(path: Path) -> dict[int, Rehearsed]:
-    """Read the records of people by number. The last record of each person counts."""
+    """Read the latest record of each person, by number."""
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = {}
     for line in lines:
@@ -107,7 +107,7 @@ async def _server(
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(
             *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
-        )  # Ctrl-C must not reach the server
+        )  # a session of its own keeps Ctrl-C from reaching the server
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
             if not url:
@@ -138,7 +138,7 @@ async def _send(
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
     minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
-    # Without keep-alive, since a connection pool checks all idle connections before each request.
+    # Keep no idle connections, since the client would check all of them before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(

@@ -14,13 +14,13 @@ from experiments.web.server.guards import Rate
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
-ATTEMPTS = 10, 300.0  # login attempts per address and per name, and their period in seconds
+ATTEMPTS = 10, 300.0  # limit of login attempts per address and per name, and its period in seconds
 CHECKS = 2  # concurrent password checks; each takes 64 MiB
-ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # each role includes the ones before it
+ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # each role has all rights of those before it
 
 
 def may(who: Researcher, role: Role) -> bool:
-    """Return True if the researcher's role includes `role`."""
+    """Return True if the researcher has the rights of `role`."""
     return ORDER.index(who.role) >= ORDER.index(role)
 
 
@@ -43,7 +43,7 @@ class Access:
         return self._from.allows(address) and self._names.allows(name)
 
     async def log_in(self, connection: HTTPConnection, name: str, password: str) -> str | None:
-        """Check the credentials and return a new token, or None if they are wrong. It ends an earlier login."""
+        """Start a login and return its token, or None if the credentials are wrong. An earlier login ends."""
         async with self._checks:
             researcher = await self._researchers.check(name, password)
         if researcher is None:
@@ -54,12 +54,12 @@ class Access:
         return token
 
     async def log_out(self, connection: HTTPConnection) -> None:
-        """End the login of the cookie, if any."""
+        """End the login that the cookie belongs to, if any."""
         if (token := self._token(connection)) is not None:
             await self._researchers.log_out(token_hash(token))
 
     def remember(self, response: Response, token: str) -> None:
-        """Set the login cookie. `SameSite=strict` keeps it off requests from other sites."""
+        """Set the login cookie. With `SameSite=strict`, browsers do not send it in requests from other sites."""
         seconds = int(LASTS.total_seconds())
         response.set_cookie(
             self._cookie, token, seconds, httponly=True, secure=self._secure, samesite="strict"

@@ -31,8 +31,8 @@ from experiments.web.server.sessions import Sessions
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
-HEALTH_TIMEOUT = 3.0  # timeout of the database, in seconds
-CHECK_PERIOD = 5.0  # period of checking the login of a watching researcher, in seconds
+HEALTH_TIMEOUT = 3.0  # timeout of the database during a health check, in seconds
+CHECK_PERIOD = 5.0  # how often the login of a watching researcher is checked, in seconds
 PAGE_SIZE = 100  # participants per page of the list
 MAX_WANTED = 1_000_000  # largest quota of a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
@@ -43,7 +43,7 @@ Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class ResearcherContext:
-    """Study, store, sessions of this server and metrics, as shown on the page."""
+    """The data shown on the researcher's page."""
 
     study: Study
     store: Store
@@ -52,7 +52,7 @@ class ResearcherContext:
 
 
 class ResearcherServer:
-    """Pages for researchers, health check and metrics.
+    """Server of the researcher's page, the health check and the metrics.
 
     Args:
         public: Public URL of the page behind a proxy, or None.
@@ -68,7 +68,7 @@ class ResearcherServer:
         self._access = Access(watched.store.researchers, secure=secure)
 
     def app(self, host: str) -> Starlette:
-        """Return the ASGI application that listens at `host`."""
+        """Return the ASGI application for a server that listens at `host`."""
         return Starlette(
             routes=[
                 Route("/health", self._health),
@@ -231,7 +231,7 @@ class ResearcherServer:
     def _change(
         self, role: Role, before: StudyState | None, after: StudyState
     ) -> Callable[[Request], Awaitable[Response]]:
-        """Return an endpoint that changes the state of the study, if it is still `before`."""
+        """Return an endpoint that changes the study's state from `before`, or from any state if None, to `after`."""
 
         async def change(request: Request, who: Researcher) -> Response:
             state = (await self._store.study()).state

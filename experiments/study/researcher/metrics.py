@@ -1,4 +1,4 @@
-"""Prometheus metrics, and recent warnings and errors. None of them identifies a participant."""
+"""Prometheus metrics, and recent warnings and errors. They do not identify participants."""
 
 import logging
 import time
@@ -20,7 +20,7 @@ KEPT = 50  # number of warnings and errors kept
 
 @dataclass(frozen=True)
 class Fault:
-    """A warning or error of the log."""
+    """A warning or error in the log."""
 
     at: datetime
     level: str

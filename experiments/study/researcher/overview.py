@@ -29,7 +29,7 @@ class CellLine:
 
 @dataclass(frozen=True)
 class PhaseLine:
-    """Participants in a phase: active, inactive for long, and those who left in it, by status."""
+    """Participants in a phase: active ones (`here`), idle ones among them (`away`), and dropouts by status."""
 
     name: str
     here: int
@@ -62,7 +62,7 @@ class PayLine:
 
 @dataclass(frozen=True)
 class Overview:
-    """State of a study. `checked` has frame rates of the device check, `playing` of sessions under way."""
+    """State of a study. `checked` has the frame rates from device checks, `playing` those of current sessions."""
 
     at: datetime
     state: StudyState
