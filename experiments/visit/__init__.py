@@ -1,4 +1,4 @@
-"""One participant's visit: plan, phases, server and store."""
+"""Visits of participants: their plan, phases, server and database."""
 
 import lazy_loader
 

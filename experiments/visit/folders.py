@@ -1,4 +1,4 @@
-"""Folders of visits, with the settings of their trials, journals and runs.
+"""Visit folders. Each holds the settings, journals and runs of one participant's trials.
 
 A visit's folder is named after the SHA-256 of the token in the participant's link. Only the database records the
 participant's progress.
@@ -19,11 +19,11 @@ from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import JOURNALS, VISIT
 from mjsim.support.files import write_text_atomically
 
-VISITS = "visits"  # folder of a study's visits in its own folder
+VISITS = "visits"  # name of the folder of visits, within a study's folder
 
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A phase that has ended, with the fields of a `phase_ended` event. `reason` is given for a training."""
+    """A phase that has ended, with the fields of a `phase_ended` event. Only a training has a `reason`."""
 
     phase: str
     duration_s: float
@@ -37,7 +37,7 @@ class Stored(msgspec.Struct, frozen=True):
     phase: str  # phase in which the folder was created
     phases: list[str]  # played phases, in order
     trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
-    ended: list[Ended] = []  # phases before the first trial
+    ended: list[Ended] = []  # phases that ended before the first trial
     version: int = 1  # format version
 
 
@@ -66,7 +66,7 @@ class VisitFolder:
         return found
 
     def before(self, phase: str) -> list[dict[str, Any]]:
-        """Return the phases before the task as fields of `phase_ended` events. Other phases have none."""
+        """Return the fields of all `phase_ended` events before the task. For other phases, there are none."""
         if phase != TASK:
             return []
         ended = [one for one in self.stored.ended if one.phase != TRAINING]
@@ -98,7 +98,7 @@ class VisitFolders:
         """Create the folder of a visit, or return the existing one.
 
         Args:
-            name: Hash of the token of the participant's link.
+            name: Hash of the token in the participant's link.
         """
         if (known := self.find(name)) is not None:
             return known

@@ -1,4 +1,4 @@
-"""The plan of a visit, from which a server takes participants through all phases."""
+"""The plan of a visit, which a server follows to take participants through all phases."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -37,10 +37,10 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     idle: Seconds = 1800.0  # inactivity after which a trial releases its slot, in seconds
     abandoned_after: Seconds = 1800.0  # inactivity after which the place in a cell is released, in seconds
     timed_out_after: Seconds = 14400.0  # inactivity after which the participation ends, in seconds
-    attempts: Count = 3  # allowed attempts at the comprehension check
-    # allowed wrong answers to survey items with a right one; None disables the check
+    attempts: Count = 3  # number of attempts allowed at the comprehension check
+    # number of wrong answers allowed in the survey's attention checks; None disables screening by them
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # days after the last activity until identifying data are deleted
+    keep_days: Count | None = None  # days from the last activity until identifying data are deleted
 
     def __post_init__(self) -> None:
         if self.timed_out_after < self.abandoned_after:
@@ -57,15 +57,15 @@ class VisitPlan:
     Attributes:
         name: Name of the study in the database.
         language: Language tag of the pages.
-        phases: Names of the phases, in order; the last one is reached, not completed.
+        phases: Names of the phases, in order. A visit is finished when it reaches the last one.
         story: Text of the story, with blank lines between paragraphs.
-        minimum: Seconds before which a phase cannot be ended; infinite for a trial that only its own end ends.
+        minimum: Minimum duration by phase, in seconds. Infinite for a trial that the participant cannot end early.
         optional: Phases that may be skipped.
         minutes: Expected duration of a visit.
-        cells: Cells of the design. An assignment names one, and a place in it.
+        cells: Cells of the design. Each participant is assigned a place in one of them.
         trials: Returns the settings of the trials of an assignment, by phase.
-        headset: True if the page of a trial offers a headset.
-        floor_plan: True if the run of the task gets a picture of its paths.
+        headset: True if trials can be played with a VR headset.
+        floor_plan: True if the run of the task gets a floor plan with the paths walked.
         rehearsal: True if all participants are simulated.
     """
 

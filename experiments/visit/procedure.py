@@ -1,4 +1,4 @@
-"""The course of visits through their phases."""
+"""Progress of visits through their phases."""
 
 import asyncio
 import dataclasses
@@ -35,7 +35,7 @@ class PhaseState:
     Attributes:
         phase: Current phase, or None if the participation has ended.
         number: Number of the phase, from 1.
-        wait: Seconds before the phase may be ended.
+        wait: Time until the phase may be ended, in seconds.
     """
 
     person: PersonRow
@@ -70,11 +70,11 @@ class Procedure:
         return PhaseState(person, self.phases[number], number + 1, visitor, wait)
 
     async def times(self, person: PersonRow) -> tuple[float, float]:
-        """Return the seconds since the phase was first shown, and those until it may be ended."""
+        """Return the time since the phase was first shown and the time until it may end, in seconds."""
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
         minimum = self.plan.minimum.get(person.phase, 0.0)
-        # A negative time has passed if the clock was set back.
+        # If the clock was set back, `passed` is negative, and the participant need not wait.
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
     async def submit(self, now: PhaseState, phase: str, sent: FormData) -> Again | None:
@@ -111,7 +111,7 @@ class Procedure:
             await self.store.save_answers(now.person.id, phase, drafts)
 
     async def assign(self, person: PersonRow) -> Assignment | None:
-        """Return the participant's place in a cell, or None if all cells are full."""
+        """Return the participant's place in a cell, assigning one if needed, or None if all cells are full."""
         plan = self.plan
         return await self.store.assign(
             person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
@@ -154,7 +154,7 @@ class Procedure:
         return person
 
     async def recover(self, before: datetime.datetime | None = None) -> None:
-        """Record trials that ended without being recorded, for all participants or those inactive since `before`.
+        """Record ended trials that the database lacks, for all participants or those inactive since `before`.
 
         A damaged folder is logged and skipped.
         """
@@ -166,7 +166,7 @@ class Procedure:
                     LOG.error("person %d: %s", person.id, error)
 
     async def adopt(self) -> None:
-        """Add participants for visit folders from before `mjsim play` had a database."""
+        """Add participants to the database for visit folders older than the database of `mjsim play`."""
         for name in await asyncio.to_thread(self.folders.names):
             try:
                 folder = self.folders.find(name)
@@ -180,7 +180,7 @@ class Procedure:
                 await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
 
     async def _leave_missing_phase(self, person: PersonRow) -> PersonRow:
-        """Advance a participant whose phase is not in the plan, such as the film of a server without one."""
+        """Advance a participant whose phase the plan lacks, such as a film that the server no longer has."""
         order = (*PHASES, RESULT)
         later = order[order.index(person.phase) + 1 :] if person.phase in order else ()
         following = next((name for name in later if name in self.names), None)
@@ -199,7 +199,7 @@ class Procedure:
         return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
 
     async def _after_earlier_visit(self, person: PersonRow, place: Assignment) -> Assignment:
-        """Use the next house seed if the participant has seen the result of the same episode."""
+        """Return `place`, but with the house seed after that of the participant's earlier visit, if any."""
         earlier = (await self.store.identity(person.id)).get(AFTER)
         folder = self.folders.find(earlier) if earlier else None
         if folder is None or not folder.is_over(TASK):

@@ -15,7 +15,7 @@ class Candidate:
     """A person who may take part.
 
     Attributes:
-        key: The platform's id of the person, which recognizes a second visit. None if there is no id.
+        key: The platform's id of the person, by which a second visit is recognized, or None.
         identity: All ids needed for payment. They never leave the store.
     """
 
@@ -25,22 +25,22 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Preview:
-    """A look at the study before accepting it."""
+    """A person who looks at the study before accepting it."""
 
 
 @dataclass(frozen=True)
 class InvalidLink:
-    """A link that the platform could not have made."""
+    """A link that is not valid for the platform, and the reason."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class WayBack:
-    """How the last page leads back to the platform.
+    """How the last page sends the participant back to the platform.
 
     Attributes:
-        fields: Fields of a form that is posted there, or None for a plain link.
+        fields: Fields of a form that is posted to `url`, or None for a plain link.
         gives_back: True if the participant must return the task on the platform's page.
     """
 
@@ -67,11 +67,11 @@ class Recruiter(Protocol):
     embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Check the query of a link."""
+        """Check the query of the link with which a person arrives."""
         ...
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """Return the way back for a participant who leaves like this."""
+        """Return how a participant with this final status gets back to the platform."""
         ...
 
 
@@ -80,7 +80,7 @@ class OpenLink:
 
     Args:
         platform: `link`, or `lab`, where the last page leads to the first one for the next participant.
-        repeats: True if the link of a further visit names the earlier one.
+        repeats: True if a link for playing again contains the token of the earlier visit.
     """
 
     has_time_limit = False

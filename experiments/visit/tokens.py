@@ -14,7 +14,7 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """Return the SHA-256 of a token, hexadecimal. Only this hash is stored."""
+    """Return the SHA-256 of a token in hexadecimal. Only this hash is stored."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
@@ -25,7 +25,7 @@ class Keys:
         self._secret, self._study = secret, study
 
     def person(self, platform_id: str) -> str:
-        """Return the key of a platform's participant, hexadecimal."""
+        """Return the key of a platform's participant in hexadecimal."""
         return self._digest(f"key:{platform_id}").hex()
 
     def token(self, platform_id: str) -> str:

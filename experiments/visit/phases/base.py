@@ -1,4 +1,4 @@
-"""The interface of phases, the phases with a text and a form, and the ones that are trials."""
+"""The interface of phases, and its implementations for forms and trials."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ class Visitor:
     Attributes:
         shown_s: Time since the phase was first shown, in seconds.
         attempts: Number of rejected forms in this phase.
-        path: Path of the participant's pages.
+        path: URL path of the participant's pages.
         metrics: Metrics of the task, only in the phase `result`.
     """
 
@@ -43,7 +43,7 @@ class Visitor:
 
 @dataclass(frozen=True)
 class Page:
-    """A template by name, and its values."""
+    """A page to be rendered: name of the template, and values for it."""
 
     template: str
     values: Mapping[str, Any]
@@ -51,7 +51,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Done:
-    """An accepted form: the answers and what follows."""
+    """Result of an accepted form: the answers, and how the visit continues or ends."""
 
     answers: Answers = field(default_factory=dict)
     outcome: Outcome = "next"
@@ -59,7 +59,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Again:
-    """A rejected form: the phase is shown again with a note."""
+    """Result of a rejected form. The phase is shown again with `note`."""
 
     note: str
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -72,14 +72,14 @@ class Phase(Protocol):
     name: str
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
-        """Return the page. `refused` is the result of a rejected form."""
+        """Return the page to show. If a form was just rejected, `refused` is the result."""
         ...
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again: ...
 
 
 class FormPhase:
-    """A page with a text, the items of a form and a button. `name` is also that of its section in the texts."""
+    """A page with a text, a form and a button. They are described in the section `name` of the texts."""
 
     def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
         self.name, self._template = name, template
@@ -103,7 +103,7 @@ class FormPhase:
             },
         )
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - of subclasses
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - used by subclasses
         return {}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
@@ -140,7 +140,7 @@ class FormPhase:
 class Story(FormPhase):
     """The story."""
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"paragraphs": self._plan.story_paragraphs}
 
 
@@ -174,7 +174,7 @@ class Consent(FormPhase):
 class Comprehension(FormPhase):
     """Questions about the task. Too many failed attempts screen the participant out."""
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"story": self._plan.story_paragraphs}
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
@@ -203,9 +203,9 @@ class Survey(FormPhase):
 
 
 def form_of(items: Sequence[Item], scale: Sequence[str], common: Section, language: str = "en") -> BaseForm:
-    """Return a form with a field per item. `scale` has the labels of the points of scales."""
+    """Return a form with a field per item. `scale` has the labels of the points on rating scales."""
     meta = DefaultMeta()
-    meta.locales = [language]  # language of WTForms' own messages
+    meta.locales = [language]  # for WTForms' built-in messages
     return BaseForm({item.name: _field(item, scale, common) for item in items}, meta=meta)
 
 
@@ -233,14 +233,14 @@ def _field(item: Item, scale: Sequence[str], common: Section) -> Any:
 
 
 class TrialPhase:
-    """A phase that is a trial. The server makes its page, and it ends with the trial."""
+    """A phase in which a trial is played. It ends with the trial, and has no form."""
 
     def __init__(self, plan: VisitPlan, name: str) -> None:
         self.name = name
         self._plan = plan
 
-    def page(self, visitor: Visitor, refused: Again | None = None) -> Page:  # noqa: ARG002 - nothing is sent
+    def page(self, visitor: Visitor, refused: Again | None = None) -> Page:  # noqa: ARG002 - there is no form
         return Page("play", {"trial": self.name})
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - it ends by itself
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - there is no form
         return Again(self._plan.texts["common"]["too_early"])

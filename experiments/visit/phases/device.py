@@ -9,7 +9,7 @@ from experiments.visit.phases.base import Again, Done, FormData, FormPhase, Visi
 from experiments.visit.plan import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
-MAX_RENDERER = 200  # maximum length, in characters
+MAX_RENDERER = 200  # maximum length of the renderer's name, in characters
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class _Measured:
     renderer: str
 
     def faults(self, needed: Device, draws: bool) -> list[str]:
-        """Return the names of the texts that describe unmet requirements.
+        """Return the names of the messages about unmet requirements.
 
-        Frame rate does not matter if the server draws.
+        The frame rate counts only if the browser `draws`, rather than the server.
         """
         values = self.values
         found = [
@@ -37,10 +37,10 @@ class _Measured:
 class DeviceCheck(FormPhase):
     """A page that measures the participant's computer and submits the result."""
 
-    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all
+    def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"keyboard": self._plan.device.keyboard}
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - what is sent says all
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - the form suffices
         measured = _measured(sent)
         if measured is None:
             return Again(self._plan.texts["common"]["needs_script"])

@@ -1,1 +1,1 @@
-"""The server of visits: pages and WebSockets for participants."""
+"""The visit server: pages and WebSockets for participants."""

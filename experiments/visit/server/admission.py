@@ -16,9 +16,9 @@ from experiments.visit.tokens import Keys, new_token, token_hash
 from experiments.web.server.guards import Rate, sent_form
 
 LOG = logging.getLogger("mjsim.study")
-NEW_PEOPLE = 60, 60.0  # new participants per IP address, and the period in seconds
-COUNTED = 10.0  # lifetime of a count of free places, in seconds; late surplus is handled at the training
-COUNTED_FULL = 1.0  # lifetime of a count of 0, in seconds
+NEW_PEOPLE = 60, 60.0  # limit of new participants per IP address, and its period in seconds
+COUNTED = 10.0  # how long a count of free places is cached, in seconds; surplus people are turned away later
+COUNTED_FULL = 1.0  # how long a count of 0 is cached, in seconds
 TOKEN = "token"  # form field with the token that the browser has stored
 
 
@@ -31,7 +31,7 @@ class Admission:
         self._recruiter = self._plan.recruiter
         self._new = Rate(*NEW_PEOPLE)
         self._counting = asyncio.Lock()
-        self._room, self._counted = 0, 0.0  # number of free places, and when it expires
+        self._room, self._counted = 0, 0.0  # cached number of free places, and when it expires
 
     async def welcome(self, request: Request) -> Response:
         """Show the welcome page, or send a returning participant to their current phase."""
@@ -70,10 +70,10 @@ class Admission:
         return None if came.key is None else await self._store.find(token_hash(self._keys.token(came.key)))
 
     async def _again(self, request: Request, came: Candidate, person: PersonRow, token: str = "") -> Response:
-        """Let a participant return if all ids match, or if the browser has the participant's link.
+        """Let a participant return if all ids match, or if the browser has stored the participant's token.
 
-        The platform's id of a person alone is no proof, since others know it. Only the person knows the submission's
-        id.
+        The platform's id of a person is no proof of identity, since others may know it. Only the person knows the id
+        of the submission.
         """
         same = came.identity == await self._store.identity(person.id)
         if came.key is not None and (

@@ -75,7 +75,7 @@ class VisitServer:
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
-        """Return the ASGI application that listens at `host`. `public` is its public URL behind a proxy."""
+        """Return the application for a server that listens at `host`. `public` is its URL behind a proxy."""
         return Starlette(
             routes=[
                 Route("/", self._arrivals.welcome),
@@ -127,7 +127,7 @@ class VisitServer:
             await self.sessions.release()
             await self._pool.close()
             if self._host is not None:
-                with suppress(StoreError):  # without heartbeats, its lease ends soon
+                with suppress(StoreError):  # the lease expires soon in any case
                     await self._host.leave()
             await self._store.close()
 
@@ -145,7 +145,7 @@ class VisitServer:
 
     async def _save(self, request: Request) -> Response:
         person, form = await self._person(request), await sent_form(request)
-        async with self._lock(person):  # keeps an older answer from replacing a newer one
+        async with self._lock(person):  # so that an older answer cannot replace a newer one
             now = await self._procedure.now(person, request.url.path)
             await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
@@ -162,7 +162,7 @@ class VisitServer:
             raise HTTPException(404)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
-            self.sessions.limit.release(person.token_hash)  # its page may have just left the queue
+            self.sessions.limit.release(person.token_hash)  # the visit may have a slot without a session
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -186,7 +186,7 @@ class VisitServer:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         if person is not None and self._host is not None and not await self._host.has(person):
-            await socket.send_denial_response(Response(status_code=404))  # the proxy asks the next host
+            await socket.send_denial_response(Response(status_code=404))  # makes the proxy try the next host
             return
         if person is None:
             await socket.close(1008)
@@ -206,15 +206,13 @@ class VisitServer:
 
     async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person
-        begun = self._procedure.folders.find(person.token_hash)  # a small file, read faster without a thread
+        begun = self._procedure.folders.find(person.token_hash)  # reads a small file, faster than in a thread
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))
         if (queued := self._trials.queued(person.token_hash)) is not None:
             if begun:
-                await self._store.beat(
-                    person.id
-                )  # who waits is there; to be assigned a place says so as well
+                await self._store.beat(person.id)  # waiting counts as activity; `assign` records it otherwise
             return self._pages.queue(request, now, queued)
         if isinstance(here, Assignment):
             here = await self._procedure.begin_playing(person, here)
@@ -231,7 +229,7 @@ class VisitServer:
         return self._pages.message(request, "unknown", 404)
 
     async def _elsewhere(self, request: Request, _: Exception) -> Response:
-        """Answer with 404, after which a proxy asks the next host. Without one, the participant sees this page."""
+        """Answer with 404, so that a proxy tries the next host. Without a proxy, the participant sees this page."""
         return self._pages.message(request, "paused", 404)
 
     async def _person(self, request: Request) -> PersonRow:

@@ -14,17 +14,17 @@ from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
 LOG = logging.getLogger("mjsim.study")
-HEARTBEAT_S = 10.0  # time between two heartbeats to the database
-SWEEP_S = 60.0  # time between two searches for absent participants
-CLOCK_SET_S = 30.0  # clock deviation that means the clock was set or the machine slept
+HEARTBEAT_S = 10.0  # period of heartbeats to the database
+SWEEP_S = 60.0  # period of searching for absent participants
+CLOCK_SET_S = 30.0  # larger deviations mean that the clock was set or the machine slept
 
 
 class HostOfVisits:
-    """This host, among several with one database. `name` is unique among them."""
+    """This host, if several hosts share a database. `name` is unique among them."""
 
     def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
         self._name, self._store, self._folders = name, store, folders
-        self._until = 0.0  # end of the lease, by the monotonic clock
+        self._until = 0.0  # when the lease expires, by the monotonic clock
         self._new = False
 
     async def keep(self, sessions: Sessions) -> None:
@@ -41,7 +41,7 @@ class HostOfVisits:
             await asyncio.sleep(HEARTBEAT_S)
 
     async def has(self, person: PersonRow) -> bool:
-        """Return True if this host shows the participant's pages. Every host shows those of the first phases."""
+        """Return True if this host has the visit, claiming it if possible. Any host serves the phases before trials."""
         if person.host is None and person.phase not in PLAYED:
             return True
         if time.monotonic() > self._until:
@@ -64,13 +64,13 @@ async def end_absent(procedure: Procedure) -> None:
     while True:
         await asyncio.sleep(SWEEP_S)
         now = time.monotonic()
-        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # last activity is stored in that clock's time
+        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # restart, since activity is timed by that clock
             since, ahead = now, time.time() - now
         if now - since < away:
             continue
         try:
             before = utc_now() - datetime.timedelta(seconds=away)
-            await procedure.recover(before)  # their trials may be over but not recorded
+            await procedure.recover(before)  # their trials may have ended without being recorded
             if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
         except StoreError as error:  # try again at the next sweep

@@ -1,4 +1,4 @@
-"""Pages of the phases, last pages and messages."""
+"""Rendering of phases, last pages and messages."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from experiments.web.client_files import page
 
 
 class VisitPages:
-    """Pages of a plan, with its texts."""
+    """Renders the pages of a plan with its texts."""
 
     def __init__(self, plan: VisitPlan) -> None:
         self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
@@ -31,13 +31,13 @@ class VisitPages:
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
-        """Show a message, by the name of its text."""
+        """Show the message whose text has this name."""
         words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
-        """Show why the study admits no new participants, by the name of the text."""
+        """Show a message, by the name of its text, to a person who is not admitted to the study."""
         remembers = self._recruiter.platform == "link"
         return self._last(request, "welcome", name, "withdrawn", "closed", remembers=remembers)
 

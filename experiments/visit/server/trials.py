@@ -26,12 +26,12 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Capacity, Sessions, usable_cores
 
 LOG = logging.getLogger("mjsim.study")
-BEAT_PERIOD = 60.0  # period of recording the participant's activity, in seconds
-SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # open sockets at a time
-REAL_TIME_EVERY = 20  # in a rehearsal, one participant of this many plays in real time
-NEVER = 1e9  # seconds; HTML has no infinity
+BEAT_PERIOD = 60.0  # how often a participant's activity is recorded, in seconds
+SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # maximum numbers of open sockets
+REAL_TIME_EVERY = 20  # in a rehearsal, one in this many participants plays in real time
+NEVER = 1e9  # stands for infinity in HTML, in seconds
 REFRESH = 10.0, 30.0  # shortest and longest polling period of the queue page, in seconds
-PATIENCE = 2.5  # a page keeps its position for this many polling periods
+PATIENCE = 2.5  # number of missed polling periods after which a page loses its position in the queue
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Queued:
     Attributes:
         position: Position, from 1.
         wait: Expected waiting time, in seconds.
-        refresh: Time until the page asks again, in seconds.
+        refresh: Time until the page polls again, in seconds.
     """
 
     position: int
@@ -63,7 +63,7 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(pool, self._limit, self._plan.limits.idle, meter, capacity)
-        self._default_wait = 60.0 * self._plan.minutes  # assumed duration in seconds, until trials have ended
+        self._default_wait = 60.0 * self._plan.minutes  # assumed until trials have ended, in seconds
         self._sockets: Counter[str] = Counter()  # open sockets, by participant and by address
 
     def queued(self, visit: str) -> Queued | None:
@@ -116,7 +116,7 @@ class Trials:
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        # All participants may be behind one address. A page that is loaded again has two sockets for a moment.
+        # All participants may share one address, and a reloaded page briefly has two sockets.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address

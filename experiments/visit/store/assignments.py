@@ -22,7 +22,7 @@ from experiments.visit.store.values import (
     utc_now,
 )
 
-SEEDS = 2**53  # exact in JavaScript's numbers, too
+SEEDS = 2**53  # JavaScript's numbers represent all seeds below this exactly
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
@@ -63,7 +63,7 @@ class Assignments(StorePart):
         now: datetime | None = None,
         abandoned_after: timedelta = timedelta(minutes=30),
     ) -> Assignment | None:
-        """Return the participant's place, assigning one if needed. None if all cells are full.
+        """Return the participant's place, assigning one if needed, or None if all cells are full.
 
         A place is held while its participant is active. After `abandoned_after` without activity it no longer counts,
         and the next participant of the cell gets it if no other place is free. A participant who returns later gets the
@@ -72,7 +72,7 @@ class Assignments(StorePart):
 
         Args:
             cells: Quotas of the study file. :meth:`set_quota` may have changed them.
-            rule: Rule for choosing a cell, see :func:`choose`.
+            rule: Rule for choosing a cell; see :func:`choose`.
             abandoned_after: How long a place is held without activity.
 
         Raises:
@@ -91,7 +91,7 @@ class Assignments(StorePart):
                     return await place_of(connection, person_id)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
             here = {"study": self._study_id, "since": now - abandoned_after}
-            while True:  # repeat if a participant became active between the two queries
+            while True:  # repeat if an absent participant returned between the two queries
                 taken = await _tally(connection, _TAKEN, here)
                 cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
                 if cell is None:
@@ -107,11 +107,11 @@ class Assignments(StorePart):
     async def room(
         self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
     ) -> int:
-        """Return the number of free places minus participants on their way to one. It may be negative.
+        """Return the number of free places not needed by participants in earlier phases. It may be negative.
 
         Args:
             wanted: Quotas of the study file.
-            first: First phase. Participants in it are not counted as on their way.
+            first: Name of the first phase, whose participants are not counted.
             abandoned_after: Inactivity after which a participant does not count, as in :meth:`assign`.
         """
         since = (now or utc_now()) - abandoned_after
@@ -145,7 +145,7 @@ class Assignments(StorePart):
             return tuple(Assignment(*row) for row in await connection.execute(query))
 
     async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
-        """Override the study file's number of participants in a cell. Assigned places stay."""
+        """Override the study file's number of participants in a cell. Assigned places are kept."""
         if cell < 0 or wanted < 0:
             raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
         now = now or utc_now()
@@ -214,7 +214,7 @@ class Assignments(StorePart):
 
 
 async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
-    """Return the first unassigned place of a cell, or else release and return an abandoned one, if any."""
+    """Return a free place of a cell. If there is none, release an abandoned one, or return None."""
     free = sorted(set(range(wanted)) - {holder.place for holder in holders})
     if free:
         return free[0]
@@ -232,12 +232,12 @@ async def _tally(
 
 
 def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
-    """Choose the next participant's cell: `balanced` the least filled one, `uniform` any with free places.
+    """Choose the next participant's cell: the least filled (`balanced`) or any with free places (`uniform`).
 
     Args:
         counts: Number of participants in each cell.
         quotas: Number of wanted participants of each cell.
-        rule: The rule. Ties are broken at random.
+        rule: Rule for choosing a cell. Ties are broken at random.
 
     Returns:
         Index of the cell, or None if all are full.
@@ -259,7 +259,7 @@ async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | 
 
 
 async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
-    """Give a participant a released place again. Return False if it is taken."""
+    """Give a released place back to its participant. Return False if another participant has it."""
     query = select(assignment.c.id).where(
         assignment.c.study_id == study_id,
         assignment.c.cell == place.cell,
@@ -273,7 +273,6 @@ async def take_back(connection: AsyncConnection, study_id: int, place: Assignmen
 
 
 async def set_place(connection: AsyncConnection, person_id: int, state: PlaceState) -> None:
-    """Set the state of a participant's place."""
     await connection.execute(
         update(assignment)
         .where(assignment.c.person_id == person_id)

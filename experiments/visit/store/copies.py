@@ -20,7 +20,7 @@ ROWS = 1000  # rows per INSERT
 
 
 def check_new(path: Path) -> None:
-    """Raise StoreError if the file of a new backup exists."""
+    """Raise StoreError if the file for a new backup exists already."""
     if path.exists():
         raise StoreError(f"{path} is there already: name a new file for the backup.")
 
@@ -64,7 +64,7 @@ async def restore(path: Path, url: str) -> None:
     """
     if not path.is_file():
         raise StoreError(f"There is no backup {path}.")
-    with TemporaryDirectory() as folder:  # an older backup is upgraded in a copy
+    with TemporaryDirectory() as folder:  # upgrade a copy, in case the backup is from an older version
         copy = shutil.copyfile(path, Path(folder, "backup.db"))
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
@@ -101,7 +101,7 @@ async def _copy(source: Database, target: Database) -> None:
                         rows = []
                 if rows:
                     await writing.execute(insert(table), rows)
-                if target.kind == "postgresql":  # its id sequences are separate from the rows
+                if target.kind == "postgresql":  # inserted ids do not advance PostgreSQL's sequences
                     last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
                     after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
                     await writing.execute(text(f"SELECT setval({after})"))

@@ -31,7 +31,7 @@ PRAGMAS = (
     "PRAGMA foreign_keys = ON",
     "PRAGMA secure_delete = ON",  # overwrite deleted rows
 )
-# Settings of servers, with the values that make commits durable.
+# Server settings, each with the values that make commits durable.
 DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
     "mysql": {"@@innodb_flush_log_at_trx_commit": ("1",)},
     "postgresql": {
@@ -44,7 +44,7 @@ TURN_S = 60  # timeout for a pooled connection, in seconds
 TRIES = 9
 CONNECTIONS = 10  # size of the connection pool
 TOGETHER = 64  # maximum number of writes per SQLite transaction
-PAUSE_S = 0.01  # doubled before each retry, in seconds
+PAUSE_S = 0.01  # base of the exponential delay between tries, in seconds
 
 
 class _UnknownError(StoreError):
@@ -59,10 +59,9 @@ class Database:
         self.url = _parsed(url)
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
-        self.on_write: Callable[[float], None] = lambda _: (
-            None
-        )  # called with the duration of each write, in seconds
-        self._turn = asyncio.Lock()  # SQLite has one writer
+        # called with the duration of each write, in seconds
+        self.on_write: Callable[[float], None] = lambda _: None
+        self._turn = asyncio.Lock()  # SQLite allows one writer at a time
         self._waiting: list[_Waiting] = []
         self._writer: asyncio.Task[None] | None = None
 
@@ -173,12 +172,12 @@ class Database:
         return result
 
     async def _write_waiting(self) -> None:
-        """Run waiting work in groups, because most of a transaction's time is the commit's wait for the disk."""
+        """Run waiting work in groups, since a transaction spends most of its time waiting for the disk."""
         while self._waiting:
             group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
             if len(group) > 1 and await self._write_group(group, alone=False):
                 continue
-            for one in group:  # the group failed and nothing was written
+            for one in group:  # a single one, or a group that failed without being written
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
@@ -255,7 +254,7 @@ def _engine(url: URL) -> AsyncEngine:
             connect_args={"timeout": PATIENCE_S, "async_creator_fn": sqlite_connection},
             pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
-            max_overflow=0,  # each is a thread, and waiting is faster than starting one
+            max_overflow=0,  # a connection is a thread; waiting for one is faster than starting one
         )
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
@@ -272,7 +271,7 @@ def _engine(url: URL) -> AsyncEngine:
 
 
 def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
-    connection.isolation_level = None  # the driver starts no transactions
+    connection.isolation_level = None  # keeps the driver from starting transactions
     cursor = connection.cursor()
     for pragma in PRAGMAS:
         cursor.execute(pragma)
@@ -282,14 +281,14 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 def _begin(connection: Connection) -> None:
     """Start a transaction.
 
-    One that will write locks at once, since one that reads first may fail to get the lock later.
+    A transaction that will write takes the lock at once, since it may fail to get it after reading.
     """
     if statement := connection.get_execution_options()["begin"]:
         connection.exec_driver_sql(statement)
 
 
 async def _pause(attempt: int) -> None:
-    """Wait before the next try, about five seconds for all tries together."""
+    """Wait before a retry. All waits together take about five seconds."""
     share = random.uniform(0.5, 1.5)  # nosec B311  # no secret
     await asyncio.sleep(PAUSE_S * 2**attempt * share)
 

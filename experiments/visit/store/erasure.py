@@ -13,7 +13,7 @@ from experiments.visit.store.ledger import by_key, events_of, paid
 from experiments.visit.store.part import StorePart, lock_study, note
 from experiments.visit.store.values import utc_now
 
-# In an order that keeps foreign keys valid.
+# Tables with rows of participants, in an order of deletion that keeps foreign keys valid.
 OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.identity, tables.payment)
 
 
@@ -57,7 +57,7 @@ class Erasure(StorePart):
         await self._database.scrub()
 
     async def known(self, before: datetime) -> tuple[int, ...]:
-        """Return the numbers of identifiable participants inactive since `before`."""
+        """Return the numbers of participants inactive since `before` who can still be identified."""
         mine = (tables.person.c.study_id == self._study_id, tables.person.c.seen < before)
         recognised = tables.identity.c.id.is_not(None) | tables.person.c.platform_key.is_not(None)
         query = select(tables.person.c.id).outerjoin(tables.identity).where(*mine, recognised)
@@ -71,7 +71,7 @@ class Erasure(StorePart):
         Measures, answers and amounts stay. The links no longer work, and the participants could take part again.
 
         Args:
-            names: New names of their folders in place of the hash of the link, in the same order.
+            names: New names of their folders, in the same order. They replace the hashes of the links.
         """
         now = utc_now()
 

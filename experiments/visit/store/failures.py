@@ -10,7 +10,7 @@ PASSING = {
     "40001",  # PostgreSQL: conflict of two transactions
     "40P01",  # PostgreSQL: deadlock
 }
-# MariaDB's numbers, PostgreSQL's states or parts of messages, each with cause and remedy
+# Error numbers (MariaDB), SQLSTATE codes (PostgreSQL) or parts of messages, with cause and remedy
 MEANINGS = (
     (
         ("1045", "1044", "28P01", "42501", "authentication failed", "FATAL:  role", "pg_hba.conf"),
@@ -40,7 +40,7 @@ def passes(error: SQLAlchemyError) -> bool:
 
 
 def advice(error: SQLAlchemyError, database: str) -> str:
-    """Return a sentence with the cause and the remedy."""
+    """Return a message with the cause and the remedy."""
     if isinstance(error, TimeoutError):
         return (
             f"The database {database} is busy: every connection is in use. Try again, or let fewer people in."

@@ -1,4 +1,4 @@
-"""Several hosts with one database: heartbeats, and which host has which visit.
+"""Several hosts with one database: their heartbeats, and the assignment of visits to hosts.
 
 Times are those of the database's clock, since the hosts' clocks may be wrong.
 """
@@ -15,7 +15,7 @@ from experiments.visit.store.values import Host
 
 LEASE = timedelta(seconds=60)  # without a successful heartbeat for this long, a host ends its sessions
 SILENT = timedelta(seconds=90)  # a host without heartbeats for this long may be handed over
-HANDED_OVER = "-"  # host name that stands for any host with the journal
+HANDED_OVER = "-"  # stands for the name of any host that has the participant's journal
 
 
 class Hosts(StorePart):
@@ -40,7 +40,7 @@ class Hosts(StorePart):
             return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
 
     async def claim(self, person_id: int, name: str, *, new: bool, journal: bool) -> bool:
-        """Let a host have the trials of a participant. Return True if it has them.
+        """Assign a participant's trials to a host if allowed. Return True if the host has them.
 
         Args:
             new: True if the host accepts new visits.
@@ -49,7 +49,7 @@ class Hosts(StorePart):
         may = [person.c.host == name]
         if journal:
             may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
-        elif new:  # a participant with a place has a journal elsewhere
+        elif new:  # not for participants with a place, whose journal is on another host
             may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
 
         async def work(connection: AsyncConnection) -> bool:
@@ -59,7 +59,7 @@ class Hosts(StorePart):
         return await self._database.write(work)
 
     async def drain(self, name: str, draining: bool, who: str) -> None:
-        """Stop or allow new visits on a host. Visits that it has continue."""
+        """Stop or allow new visits on a host. Its current visits continue."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)

@@ -17,11 +17,8 @@ from experiments.visit.store.part import StorePart, database_now, lock_study
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
-ONCE: tuple[PaymentKind, ...] = (
-    "reward",
-    "screen_out",
-    "partial",
-)  # kinds of which a participant gets at most one
+# kinds of which a participant gets at most one payment in all
+ONCE: tuple[PaymentKind, ...] = ("reward", "screen_out", "partial")
 IN_DOUBT_AFTER = timedelta(minutes=10)
 _FIELDS = [column for column in payment.c if column.name != "study_id"]
 
@@ -39,7 +36,7 @@ class Ledger(StorePart):
         note: str = "",
         now: datetime | None = None,
     ) -> bool:
-        """Record that a payment is owed. Return False if the same payment is recorded already.
+        """Record that a payment is owed. Return False if this has been recorded before.
 
         Args:
             kind: Kind of the payment. A participant gets at most one of `reward`, `screen_out` and `partial`.
@@ -92,7 +89,7 @@ class Ledger(StorePart):
     async def confirm(
         self, key: str, attempt: int, reference: str, note: str = "", now: datetime | None = None
     ) -> bool:
-        """Record the platform's payment with its reference. Return False if it is recorded already."""
+        """Record that the platform has paid, with its reference. Return False if this was recorded before."""
 
         async def work(connection: AsyncConnection) -> bool:
             events = await self._known(connection, key)
@@ -105,7 +102,7 @@ class Ledger(StorePart):
         return await self._database.write(work)
 
     async def fail(self, key: str, attempt: int, note: str, now: datetime | None = None) -> bool:
-        """Record that the platform has certainly not paid in this attempt. Return False if it is not the current one.
+        """Record that an attempt has certainly failed. Return False if it is not the current attempt.
 
         Never call this after a timeout or a lost connection, when the payment is in doubt.
         """

@@ -61,7 +61,7 @@ class People(StorePart):
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
                 found = replace(PersonRow(*known), returning=True)
-                if found.active:  # a task that is returned and accepted again has new ids for payment
+                if found.active:  # after returning and accepting the task again, a participant has new ids
                     mine = ids.c.person_id == found.id
                     await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
                 return found
@@ -106,13 +106,13 @@ class People(StorePart):
             return tuple(PersonRow(*row) for row in await connection.execute(query.order_by(person.c.id)))
 
     async def identity(self, person_id: int) -> dict[str, str]:
-        """Return a participant's platform ids, which are only used for payment. Empty if they are erased."""
+        """Return a participant's platform ids, which are only used for payment. They are empty once erased."""
         query = select(ids.c.ids).where(ids.c.person_id == person_id)
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
 
     async def beat(self, person_id: int, now: datetime | None = None) -> None:
-        """Record activity of a participant, which keeps the place."""
+        """Record that a participant is active and keeps the place."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:

@@ -76,9 +76,9 @@ class Phases(StorePart):
 
         Args:
             answers: Answers by item. They replace saved ones.
-            reason: Reason for ending, for phases with several.
+            reason: Reason for the end of the phase, if there are several ways to end it.
             duration_s: Duration in seconds, by default the time since the phase was first shown.
-            status: Final status that ends the participation too, such as `finished` after the last phase.
+            status: Final status, such as `finished`, if the participation ends as well.
         """
         now = now or utc_now()
 
@@ -202,7 +202,7 @@ async def _save(
 
 
 class Endings(StorePart):
-    """Changes of the final status."""
+    """Ways to end a participation."""
 
     async def finish(self, person_id: int, status: Status = "finished", now: datetime | None = None) -> bool:
         """End an active participation. Return True if it was active.
@@ -238,7 +238,7 @@ class Endings(StorePart):
         return await self._database.write(work)
 
     async def withdraw(self, person_id: int, delete: bool, now: datetime | None = None) -> bool:
-        """Withdraw a participant, even after finishing. Return True if this call did.
+        """Withdraw a participant, even after finishing. Return False if nothing changed.
 
         With `delete`, the answers are deleted at once and the place is released. The number and platform ids stay until
         all payments are made. :meth:`Store.erase` then deletes the rest.
@@ -267,7 +267,7 @@ async def end(
 ) -> None:
     """Set the final status of a participant, and finish or release the place. The study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
-    if status == "no_consent":  # ids are only needed for payment; the keyed hash still recognizes the person
+    if status == "no_consent":  # no payment needs the ids; the keyed hash still recognizes the person
         await connection.execute(delete_rows(identity).where(identity.c.person_id == person_id))
     place = await place_of(connection, person_id)
     if place is None:
@@ -277,5 +277,5 @@ async def end(
             await set_place(connection, person_id, "released")
     elif place.state == "held":
         await set_place(connection, person_id, "finished")
-    else:  # if another participant has the place by now, the cell gets one more than wanted
+    else:  # if the place is taken again, the cell ends with one participant too many
         await take_back(connection, study_id, place, "finished")

@@ -17,7 +17,7 @@ from experiments.visit.store.values import Researcher, Role, utc_now
 if TYPE_CHECKING:
     from argon2 import PasswordHasher
 
-PASSWORD_MEMORY_KIB = 65_536  # memory cost of hashing a password, by RFC 9106
+PASSWORD_MEMORY_KIB = 65_536  # memory cost of hashing a password, as recommended by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
 _FIELDS = (
     researcher.c.id,
@@ -65,7 +65,7 @@ class Researchers:
     async def check(self, name: str, password: str) -> Researcher | None:
         """Return the researcher with these credentials, or None if they are wrong or the account is disabled.
 
-        Unknown names take as long as known ones. The caller limits the number of attempts.
+        Checking an unknown name takes as long as checking a known one. The caller limits the number of attempts.
         """
         row = await self._row(name) if NAME.fullmatch(name) else None
         if row is None:

@@ -11,9 +11,9 @@ SLOW = ("Connection.commit", "Connection.close")
 
 
 class SqliteConnection(aiosqlite.Connection):
-    """Uses the thread only for operations that may wait for a lock or the disk.
+    """A connection that uses its thread only for operations that may wait for a lock or the disk.
 
-    In WAL mode readers never wait, and writers have the lock by then.
+    In WAL mode, reading never waits, and a transaction has the lock before it writes.
     """
 
     async def _execute(self, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:

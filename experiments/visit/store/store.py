@@ -50,7 +50,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
             url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
             study_name: Name of the study. A database may hold several.
             file_hash: SHA-256 of the study file, hexadecimal. A change is recorded in the audit log.
-            password_memory_kib: Memory cost of hashing a researcher's password. Tests use little.
+            password_memory_kib: Memory cost of hashing a researcher's password. Tests use less.
         """
         database = Database(url)
         try:
@@ -69,7 +69,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         self._database.on_write = tell
 
     def is_at(self, path: Path) -> bool:
-        """Return True if the database is this file."""
+        """Return True if the database is the SQLite file at `path`."""
         return (
             self._database.kind == "sqlite"
             and path.resolve() == Path(self._database.url.database or "").resolve()
@@ -130,7 +130,7 @@ async def change_database(path: Path, study_name: str, work: Callable[[Store], A
         return await work(store)
     finally:
         await store.close()
-        with suppress(sqlite3.OperationalError):  # another process has it open
+        with suppress(sqlite3.OperationalError):  # fails while another process has the file open
             one_file(path)
 
 

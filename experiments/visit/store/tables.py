@@ -1,4 +1,4 @@
-"""The tables of a study's database. Migrations create them, and a test compares both."""
+"""The tables of a study's database. Migrations create them, and a test checks that both agree."""
 
 import json
 from datetime import UTC, datetime
@@ -28,7 +28,7 @@ HASH = 64  # length of a SHA-256, in hexadecimal digits
 
 
 class Utc(TypeDecorator[datetime]):
-    """A time with a timezone, stored as UTC without it, since SQLite and MariaDB cannot store timezones."""
+    """A time with a timezone. It is stored in UTC, since SQLite and MariaDB cannot store timezones."""
 
     impl = DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
     cache_ok = True
@@ -46,7 +46,7 @@ class Utc(TypeDecorator[datetime]):
 
 
 class Json(TypeDecorator[Any]):
-    """A value as ASCII JSON text, so that every character survives every database."""
+    """A value stored as JSON in ASCII, so that no database can change a character."""
 
     impl = Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
     cache_ok = True
@@ -82,7 +82,7 @@ def _id() -> Column[int]:
 
 
 def _of(table: str, *, unique: bool = False, index: bool = False) -> Column[int]:
-    """Return a foreign key. `index` is for tables without a unique constraint that starts with the column."""
+    """Return a foreign-key column. Set `index` if no unique constraint of the table begins with it."""
     return Column(f"{table}_id", ForeignKey(f"{table}.id"), nullable=False, unique=unique, index=index)
 
 
@@ -111,7 +111,7 @@ person = Table(
     Column("created", Utc, nullable=False),
     Column("seen", Utc, nullable=False),
     Column("delete_wanted", Boolean, nullable=False),
-    Column("host", String(NAME)),  # host that has the participant's trials; NULL if there is only one
+    Column("host", String(NAME)),  # host that has the participant's trials; NULL if there is only one host
     UniqueConstraint("study_id", "platform_key"),
     **OPTIONS,
 )
@@ -125,8 +125,8 @@ identity = Table(
     **OPTIONS,
 )
 
-# `active` is 1 while the place is held or finished, and NULL once it is released. So the last constraint keeps two
-# participants from having the same place.
+# `active` is 1 while a place is held or finished, and NULL once it is released. Thus the unique constraint ensures
+# that only one participant has a place.
 assignment = Table(
     "assignment",
     metadata,

@@ -1,4 +1,4 @@
-"""Migration of a database to the current tables, by one process at a time."""
+"""Migration of a database to the current schema, by one process at a time."""
 
 from pathlib import Path
 
@@ -15,11 +15,11 @@ from experiments.visit.store.tables import metadata
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSIONS = "alembic_version"
-LOCK = 7_303_014  # arbitrary number that all upgrading processes share
+LOCK = 7_303_014  # arbitrary lock number, shared by all upgrading processes
 
 
 async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
-    """Create the tables, or migrate them to the current form with their rows.
+    """Create the tables, or migrate existing tables and their rows to the current schema.
 
     Raises StoreError if a newer mjsim created them, or the database holds tables of another program.
     """
@@ -36,7 +36,7 @@ async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
 
 
 async def _lock(connection: AsyncConnection, kind: str) -> None:
-    """Take a lock, except in SQLite, whose transaction is one."""
+    """Keep other processes from upgrading. In SQLite, the transaction does so already."""
     if kind == "mysql":
         found = await connection.execute(
             text("SELECT GET_LOCK(:name, :wait)"), {"name": f"mjsim{LOCK}", "wait": PATIENCE_S}

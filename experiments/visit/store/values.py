@@ -26,7 +26,7 @@ class StudyRow:
 
     Attributes:
         file_hash: Hash of the study file at the last opening.
-        quotas: Changed numbers of wanted participants, by cell.
+        quotas: Numbers of wanted participants that differ from the study file, by cell.
     """
 
     id: int
@@ -67,7 +67,7 @@ class PersonRow:
 
 @dataclass(frozen=True)
 class Host:
-    """A host of a study with several."""
+    """One of several hosts of a study."""
 
     name: str
     seen: datetime
@@ -76,7 +76,7 @@ class Host:
 
 @dataclass(frozen=True)
 class PhaseRow:
-    """A participant's phase: when it was first shown, and how it ended (None before that)."""
+    """A participant's phase. `ended` and the fields after it are None until the phase has ended."""
 
     person_id: int
     name: str
@@ -123,19 +123,19 @@ class AuditRow:
 
 @dataclass(frozen=True)
 class CellQuota:
-    """Number of wanted participants of a cell, and their house seeds, which repeat for further participants."""
+    """Number of participants wanted in a cell, and the house seeds of its places, which are reused in order."""
 
     wanted: int
     house_seeds: Sequence[int]
 
     def house_seed(self, place: int) -> int:
-        """Return the house seed of a place, counted from 0."""
+        """Return the house seed of the place with this index."""
         return self.house_seeds[place % len(self.house_seeds)]
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """A participant's place in a cell, both counted from 0, with the participant's seeds."""
+    """A participant's place in a cell, and the participant's seeds. `cell` and `place` count from 0."""
 
     person_id: int
     cell: int
@@ -158,7 +158,7 @@ class CellCount:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of participants by status, by phase (active ones only) and by cell."""
+    """Numbers of participants by status and by phase (only active ones), and of places by cell."""
 
     statuses: Mapping[str, int]
     phases: Mapping[str, int]
@@ -190,7 +190,7 @@ class PaymentEvent:
 
     @property
     def in_doubt(self) -> bool:
-        """True if the platform may have paid, provided that this is the last event of its key."""
+        """True if it is unknown whether the platform has paid. Only valid for the last event of a key."""
         return self.event == "sending"
 
 

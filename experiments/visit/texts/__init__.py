@@ -1,4 +1,4 @@
-"""Texts for participants, read from `experiments/texts`: one file per language, and its story."""
+"""Texts for participants, from `experiments/texts`. Each language has a file of texts and a story."""
 
 import re
 from collections.abc import Mapping
@@ -47,11 +47,11 @@ def languages() -> tuple[str, ...]:
 
 
 def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
-    """Return the texts of a language. A file of a study may replace some of them.
+    """Return the texts of a language. A study's own file may replace some of them.
 
     Args:
-        language: Language of one of the files in this package. Otherwise `path` must have all texts.
-        path: File with some sections. The items of a section replace all original items.
+        language: Language tag. If there is no file for it, `path` must contain all texts.
+        path: The study's own file, or None. If a section has items, they replace all original ones.
         values: Values of the placeholders `{name}`.
 
     Raises:
@@ -127,7 +127,7 @@ def _section(
 
 
 def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
-    """Replace placeholders by values of the study. Other placeholders of the English text stay."""
+    """Replace placeholders with the study's values. Placeholders that are filled in later stay."""
     places = _PLACE.findall(english)
     later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
 

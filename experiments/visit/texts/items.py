@@ -13,7 +13,7 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A question with its kind of answer.
 
     Attributes:
-        name: Name of its column in tables.
+        name: Name of the item, from which those of table columns are formed.
         kind: `scale` (a point from 1), `choice` and `several` (of `choices`), `number` (an integer), `line` or `text`.
         right: The right answer of an attention or comprehension check. For a scale, the number of the point.
     """
@@ -39,11 +39,11 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")
 
     def is_wrong(self, answer: Any) -> bool:
-        """Return True if the item has a right answer and this is not it."""
+        """Return True if the item has a right answer and `answer` is a different one."""
         return self.right is not None and answer != self.right
 
     def example(self) -> str:
-        """Return a valid answer as a form field, the right one if there is one."""
+        """Return a valid answer as the text of a form field: the right answer, if the item has one."""
         if self.right is not None:
             return str(self.right)
         match self.kind:

@@ -11,7 +11,7 @@ TIME = sa.DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
 
 
 def upgrade() -> None:
-    """Add the table and the column, unless an interrupted upgrade has."""
+    """Add the table `host` and the column `person.host`, unless an interrupted upgrade already has."""
     found = sa.inspect(op.get_bind())
     if "host" not in {column["name"] for column in found.get_columns("person")}:
         op.add_column("person", sa.Column("host", sa.String(100), nullable=True))
