@@ -31,7 +31,7 @@ class CheckReport:
     path: str  # the checked name or path
     findings: tuple[Finding, ...]  # errors first
     facts: Mapping[str, str] = field(default_factory=dict)  # name -> text
-    views: tuple[Drawing, ...] = ()  # drawings for a picture; empty if nothing could be compiled
+    views: tuple[Drawing, ...] = ()  # drawings for the report's picture, empty if nothing could be compiled
 
     def __post_init__(self) -> None:
         ordered = sorted(self.findings, key=lambda f: f.severity != "error")

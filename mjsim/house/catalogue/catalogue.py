@@ -132,7 +132,7 @@ class Catalogue:
 
     @classmethod
     def read(cls, house: HouseRef) -> "Catalogue":
-        """Read and check a catalogue. This never generates a home.
+        """Read and check a catalogue, without generating a home.
 
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or
@@ -164,7 +164,7 @@ class _HouseEntry(_ModelEntry):
 
 
 class _ObjectEntry(_ModelEntry):
-    category: _Text | None = None  # alternative to being listed in the category
+    category: _Text | None = None  # given here, or by the object list of the category
 
 
 class _ReceptacleEntry(_ModelEntry):

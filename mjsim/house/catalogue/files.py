@@ -25,7 +25,7 @@ def base_of(house: HouseRef) -> HouseRef | None:
         name = tomllib.loads(read_text(house.file)).get("extends")
         return parse_house(name, house.file.parent) if isinstance(name, str) else None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
-        return None  # reading the catalogue reports it
+        return None  # reading the catalogue later reports the error
 
 
 def catalogue_file(house: HouseRef) -> Path:

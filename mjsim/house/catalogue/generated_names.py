@@ -18,7 +18,7 @@ VERSION = 3  # version of the generator; increase it with every change that alte
 ROOMS = (1, 10)  # smallest and largest number of rooms
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000  # longest range of seeds
-# Probabilities of 1 to 10 rooms, including bathrooms and halls, if the name does not give their number.
+# Probabilities of 1 to 10 rooms (bathrooms and halls included), for names that do not give the number of rooms.
 _SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
 _SPLITS: Mapping[str, float] = {"train": 0.8, "validation": 0.9, "test": 1.0}
 
@@ -84,7 +84,7 @@ def generated_names(houses: str) -> list[str]:
 
 
 def split_of(seed: int) -> str:
-    """Return the split of a seed, by a hash: `train` (80 %), `validation` (10 %) or `test` (10 %)."""
+    """Return the dataset split of a seed: `train` (80 %), `validation` (10 %) or `test` (10 %), chosen by a hash."""
     share = stream(seed, "split").random()
     return next(name for name, end in _SPLITS.items() if share < end)
 
@@ -103,7 +103,7 @@ def _default_rooms(seed: int) -> int:
 
 
 def stream(seed: int, *purpose: str) -> "np.random.Generator":
-    """Return the random generator of a purpose, such as `stream(7, "furniture", "bedroom")`.
+    """Return the random generator of a seed for one purpose, such as `stream(7, "furniture", "bedroom")`.
 
     Purposes have independent generators, so drawing more for one does not change the others.
     """

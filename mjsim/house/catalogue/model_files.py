@@ -19,7 +19,7 @@ class ModelFile:
     """An MJCF file that was read with all files that it includes or refers to."""
 
     path: Path
-    elements: tuple[ET.Element, ...]  # XML elements of the file and of included files, if they are XML
+    elements: tuple[ET.Element, ...]  # XML elements of this file and of all included XML files
 
     @classmethod
     def read(cls, path: Path) -> "ModelFile":
@@ -94,7 +94,7 @@ def content_hash(text: str, models: Iterable[Path]) -> str:
     files: dict[str, bytes] = {}
     for model in models:
         _read_assets(model.parent, list(_elements(str(model), str(model.parent), files)), files)
-    # In the order of references: swapping the contents of two files makes a different house.
+    # In the order of references, so that swapping the contents of two files changes the hash.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 

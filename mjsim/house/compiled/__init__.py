@@ -1,1 +1,1 @@
-"""Compiled houses without objects and a person: rooms, receptacles, floor, rays."""
+"""Compiled houses, without objects or a person: rooms, receptacles, floor and ray casts."""

@@ -28,7 +28,7 @@ def tighten(model: mujoco.MjModel) -> None:
         made, children, leaf, depth = surface_area_tree(
             boxes[:, :3] - boxes[:, 3:], boxes[:, :3] + boxes[:, 3:]
         )
-        if len(made) != count:  # not a binary tree with one geom per leaf
+        if len(made) != count:  # skip trees that are not binary with one geom per leaf
             continue
         inner = leaf < 0
         model.bvh_aabb[nodes] = made

@@ -1,4 +1,4 @@
-"""Footprints of static geoms: floor plans, a grid of obstacles for the trunk, and a distance field."""
+"""Footprints of static geoms: floor plans, an obstacle grid for the person's trunk, and a distance field."""
 
 import math
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Footprint:
 
 
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
-    """Project the static colliding geoms that reach into a band of heights, from `low` to `high`, m.
+    """Project the static colliding geoms that reach into the band of heights from `low` to `high`, m, onto the floor.
 
     Floors and rugs end below the default band, while lintels, lamps and wall cupboards begin above it. A geom in the
     band counts with its whole outline. Objects and the person are left out because they move.
@@ -61,7 +61,7 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points (k, 3), m, that cover a geom: their outline contains the geom's, and their range of z equals its.
+    """Return points (k, 3), m, around a geom. Their outline from above contains the geom's, and their z range is equal.
 
     Raises:
         AssetError: The geom is a plane or a height field.
@@ -114,16 +114,15 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Floor(NamedTuple):
-    """Outlines of the obstacles of the trunk, with a grid for looking up those nearby. For kernels."""
+    """Outlines of obstacles to the person's trunk, in arrays for kernels, with a grid to look up the nearby ones."""
 
     # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
     edges: NDArray[np.float64]
     first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
     boxes: NDArray[np.float64]  # smallest and largest x, smallest and largest y of each polygon, m, (p, 4)
     near: NDArray[np.int64]  # polygons that the trunk may touch, cell by cell
-    near_first: NDArray[
-        np.int64
-    ]  # index into `near` of the first polygon of each cell, row by row, (cells + 1,)
+    # index into `near` of the first polygon of each cell, row by row, (cells + 1,)
+    near_first: NDArray[np.int64]
     origin_x: float  # corner of cell (0, 0), m
     origin_y: float
     rows: int  # number of cells along x
@@ -131,13 +130,13 @@ class Floor(NamedTuple):
 
     @classmethod
     def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
-        """Collect the static geoms at the heights of a trunk of a radius, m."""
+        """Build the grid for the static geoms at trunk height and a trunk with the given radius, m."""
         low, high = _TRUNK_BAND
         return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
 
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
-        """Make the grid for convex counter-clockwise polygons (k, 2), m, and a trunk of a radius, m."""
+        """Build the grid for convex counter-clockwise polygons (k, 2), m, and a trunk with the given radius, m."""
         reach = radius + MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
@@ -172,10 +171,10 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ClearanceField(NamedTuple):
-    """Grid of signed distances to the static geoms of a band of heights. Also for kernels."""
+    """Grid of signed distances to the static geoms within a band of heights, in arrays for kernels."""
 
     distance: NDArray[np.float64]  # distance of each cell's centre, m, positive outside, (nx, ny)
-    gradient: NDArray[np.float64]  # unit vector in which the distance increases, (nx, ny, 2)
+    gradient: NDArray[np.float64]  # unit vector along which the distance increases, (nx, ny, 2)
     origin_x: float  # centre of cell (0, 0), m
     origin_y: float
     resolution: float  # cell size, m

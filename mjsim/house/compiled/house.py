@@ -25,13 +25,13 @@ from mjsim.values.errors import AssetError, SamplingError
 VISUAL_BODY = "looks"  # name of the body with an object's visual geoms
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
-MAX_HOUSES = 4  # size of the cache, at some 30 MB per house
+MAX_HOUSES = 4  # size of the cache, in houses of about 30 MB each
 T = TypeVar("T")
 GROUP = "mjsim.navigable"  # entry points of navmesh builders
 
 
 class NavigablePoints(Protocol):
-    """The walkable floor, as sampling uses it. Points are (x, y) in m."""
+    """The part of the walkable-floor interface that sampling needs. Points are (x, y) in m."""
 
     def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """Draw a point (2,) uniformly from the part of the floor that a person can reach."""
@@ -40,7 +40,7 @@ class NavigablePoints(Protocol):
         """Return True if a person can stand at a point (2,)."""
 
     def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
-        """Return the nearest point (2,) that `sample` could draw, which is the point itself if possible."""
+        """Return the point (2,) nearest to `point` that `sample` could draw, or `point` itself if it is one."""
 
 
 class NavigableFloor(NavigablePoints, Protocol):
@@ -85,10 +85,10 @@ def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Move the visual geoms of an object to a body of their own, fixed to the object's, in place. It saves time.
+    """Move the visual geoms of an object to a body of their own, fixed to the object's, in place.
 
-    The broad phase visits all geoms of every body that can collide in each step, even while it sleeps. Geoms in nested
-    frames are not moved.
+    This saves time because the broad phase visits, in each step, all geoms of every body that can collide, even while
+    the body sleeps. Geoms in nested frames are not moved.
     """
     body = spec.body("object")
     groups: list[tuple[Any, list[Any]]] = []
@@ -122,7 +122,7 @@ def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
     names = [geom.name for geom in geoms]
     before = len(body.geoms)
     for geom in geoms:
-        geom.name = ""  # names are unique, and attaching makes a copy first
+        geom.name = ""  # names must be unique, and attaching a frame first copies its geoms
         geom.set_frame(frame)
     body.attach_frame(frame, "", "")
     spec.delete(frame)
@@ -184,7 +184,7 @@ class CompiledHouse:
         return self.cached((path, False), lambda: remove_visuals(whole.copy()))
 
     def cached(self, key: Any, compute: Callable[[], T]) -> T:
-        """Call `compute` at the first call with `key`, and return its result in all later calls."""
+        """Return the value cached under `key`. The first call computes it with `compute`."""
         if key not in self._derived:
             self._derived[key] = compute()
         return cast(T, self._derived[key])

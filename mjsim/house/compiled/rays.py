@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 # person (4).
 SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
 DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # groups that the first-person view shows
-RIM = 0.06  # distance from a receptacle's volume to the outside of its walls, m
+RIM = 0.06  # horizontal margin around a receptacle's volume that counts as its own walls, m
 _SKIP = 1e-6  # distance skipped to pass through a surface, in units of the ray's length
 _MAX_SKIPS = 32
 
@@ -37,7 +37,7 @@ def first_hit(
         start, ray: Start, m, and direction, (3,). Distances are in units of the direction's length.
         groups: Mask of the geom groups to hit, (6,).
         through: Mask of the geoms that the ray passes through, (ngeom,).
-        without: Id of a body to ignore, so that what touches its surface is found too. -1 for none.
+        without: Id of a body to ignore, so that geoms touching its surface are found too. -1 for none.
         reach: End of the ray. Hits beyond it may be reported or not.
     """
     origin, along = np.asarray(start, np.float64), np.asarray(ray, np.float64)

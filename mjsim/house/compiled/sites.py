@@ -16,7 +16,7 @@ PREFIX = "room:"
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
-    """Rectangles on the floor, of which each is a room or a part of a room (PAPER section 5)."""
+    """Rooms as rectangles on the floor, one or more per room (PAPER section 5)."""
 
     labels: Mapping[str, str]  # room key -> label shown to people ("Kitchen"), in the catalogue's order
     keys: tuple[str, ...]  # room key of each rectangle, length k
@@ -57,7 +57,7 @@ class RoomMap:
         )
 
     def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Distances from points (..., 2), m, to each rectangle, m, shape (..., k). They are 0 inside."""
+        """Return the distances, m, (..., k), from points (..., 2), m, to each rectangle. They are 0 inside."""
         offsets = np.asarray(xy, dtype=np.float64)[..., None, :2] - self.centers
         local = np.einsum("kji,...kj->...ki", self.axes, offsets)
         outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
@@ -74,7 +74,7 @@ class RoomMap:
 
     @property
     def rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Centres and half sizes, m, each (k, 2), and axes, (k, 2, 2), for kernels."""
+        """Arrays for kernels: centres and half sizes, m, each (k, 2), and axes, (k, 2, 2)."""
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
@@ -104,7 +104,7 @@ def nearest_rectangle(
     half_sizes: NDArray[np.float64],
     axes: NDArray[np.float64],
 ) -> float:
-    """Return the distance from a point to the nearest of k rectangles, m, or 0 inside one. See `RoomMap` for shapes."""
+    """Return the distance, m, from a point to the nearest of k rectangles, or 0 inside. Arrays are as in `RoomMap`."""
     nearest = math.inf
     for k in range(len(centers)):
         dx, dy = x - centers[k, 0], y - centers[k, 1]
@@ -136,7 +136,7 @@ class ReceptacleGeometry:
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
     def distance(self, xy: NDArray[np.float64]) -> float:
-        """Horizontal distance from a floor point (2,) to the nearest point of the volume, m."""
+        """Return the horizontal distance from a floor point (2,) to the nearest point of the volume, m."""
         local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
         outside = np.maximum(np.abs(local) - self.half_size, 0.0)
         return float(np.hypot(outside[0], outside[1]))

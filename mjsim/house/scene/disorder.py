@@ -58,7 +58,7 @@ class Disorder:
         }
 
     def count(self, seed: int, most: int) -> int:
-        """Draw a number of objects from the observed ones that are from 1 to `most`."""
+        """Draw a number of objects, 1 to `most`, from the observed numbers."""
         fitting = [n for n in self.misplaced if 1 <= n <= most]
         if not fitting:
             raise EpisodeError(f"no episode has 1 to {most} misplaced objects; allow more")

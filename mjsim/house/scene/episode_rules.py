@@ -27,7 +27,7 @@ NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
 def check_fit(episode: Episode, catalogue: Catalogue) -> Iterator[Finding]:
-    """Find what contradicts the catalogue."""
+    """Find contradictions between an episode and the catalogue of its house."""
     if len(episode.objects) > MAX_OBJECTS:
         yield _episode("objects", f"has {len(episode.objects)} objects", f"use at most {MAX_OBJECTS}")
     unknown = sorted(set(episode.receptacles) - set(catalogue.receptacles))
@@ -86,7 +86,7 @@ def _check_object(placed: PlacedObject, target: str, catalogue: Catalogue) -> It
 
 
 def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
-    """Find a start or objects outside the house, and invalid orientations."""
+    """Find a start or objects outside the house, and objects with invalid orientations."""
     start = episode.start
     if not rooms.contains((start.x, start.y), margin=OUTSIDE):
         yield Finding(
@@ -125,7 +125,7 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
 
 
 def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:
-    """Find things that overlap at the start. `owner` is the index of the object of each geom, or -1, (ngeom,)."""
+    """Find overlaps at the start of an episode. `owner` (ngeom,) is the index of each geom's object, or -1."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     trunk = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TRUNK)
@@ -133,7 +133,7 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
     reported = set()
     for contact in deep:
         first, second = sorted(data.contact.geom[contact].tolist(), key=lambda g: (owner[g] < 0, g))
-        # The person can push objects away, but not walls.
+        # The trunk collides only with walls and furniture, because the person can push objects away.
         if trunk in (first, second):
             what, subject = "a wall or a piece of furniture", "start"
         elif owner[first] < 0:

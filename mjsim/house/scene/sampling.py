@@ -23,7 +23,7 @@ from mjsim.values.errors import SamplingError, brief
 MIN_DISTANCE = 1.0  # smallest distance between points, and from points to receptacles, m
 START_CLEARANCE = 0.5  # smallest distance from the start to every object, m
 DROP = (0.01, 0.02)  # range of heights above the floor from which objects are dropped, m
-PACKINGS, DRAWS = 20, 4000  # a packing that is stuck is discarded as a whole, so that points stay uniform
+PACKINGS, DRAWS = 20, 4000  # an incomplete packing is discarded as a whole to keep points uniform
 DROPS = 8
 MAX_POINTS = 1000
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
@@ -136,7 +136,7 @@ def sample_points(
 
 
 def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
-    """Return the number of points, at most `count`, that fit into the house in one attempt."""
+    """Return how many points, at most `count`, a single attempt at packing fits into the house."""
     return len(_pack(navigable, keep_away, count, np.random.default_rng(0)))
 
 
@@ -176,7 +176,7 @@ def _rng(seed: int, purpose: _Purpose, *level: int) -> np.random.Generator:
 
 
 def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator) -> list[str]:
-    """Draw the category of each point. Each block of as many points as categories has every category once."""
+    """Draw the category of each point, in shuffled rounds that contain every category once."""
     keys = list(catalogue.categories)
     blocks = -(-count // len(keys))
     order = np.concatenate([rng.permutation(len(keys)) for _ in range(blocks)])

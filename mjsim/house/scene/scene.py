@@ -99,7 +99,7 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def cached(self, key: str, make: Callable[[], T]) -> T:
-        """Call `make` at the first call with `key`, and return its result in all later calls."""
+        """Return the value cached under `key`. The first call makes it with `make`."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
@@ -137,7 +137,7 @@ def compose(
             overlaps something else.
     """
     _require(check_fit(episode, catalogue), episode)
-    if avatar:  # objects without an avatar have not been dropped yet
+    if avatar:  # scenes for dropping objects have no avatar, and their poses are not final
         _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
     scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
     if avatar:
@@ -153,7 +153,7 @@ def assemble(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """Compose an episode like `compose`, without checking it."""
+    """Compose an episode as `compose` does, but without checking it."""
     person = person or PersonParameters()
     house = compiled_house(catalogue)
     require_usable(house)

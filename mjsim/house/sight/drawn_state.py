@@ -1,4 +1,4 @@
-"""Scenes with visual geoms: their state, taken from the scene without visual geoms, and their large boxes."""
+"""State of scenes with visual geoms, derived from the scenes without them, and the large boxes that block sight."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ _MIN_WALL = 0.25  # smallest half extents of large boxes along their two longer 
 
 
 def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
-    """Return the scene with visual geoms, and its state, which is valid until the next call for the same scene."""
+    """Return the scene with visual geoms, and its state. The next call for the same scene overwrites that state."""
     if scene.visuals:
         return scene, data
     drawn = scene.cached("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))

@@ -65,7 +65,7 @@ class PotentialVisibility:
         self._centers = np.full((len(self._radii), 3), np.inf)
 
     def may_see(self, seen: Observation, aspect: float) -> Mask:
-        """Mask of the objects that may come into a view with an aspect ratio (width over height), shape (n,)."""
+        """Return a mask (n,) of the objects that may come into a view with an aspect ratio (width over height)."""
         centers = _centers(seen.object_positions, seen.object_quaternions, self._offsets)
         moved = (np.abs(centers - self._centers) > _MOVED).any(axis=1)
         if moved.any():
@@ -79,7 +79,7 @@ class PotentialVisibility:
 
 
 def _balls(scene: Scene) -> tuple[Floats, Floats]:
-    """Bounding balls of the objects: centres in the frames of their bodies, m, (n, 3), and radii, m, (n,)."""
+    """Return bounding balls of the objects: centres in the frames of their bodies, m, (n, 3), and radii, m, (n,)."""
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
     model, owner = scene.model, scene.index.geom_owner
     data = mujoco.MjData(model)
@@ -140,7 +140,7 @@ def _may_see(
     walls: _WallSegments,
     grid: _VisibilityGrid,
 ) -> Mask:
-    """Mask of the objects within an angle, rad, of the gaze and in sight of a cell that the eye can reach.
+    """Return a mask of the objects within an angle, rad, of the gaze that are visible from a cell in reach of the eye.
 
     `eye` and the unit vector `gaze` are (3,). `stride` is how far the eye can move, m. `centers` (n, 3) and `radii`
     (n,) are balls around the objects, m. Results for cells are stored in `grid`.
@@ -177,13 +177,13 @@ def _may_see(
 
 @kernel
 def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
-    """Return `_OPEN` if no wall hides the centre of a ball, or its left, right, top or bottom end, else `_HIDDEN`."""
+    """Return `_OPEN` if the centre, left, right, top or bottom of a ball is not hidden by a wall, else `_HIDDEN`."""
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
     distance = math.hypot(level, ray[2])
     if distance <= radius or level < radius:
         return _OPEN
-    reach = 1.0 - radius / distance  # share of the ray that ends at the ball
+    reach = 1.0 - radius / distance  # fraction of the ray up to the ball
     if not _is_blocked(eye, center, reach, walls):
         return _OPEN
     side = np.array([-ray[1], ray[0], 0.0]) * (radius / level)
@@ -196,7 +196,7 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegme
 
 @kernel
 def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
-    """Return True if the first share `reach` of the line between two points (3,), m, enters a wall."""
+    """Return True if the line from `start` to `end`, (3,), m, enters a wall within the first fraction `reach`."""
     for w in range(len(walls.centers)):
         enter, leave = 0.0, reach
         for k in range(3):

@@ -40,14 +40,14 @@ class FieldOfView:
 
 
 def persons_geoms(scene: Scene) -> Mask:
-    """Mask of the geoms of the person's body, (ngeom,)."""
+    """Return a mask of the geoms of the person's body, (ngeom,)."""
     return _sight(scene).person
 
 
 def in_field_of_view(
     points: ArrayLike, eye: ArrayLike, heading: float, pitch: float, field: FieldOfView
 ) -> Mask:
-    """Mask of the points (n, 3), m, inside the field of view, at any distance and regardless of obstacles, (n,).
+    """Return a mask (n,) of the points (n, 3), m, inside the field of view, at any distance, even behind obstacles.
 
     The other arguments are as for `visible_objects`.
     """
@@ -161,7 +161,7 @@ def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaz
 def _object_hits(
     scene: Scene, data: mujoco.MjData, gaze: _Gaze, among: Collection[str] | None, *, once: bool
 ) -> Iterator[int]:
-    """Yield the object index of each ray that hits its object first, or only of the first such ray if `once`."""
+    """Yield the index of an object for each ray that hits it first, or at most once per object if `once`."""
     scene, data = drawn_state(scene, data)
     sight, names = _sight(scene), scene.index.names
     looked_for = frozenset(names if among is None else among)
@@ -202,7 +202,7 @@ def _sight_geometry(scene: Scene) -> _SightGeometry:
 def _open_rays(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask, gaze: _Gaze
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Collect the rays inside the field of view that no wall certainly blocks.
+    """Collect the rays inside the field of view, without those that a large wall certainly blocks.
 
     Poses of geoms are (ngeom, 3) m and (ngeom, 9), `wanted` (n,) is a mask of objects. Returns the object index of each
     ray, (k,), in order, and vectors from the eye to points in the object's bounding box, m, (k, 3).
@@ -226,7 +226,7 @@ def _open_rays(
 def _bounding_boxes(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask
 ) -> tuple[Floats, Floats]:
-    """Corners of the axis-aligned boxes around wanted objects, m, each (n, 3), or infinity and -infinity for others."""
+    """Return lower and upper corners, m, each (n, 3), of boxes around wanted objects, and inf and -inf for others."""
     low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
     for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba has no `strict`
         if not wanted[i]:

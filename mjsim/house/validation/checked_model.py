@@ -89,7 +89,7 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
     """Compile an MJCF file on its own, or return the findings that prevent it."""
     try:
         file = ModelFile.read(path)
-        # Before MuJoCo reads the file, because it takes NaN for a missing number and writes a log file.
+        # MuJoCo takes NaN for a missing number and writes a log file, so check numbers before it reads the file.
         if found := list(check_numbers(subject, file)):
             return found
         return Compiled.of(subject, path, file.spec().compile())

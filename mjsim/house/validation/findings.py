@@ -31,7 +31,7 @@ def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def one_line(findings: Iterable[Finding], name: object) -> str:
-    """Format the first error about `name`, and the number of further errors, for an exception."""
+    """Format the first error, prefixed with `name`, and the number of further errors as an exception message."""
     first, *more = errors(findings)
     rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
     return f"{name}: {first}{rest}"

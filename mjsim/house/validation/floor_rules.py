@@ -24,7 +24,7 @@ FLOOR_GAP = 0.006  # largest deviation of the floor from z = 0, m
 HEADROOM = 2.0  # height of the highest eyes, m
 _RAYS = 3000
 _HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of colliding geoms, ceilings and lamps
-_CHEST = 1.0  # height of the start of rays, which is free wherever a person can stand, m
+_CHEST = 1.0  # start height of rays, m, which is free wherever a person can stand
 
 
 def check_floor(floor: WalkableFloor) -> list[Finding]:
@@ -98,7 +98,7 @@ def _passages(floor: WalkableFloor) -> Iterator[Finding]:
     for key in dict.fromkeys(floor.rooms.keys):
         room = np.isin(floor.rectangle_of, floor.rectangles_of(key))
         if (wide[room] == main).any() or not (body[room] == at_home).any():
-            continue  # wide enough, or not connected at all, which another rule reports
+            continue  # the way is wide enough, or there is none, which another rule reports
         place, width = _narrowest(field, wide, main, room & (wide > 0), body == at_home)
         at = floor.centres[place]
         yield floor.compiled.warning(
@@ -116,9 +116,9 @@ def _narrowest(
     beyond: NDArray[np.bool_],
     body: NDArray[np.bool_],
 ) -> tuple[tuple[int, int], float]:
-    """Return cell and width, m, of the widest passage from the wide component `main` to the cells `beyond`."""
+    """Return the cell and the width, m, of the widest passage from component `main` of `wide` to the cells `beyond`."""
     seeds = (wide == main) | beyond
-    if not beyond.any():  # the whole room is narrow, so take its edge
+    if not beyond.any():  # the whole room is narrow, so use the edge of the wide component
         seeds = wide == main
     nearest = distance_transform_edt(~seeds, return_distances=False, return_indices=True)
     near_main = (wide == main)[tuple(nearest)]
@@ -165,7 +165,7 @@ def _places(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
-    """Return the middles (k, 2), m, of colliding geoms on the walkable floor that are too low to be obstacles."""
+    """Return the centres (k, 2), m, of colliding geoms on the walkable floor that are too low to count as obstacles."""
     compiled, found = floor.compiled, [np.empty((0, 2))]
     points, area = floor.walkable
     for geom in compiled.solid:

@@ -35,7 +35,7 @@ DEFAULT_TIMESTEP = 0.002  # timestep of a file that does not set it, s
 
 
 def check_hulls(compiled: Compiled) -> Iterator[Finding]:
-    """Find colliding meshes that leave floor free which their convex hull, with which MuJoCo collides, fills."""
+    """Find meshes whose convex hulls, which MuJoCo uses for collision, cover floor that the meshes leave free."""
     model, (low, high) = compiled.model, BODY_BAND
     meshes = compiled.solid[model.geom_type[compiled.solid] == mujoco.mjtGeom.mjGEOM_MESH]
     for geom in meshes.tolist():
@@ -65,7 +65,7 @@ def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
 
 
 def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
-    """Return True if a mesh has nothing at chest height above a floor point (2,), m, and nothing below it."""
+    """Return True if no part of a mesh is at chest height above a floor point (2,), m, or below that height."""
     low, high = BODY_BAND
     at, crossings = np.array([*place, high / 2]), 0
     below = _to_mesh(compiled, geom, at, -1.0)
@@ -76,7 +76,7 @@ def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
 
 
 def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: float) -> float:
-    """Return the distance, m, from a point (3,), m, up (1) or down (-1) to the next triangle of a mesh, or -1."""
+    """Return the distance, m, from a point (3,), m, straight up (1) or down (-1) to a mesh, or -1 if there is none."""
     return float(mujoco.mj_rayMesh(compiled.model, compiled.data, geom, start, np.array([0.0, 0.0, up])))
 
 
@@ -148,9 +148,8 @@ def _rooms(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
 def _overlaps(compiled: Compiled, rooms: RoomMap) -> Iterator[Finding]:
     reach = np.einsum("kij,kj->ki", np.abs(rooms.axes), rooms.half_sizes)
     low, high = rooms.centers - reach, rooms.centers + reach
-    square = (
-        np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9
-    )  # skips rotated rooms, whose extents are too large
+    # Skip rotated rooms, because their axis-aligned extents are too large.
+    square = np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9
     for i, j in itertools.combinations(np.flatnonzero(square), 2):
         sides = np.minimum(high[i], high[j]) - np.maximum(low[i], low[j])
         if rooms.keys[i] != rooms.keys[j] and sides.min() > 0 and np.prod(sides) > OVERLAP:

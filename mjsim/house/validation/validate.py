@@ -39,7 +39,7 @@ def require_usable(house: CompiledHouse) -> None:
     if found := errors(house.cached("findings", lambda: check_house(house))):
         raise AssetError(one_line(found, catalogue.name))
     if verdict is not None:
-        with contextlib.suppress(OSError):  # such as a full disk: the next process checks again
+        with contextlib.suppress(OSError):  # if the disk is full, the next process checks the house again
             verdict.parent.mkdir(parents=True, exist_ok=True)
             verdict.touch()
 
@@ -77,7 +77,7 @@ def _check_composed(house: CompiledHouse) -> list[Finding]:
         navigable = house.navigable
     except MjsimError:
         raise
-    except Exception:  # raised by the package that computes the floor if nothing is free
+    except Exception:  # the floor builder's own error, raised if no floor is free
         return [nowhere_to_stand(compiled, rooms)]
     rooms_of = {r.key: r.room for r in house.catalogue.receptacles.values()}
     return check_floor(WalkableFloor(compiled, rooms, receptacles, rooms_of, navigable))

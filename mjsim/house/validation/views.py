@@ -82,7 +82,7 @@ def _outlines(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
             )
             found.append(points[ConvexHull(points[:, :2]).vertices, :2])
-        except (AssetError, QhullError, ValueError):  # flat or not finite, which findings report
+        except (AssetError, QhullError, ValueError):  # flat or not finite, as other rules report
             continue
     return tuple(found)
 
