@@ -1,6 +1,6 @@
 """Reproducibility of runs: state hashes, checkpoints, and the versions that determine the physics.
 
-If bodies may sleep, MuJoCo's state vector does not tell which ones do, so setting it on live data is not exact, but
+If bodies may sleep, MuJoCo's state vector does not record which do, so setting it on live data is not exact, but
 setting it after `mj_resetData` is. A run that takes a checkpoint therefore resets itself and restores its own state.
 From then on, it is bit-identical to a run that starts at the checkpoint. Checkpoints are taken only while no pick or
 place is under way, because a motion is a generator, whose state cannot be stored.
@@ -149,7 +149,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
 
 
 def engine_versions() -> dict[str, str]:
-    """Return the versions of everything that determines how states follow from each other."""
+    """Return the versions of all software that affects the physics, and the processor architecture."""
     return {
         "mjsim": _installed_version(),
         "physics_code": _code_fingerprint(),

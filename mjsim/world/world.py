@@ -110,7 +110,7 @@ class World:
         return self._tier.data
 
     def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
-        """Copy `data` into a new object or into `into`, to draw it while the world is stepped."""
+        """Copy `data` to `into` or to a new object, so that it can be rendered while the world is stepped."""
         copied = mujoco.MjData(self.model) if into is None else into
         mujoco.mj_copyData(copied, self.model, self.data)
         return copied
@@ -182,7 +182,7 @@ class World:
         """
         try:
             self._tier.restore(state)
-        except (ValueError, IndexError) as error:  # raised for arrays of other shapes
+        except (ValueError, IndexError) as error:  # an array has the wrong shape
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
         return self._tier.observation()
 

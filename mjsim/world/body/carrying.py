@@ -26,7 +26,7 @@ from mjsim.world.body.slots import object_corners
 
 Floats = NDArray[np.float64]
 
-MAX_SERVO_LAG = 0.25  # m. The servo saturates at 0.04 m, and a hand that lags more is held back.
+MAX_SERVO_LAG = 0.25  # m. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
 LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, m
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owners of geoms that do not belong to an object
@@ -43,10 +43,10 @@ def count_strain(
     patience: float,
     strained: NDArray[np.int64],
 ) -> int:
-    """Count the control steps for which each hand has been strained: by its weld, beyond `max_error` m, or its servo.
+    """Count for how many consecutive control steps each hand has been strained.
 
-    The counts `strained` (2,) are updated. Returns the hands whose count exceeds `patience` as a bit mask: 1 for the
-    left, 2 for the right hand.
+    A hand is strained if its weld is stretched by more than `max_error`, m, or its servo lags. Updates `strained` (2,).
+    Returns the hands whose count exceeds `patience` as a bit mask: 1 for the left, 2 for the right hand.
     """
     slipping = 0
     for hand in range(2):
@@ -69,9 +69,8 @@ def count_strain(
 class CarryingState:
     """State of `Carrying` between control steps."""
 
-    compliance: NDArray[
-        np.float64
-    ]  # offset by which contacts have pushed each hand from its posture, m, (2, 2)
+    # offset by which contacts have pushed each hand from its posture, m, (2, 2)
+    compliance: NDArray[np.float64]
     strained: NDArray[np.int64]  # number of control steps for which each hand has been strained, (2,)
 
 
@@ -84,7 +83,7 @@ class Carrying:
         self.clearance: ClearanceField = compiled_house(scene.catalogue).cached(
             "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
         )
-        # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
+        # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
@@ -136,7 +135,7 @@ class Carrying:
         if not data.ncon:
             return self._no_contacts
         contact = data.contact
-        # Contiguous copies, because strides depend on the number of contacts, and kernels on the strides
+        # Contiguous copies, because kernels are compiled for a memory layout, which varies with the number of contacts
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:

@@ -90,7 +90,7 @@ def _object_distance(person: Person, item: int) -> float:
 
 
 def _object_in_sight(person: Person, item: int) -> bool:
-    """Return True if the centre or a grip is visible from the eye or the chest. It prevents picking through walls."""
+    """Return True if the centre or a grip is visible from the eye or the chest. This prevents picking through walls."""
     viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data

@@ -65,7 +65,7 @@ class Grips:
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
-            # Falls start slowly, so an object that was held still would fall asleep in the air.
+            # Falls start slowly, so MuJoCo would put an object that was held still to sleep in the air.
             self._data.tree_asleep[self._trees[held[0]]] = AWAKE
             self._held[hand] = None
             self._update()

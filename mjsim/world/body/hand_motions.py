@@ -23,7 +23,7 @@ _CLOSE_ENOUGH = 0.012  # m
 Vector = NDArray[np.float64]
 _TOUCH = 0.0005  # overlap at which the descent ends, m
 _OVERLAP = 0.001  # overlap below which the hand opens, m
-_RAISE = 0.003  # distance per control step to raise a load that overlaps more, m
+_RAISE = 0.003  # distance by which an overlapping load is raised per control step, m
 _RAISE_TIMEOUT = 0.6  # s
 
 
@@ -113,7 +113,7 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
 
 
 def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
-    """Return how high above the centre of the volume an object's lowest point crosses the receptacle, m."""
+    """Return the height above the volume's centre, m, at which an object's lowest point crosses the receptacle."""
     return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
 
 
@@ -173,7 +173,7 @@ def overlap(person: Person, item: int) -> float:
 def deepest_overlap(
     geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
 ) -> float:
-    """Return an object's deepest overlap, m, among contacts (k, 2) with distances (k,), m, except with the foot."""
+    """Return an object's deepest overlap, m, in contacts (k, 2) with distances (k,), m. The foot is ignored."""
     deepest = 0.0
     for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]

@@ -1,6 +1,6 @@
 """Free space for carried loads, now and in the near future: a person draws in a box when passing a door frame.
 
-The kernels look up the clearance where the hand will be shortly, and move it away from what is too near.
+The kernels look up the clearance where the hand will be soon, and move the hand away from geoms that are too near.
 """
 
 import math
@@ -27,8 +27,8 @@ EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 class BodyMotion(NamedTuple):
     """Pose and command of the body, and the clearance around it."""
 
-    pose: Floats  # x, y and heading, m and rad, followed by others, (10,) or longer
-    command: Floats  # commanded velocity in the body frame (forward, left), m/s, and yaw rate, rad/s, (3,) or longer
+    pose: Floats  # starts with x, y, m, and heading, rad, (10,) or longer
+    command: Floats  # starts with forward and left velocity, m/s, and yaw rate, rad/s, (3,) or longer
     clearance: ClearanceField  # clearance at the heights of carried objects
 
 
@@ -36,10 +36,10 @@ class BodyMotion(NamedTuple):
 def drawn_in(
     forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return the position closest to a posture (forward, left), m, where a load is clear of the house, now and shortly.
+    """Return the position (forward, left), m, closest to a posture, where a load is clear of the house now and soon.
 
-    The kernel tries a shift sideways first, as past a door frame. Otherwise it chooses a point between the body's axis
-    and the posture, as far out as the line from the axis is clear, because the far side of a wall is out of reach.
+    The kernel tries a sideways shift first, such as past a door frame. Otherwise it chooses a point between the body's
+    axis and the posture, as far out as the line from the axis is clear, because the far side of a wall is out of reach.
     """
     needed = radius + carrying.margin
     shift_f, shift_l = _sideways(forward, left, needed, body, carrying)
@@ -81,7 +81,7 @@ def _clear_throughout(
 def _sideways(
     forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return the shift in the body frame that moves a load away from what is too near."""
+    """Return the shift in the body frame, m, that moves a load away from geoms that are too near."""
     shift_f, shift_l = 0.0, 0.0
     for horizon in (0.0, carrying.near, carrying.far):
         for _ in range(ROUNDS):
@@ -97,7 +97,7 @@ def _sideways(
 
 @kernel
 def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Return the clearance, m, at a point of the body frame in `horizon` seconds, and the direction of more."""
+    """Return the clearance, m, at a point of the body frame in `horizon` seconds, and the direction of its increase."""
     pose, command = body.pose, body.command
     forward += command[FORWARD] * horizon
     left += command[LEFT] * horizon

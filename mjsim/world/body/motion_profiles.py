@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of the horizontal and the vertical part of a movement
+STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of a movement's horizontal and vertical parts
 
 # Velocity forward and left, m/s, yaw rate, rad/s, and pitch of the head, rad: `Rig.motion` or a part of a body state
 Command = NDArray[np.float64]
@@ -23,7 +23,7 @@ def minimum_jerk(phase: float) -> float:
 
 @kernel
 def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
-    """Return horizontal and vertical progress 0..1 at a phase 0..1. `lead` is the head start of one, as a share."""
+    """Return horizontal and vertical progress 0..1 at a phase 0..1. One part starts earlier by the fraction `lead`."""
     if order == STRAIGHT:
         share = minimum_jerk(phase)
         return share, share
@@ -47,7 +47,7 @@ def point_between(
 def change_velocity(
     command: Command, forward: float, left: float, max_speed: float, max_change: float
 ) -> None:
-    """Change the velocity towards a wanted one, by at most `max_change` and up to `max_speed`, all in m/s."""
+    """Change the velocity towards a target, by at most `max_change` and up to `max_speed`, all in m/s."""
     speed = math.hypot(forward, left)
     if speed > max_speed:
         forward, left = forward * (max_speed / speed), left * (max_speed / speed)
@@ -62,7 +62,7 @@ def change_velocity(
 
 @kernel
 def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
-    """Change the yaw rate towards a wanted one, by at most `max_change` and up to `max_rate`, all in rad/s."""
+    """Change the yaw rate towards a target, by at most `max_change` and up to `max_rate`, all in rad/s."""
     change = min(max_rate, max(-max_rate, rate)) - command[TURN]
     command[TURN] += min(max_change, max(-max_change, change))
 
@@ -71,7 +71,7 @@ def change_turn_rate(command: Command, rate: float, max_rate: float, max_change:
 def change_pitch(
     command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
 ) -> None:
-    """Change the pitch at a wanted rate, rad/s, of at most `max_rate`, between `lowest` and `highest`, rad."""
+    """Change the pitch at a rate, rad/s, clamped to `max_rate`. The pitch stays between `lowest` and `highest`, rad."""
     rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
         command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

@@ -18,9 +18,7 @@ from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-UPRIGHT = (
-    0.3  # smallest horizontal part of a contact's normal by which it is an obstacle, not a surface below
-)
+UPRIGHT = 0.3  # horizontal share of a contact's normal above which it is an obstacle, not a surface below
 
 _ARRIVED = 0.0005  # distance to the goal at which a hand stops, m
 
@@ -33,7 +31,7 @@ class Hands(NamedTuple):
     compliance: Floats  # offsets by which the hands yield to contacts, m, (2, 2)
     goals: Floats  # buffer for the goals of the targets, m, (2, 3)
     rest: Floats  # rest posture of the left hand, m, (3,)
-    loads: Floats  # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
+    loads: Floats  # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
     pace: Floats  # gain, 1/s, speed limit, m/s, and acceleration limit, m/s^2, of the targets, (3,)
 
 
@@ -97,7 +95,7 @@ def update_hands(
 def move_hand(
     targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
 ) -> None:
-    """Move a hand's target, a row of `targets` (2, 3), m, towards x, y, z in the body frame, and slow down near it.
+    """Move a hand's target in `targets` (2, 3), m, towards x, y, z in the body frame, and slow it down near the goal.
 
     `velocities` (2, 3), m/s, are updated. `pace` is `Hands.pace`.
     """
@@ -121,7 +119,7 @@ def move_hand(
 
 @kernel
 def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
-    """Raise the right one of two loads over the left one where they would meet."""
+    """Raise the right load above the left one if they would otherwise meet."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
     near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
     over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]

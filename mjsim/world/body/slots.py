@@ -20,7 +20,7 @@ _RAYS_ABOVE = 0.2  # height of the start of rays above the receptacle's volume, 
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
 _SLOPE_COST = 2.0  # cost of a mean gap of 1 m below the object, in metres of fill height
-_MIN_GAIN = 0.015  # smallest gain of cost for which another place is preferred to a slot, m
+_MIN_GAIN = 0.015  # amount by which another place must cost less than the best slot to be preferred, m
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ class ActiveMotion:
 
     @property
     def next_stop(self) -> int:
-        """The next control step with an incident, or the last step. Up to it, the motion can be played at once."""
+        """Next control step with an incident, or else the last one. The motion can be played up to it in one call."""
         incidents = (step + 1 for step, _, _ in self.plan.incidents if step >= self.played)
         return min(incidents, default=self.plan.length)
 
@@ -61,7 +61,7 @@ class Event(Tier):
     def answer(self, action: Pick | Place) -> ActionResult:
         if self.busy:
             return ActionResult(action, Refusal.BUSY, action.object)
-        _ = self.data  # updates the physics data, which `Full.answer` reads
+        _ = self.data  # brings the physics data up to date for `Full.answer`
         return self._full.answer(action)
 
     @property
@@ -145,7 +145,7 @@ class Event(Tier):
         self._motion, self._in_step = None, False
 
     def _begin(self, action: StepAction) -> ActionResult | None:
-        _ = self.data  # updates the physics data, which `Full.resolve` reads
+        _ = self.data  # brings the physics data up to date for `Full.resolve`
         result = self._full.resolve(action, busy=self.busy)
         if result is not None and result.applied:
             hand, item = self._full.hand_for(result)

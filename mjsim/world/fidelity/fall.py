@@ -38,7 +38,7 @@ def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle
     person = full.person
     options = person.options
     _enter(full, kinematic)
-    full.monitor.check(person.held)  # records that the hand holds the object for the last time
+    full.monitor.check(person.held)  # records the last time and position of the object in the hand
     person.grips.open(hand)
     kinematic.release(hand)
     held = [None if other == item else other for other in person.held]
@@ -110,7 +110,7 @@ def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -
 
 
 def _put_to_sleep(data: mujoco.MjData, kinematic: KinematicWorld) -> None:
-    """Mark everything that is at rest, with effect from the next forward pass.
+    """Mark the trees that are at rest as asleep, with effect from the next forward pass.
 
     The engine updates its list of sleeping trees only when a tree wakes up, so the person is made to wake up.
     """

@@ -47,7 +47,7 @@ class KinematicModel(NamedTuple):
     gait: Gait  # limits and servos of the body
     floor: Floor  # outlines of obstacles for the trunk
     grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, (n, 2, 7)
-    loads: Floats  # horizontal radius of each object around its grip, and its extent below, m, (n, 2)
+    loads: Floats  # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
     posture_pace: Floats  # `Hands.pace`, (3,)
     carrying: CarryingParameters
     # Postures of an empty left hand (`REST`), and of a loaded one while walking (`CARRY`), turning (`TUCKED`) or
@@ -78,7 +78,7 @@ def follow_rows(
     moves: Floats,
     rows: StepStates,
 ) -> tuple[int, int]:
-    """Walk along a path until the walk has to stop, and fill moves (n, 4) and rows.
+    """Walk along a path until the walk has to stop. Write the moves to `moves` (n, 4) and the states to `rows`.
 
     Returns the number of control steps, at most n, and the latest phase of the walk.
     """

@@ -33,7 +33,7 @@ from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.world.walking.path_following import Walk
 
-# Acceleration from rest above which an object is not at rest, m/s^2. Gravity is 9.8, and solver noise 1.
+# Acceleration above which a motionless object is not at rest, m/s^2. Gravity causes 9.8, solver noise about 1.
 _REST_ACCELERATION = 3.0
 MAX_ROWS = 256  # largest number of control steps per call
 
@@ -149,7 +149,7 @@ class KinematicWorld:
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int
     ) -> tuple[int, NDArray[np.float64], StepStates | None]:
-        """Walk along a path. Return the latest phase, the moves (n, 4), and the states between them."""
+        """Walk along a path. Return the latest phase of the walk, the moves (n, 4), and the states between moves."""
         moves = np.empty((min(limit, MAX_ROWS), 4))
         count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
         return phase, moves[:count], self._passed(count)

@@ -169,7 +169,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
 
 @kernel
 def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
-    """Return the share of speed that a servo keeps in a physics step, and speed per force, damped and undamped."""
+    """Return a servo's factors for a physics step: speed kept, and speed gained per force, with and without damping."""
     return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 

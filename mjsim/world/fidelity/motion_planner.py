@@ -27,8 +27,8 @@ from mjsim.world.fidelity.motion_primitives import HandMovement, MotionTrajector
 Vector = NDArray[np.float64]
 
 _INITIAL_STEPS = 200  # initial capacity of a trajectory, in control steps
-_REACH_LAG = 2  # control steps by which a hand lags at the end of a reach
-_SEATING = 1  # control step in which a firm grip pulls the load in
+_REACH_LAG = 2  # number of control steps by which the hand lags behind its target at the end of a reach
+_SEATING = 1  # number of control steps in which a firm grip pulls the load into the hand
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class MotionPlanner:
 
     def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
         grasp = self._kinematic.grasps[self._hand]
-        if grasp is None:  # for the type checker: a place starts only with a loaded hand
+        if grasp is None:  # only for the type checker, because a place starts with a loaded hand
             return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
             self._corners[grasp] = self._corners_about_hand(*grasp)

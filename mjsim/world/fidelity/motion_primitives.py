@@ -189,7 +189,7 @@ def withdraw(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand up and then to its rest posture, while the objects take the poses (k, n, 7), m and wxyz.
+    """Move a hand up and then to its rest posture, in k steps with given object poses (k, n, 7), m and wxyz.
 
     The head looks to `pitch`, rad.
     """
@@ -210,7 +210,7 @@ def withdraw(
 
 @kernel
 def end(state: KinematicState, trajectory: MotionTrajectory, model: KinematicModel) -> None:
-    """Add the control step after the end of a motion, in which the hands move to their postures."""
+    """Append the control step that follows a motion, in which the hands move towards their postures."""
     state.vector[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
     control_step(state, CARRY, -1, model)
     _append(trajectory, state)

@@ -187,7 +187,7 @@ class Tier(ABC):
         return cast(Steps, steps)
 
     def _step_each(self, choose: Callable[[Observation], Move | None], limit: int) -> Steps | None:
-        """Take up to `limit` control steps, until `choose` returns None or an event occurs."""
+        """Take up to `limit` control steps with moves from `choose`, until it returns None or an event occurs."""
         seen, moves = [self.observation()], list[Move]()
         hashes, health = list[int](), list[tuple[float, ...]]()
 

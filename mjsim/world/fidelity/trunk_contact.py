@@ -18,7 +18,7 @@ _TOUCHING = 1e-7  # m
 def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Return True if no outline is within the given distances along x and y."""
     if max(reach_x, reach_y) > radius + MARGIN:
-        return False  # beyond what a cell of the grid covers
+        return False  # a cell of the grid does not list outlines this far away
     start, end = _near(x, y, floor)
     for entry in range(start, end):
         box = floor.boxes[floor.near[entry]]
@@ -94,7 +94,7 @@ def gap_to(
     for edge in range(first, last):
         dx, dy = x - edges[edge, 0], y - edges[edge, 1]
         ex, ey = edges[edge, 2], edges[edge, 3]
-        beside = dx * ey - dy * ex  # positive outside, which is to the right of the edge
+        beside = dx * ey - dy * ex  # positive to the right of the edge, which is outside the polygon
         if beside > depth:
             depth, out_x, out_y = beside, ey, -ex
         along = min(edges[edge, 4], max(0.0, dx * ex + dy * ey))

@@ -61,7 +61,7 @@ class Health:
 
     Attributes:
         settle_times: Times from each release to rest, s, in order.
-        ejections: Number of objects that flew off, left the house, or were faster than by falls and kicks.
+        ejections: Number of objects that flew off, left the house, or were faster than falls and kicks can make them.
         tunnellings: Number of objects that passed through something solid.
         warnings: Number of MuJoCo warnings. Any warning ends the simulation with a `PhysicsError`.
     """
@@ -188,10 +188,10 @@ class HealthMonitor:
         )
 
     def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
-        """Fill sample and flags. Return True if an object may be ejected or may have tunnelled."""
+        """Scan the control step and update sample and flags. Return True if an ejection or tunnelling is possible."""
         geoms, distances = _NO_GEOMS, _NO_DISTANCES
         if data.ncon:
-            # Contiguous copies, because strides depend on the number of contacts, and kernels on the strides
+            # Contiguous copies, because kernels are compiled for a layout, which varies with the number of contacts
             geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
         found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
         if found == WARNED:

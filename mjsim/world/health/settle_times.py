@@ -46,7 +46,7 @@ class SettleTimer:
         self._gripped: dict[int, tuple[float, list[float]]] = {}  # latest time and position in a hand
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
-        """Return the settle times, s, of objects that came to rest in this step. `gripped` are those in hands."""
+        """Return the settle times, s, of objects that came to rest in this step. `gripped` are the objects in hands."""
         if not (gripped or self._gripped or self.objects):
             return []
         for item, (last, (x, y, _)) in self._gripped.items():

@@ -110,10 +110,10 @@ def sidestep(
 ) -> tuple[float, float]:
     """Return the point to walk to, m, instead of straight to `target`, in order to pass objects on the floor.
 
-    The person at x, y, m, passes the nearest object ahead on its free side. If that side is blocked and the other one
-    needs no detour, the other one. Otherwise straight over the object. `beyond`, a point farther along the path, m,
-    determines which object is in the way and on which side. It keeps the person on that side because it is behind the
-    object.
+    The person at x, y, m, passes the nearest object ahead on its free side. If that side is blocked, the person
+    takes the other one unless it needs a detour, and otherwise walks straight over the object. `beyond`, a point
+    farther along the path, m, determines which object is in the way and on which side. It keeps the person on that side
+    because it is behind the object.
     """
     clearance, walking = pace.clearance, pace.walking
     reach = distance(x, y, beyond[0], beyond[1])
@@ -213,9 +213,9 @@ def later_step(
 def step_from_python(
     walk: Any, position: Floats, heading: float, time: float, progress: Floats, places: Floats, first: bool
 ) -> tuple[int, float, float, float]:  # fmt: skip
-    """Call `next_step` or `later_step`. Return `CHANGED` also if a loose object is not at its place (n, 3), m.
+    """Call `next_step` or `later_step`. Return `CHANGED` also if a loose object has moved since the walk was planned.
 
-    `walk` consists of `plain` tuples, which numba unpacks in half the time of named tuples.
+    `walk` is from `plain`, as numba unpacks plain tuples in half the time. `places` (n, 3), m, are object positions.
     """
     path, goal, stop_distance, face_goal, shown, tolerance, pace, obstacles = walk
     speed, braking, turning_speed, clearance, patience, walking = pace
@@ -233,6 +233,6 @@ def step_from_python(
 
 
 def plain(walk: Walk) -> Any:
-    """Convert a walk to nested tuples, for `step_from_python`."""
+    """Convert the named tuples of a walk to plain tuples, which `step_from_python` takes."""
     pace = (*walk.pace[:-1], tuple(walk.pace.walking))
     return (*walk[:-2], pace, tuple(walk.obstacles))

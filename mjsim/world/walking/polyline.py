@@ -49,7 +49,7 @@ def path_length(path: Path) -> float:
 
 @kernel
 def point_along(path: Path, arc: float) -> tuple[float, float]:
-    """Point of `path` at an arc length, m, clamped to its ends."""
+    """Return the point of `path` at an arc length, m, clamped to its ends."""
     passed = 0.0
     if arc <= 0.0:
         return path[0, 0], path[0, 1]
@@ -81,7 +81,7 @@ def rest_of(path: Path, x: float, y: float) -> Path:
 
 @kernel
 def first_off_path(path: Path, positions: NDArray[np.float64], first: int, gap: float) -> int:
-    """Return the first index, from `first` on, of a position (n, 2) farther than `gap` m from `path`, or -1."""
+    """Return the index of the first position (n, 2), at `first` or later, more than `gap` m from `path`, or -1."""
     for k in range(first, len(positions)):
         if project(path, positions[k, 0], positions[k, 1])[1] > gap:
             return k

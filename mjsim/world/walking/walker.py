@@ -66,7 +66,7 @@ class Walker:
         )
 
     def record(self, phase: int, time: float) -> None:
-        """Record the phase after the first control step of a walk, which started at `time`, s."""
+        """Record the phase that a walk's first control step returned. The step started at `time`, s."""
         self.blocked = phase == BLOCKED
         if self.blocked:
             self._back_off_until = time + BACK_OFF_TIME
