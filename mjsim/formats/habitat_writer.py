@@ -1,7 +1,7 @@
 """Export of a house as a Habitat scene dataset: stage, objects, scene instance, rooms, and rearrangement episodes.
 
-Habitat has y up and the camera along -z, so our x, y, z are its x, -z, y. The stage is everything that cannot move.
-Receptacles and objects are templates with their own origins, so that our poses apply to them.
+Habitat has y up and the camera along -z, so x, y, z in mjsim are x, -z, y in Habitat. The stage is everything
+that cannot move. Receptacles and objects are templates with their own origins, so that mjsim's poses apply to them.
 """
 
 import gzip
@@ -33,9 +33,9 @@ from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 
 _UPRIGHT = np.linalg.inv(Y_TO_Z)
-_CEILING = 2.6  # height of regions, m
+_CEILING = 2.6  # height of regions, in metres
 _OBJECT, _SCENE = ".object_config.json", ".scene_instance.json"
-_AIR = 0.05  # distance of paths from walls, beyond the body's radius, m
+_AIR = 0.05  # clearance between body and walls on a path, in metres
 
 
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
@@ -134,7 +134,7 @@ def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pose(position: Floats, rotation: Floats) -> Floats:
-    """One of our poses as Habitat's transform (4, 4)."""
+    """An mjsim pose as Habitat's transform (4, 4)."""
     own = np.eye(4)
     own[:3, :3], own[:3, 3] = rotation, position
     return np.asarray(_UPRIGHT @ own @ Y_TO_Z)
@@ -220,7 +220,7 @@ def _dataset() -> dict[str, Any]:
 
 
 def _navmesh() -> dict[str, Any]:
-    """Settings that make Habitat's navmesh similar to ours."""
+    """Settings that make Habitat's navmesh similar to mjsim's walkable floor."""
     return {
         "cellSize": 0.05,
         "cellHeight": 0.05,
@@ -244,7 +244,7 @@ def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) ->
         geometry = house.receptacles[receptacle]
         targets[handle] = _pose(geometry.center, geometry.rotation).tolist()
         goals.append([f"{_slug(receptacle)}_:0000", None])
-    turn = (episode.start.heading - math.pi / 2) / 2  # Habitat looks along -z, our y
+    turn = (episode.start.heading - math.pi / 2) / 2  # Habitat looks along -z, which is y in mjsim
     return {
         "episode_id": str(number),
         "scene_id": scene + _SCENE,

@@ -29,9 +29,9 @@ from mjsim.values.errors import AssetError
 SUFFIXES = (".xml", ".mjcf")
 _SEEN = (0, 1, 2)  # geom groups that viewers show
 _CLEAR = 0.9  # opacity below which a colliding geom is a marker that is not drawn
-_OPAQUE = 250  # of 255; textures that are less opaque everywhere are shadows, and ignored
+_OPAQUE = 250  # out of 255; a texture with lower alpha everywhere is a drawn shadow, which is ignored
 _COVER = 0.02  # m
-_ENDLESS = 15.0  # half of the side given to an infinite plane, m
+_ENDLESS = 15.0  # half of the side given to an infinite plane, in metres
 _GEOM = mujoco.mjtGeom
 
 
@@ -56,7 +56,7 @@ def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _rooms(model: Any) -> tuple[NamedRoom, ...]:
-    """Rooms of a house of ours, which marks them by box sites; none for other scenes."""
+    """Rooms of an mjsim house, which are marked by box sites. Other scenes have none."""
     if not any(model.site(site).name.startswith(PREFIX) for site in range(model.nsite)):
         return ()
     rooms = RoomMap.from_model(model)
@@ -74,7 +74,7 @@ class _Picture:
 
     image: Floats  # RGB from 0 to 1, (height, width, 3)
     repeat: Floats  # (2,)
-    uniform: bool  # repeats by the metre on primitives
+    uniform: bool  # on primitives, `repeat` counts per metre
 
 
 def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFiles) -> None:
@@ -96,7 +96,7 @@ def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFil
 
 
 def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
-    """Remove all textures from a model. Return them by the names of materials, and the files that are missing."""
+    """Remove all textures from a model. Return them by material name, together with the missing files."""
     files = {t.name: t.file for t in spec.textures if t.file}  # cube textures are drawn on each side
     made = {t.name: t.rgb1 for t in spec.textures if not t.file}
     images: dict[str, Floats] = {}
@@ -134,7 +134,7 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
     alpha = np.where(model.geom_matid >= 0, material_alpha, model.geom_rgba[:, 3])
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
-    # Bodies of many scenes have some geoms to draw and others to collide. Without the latter, drawn geoms are solid.
+    # In many scenes, bodies have visual and collision geoms. If a body has no collision geoms, visual ones are solid.
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
     decor = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):

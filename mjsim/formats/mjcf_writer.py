@@ -15,7 +15,7 @@ ASSETS = "assets"
 
 
 def export_house(scene: Scene, path: Path) -> None:
-    """Write the scene as a self-contained model whose `qpos0` is the scene's state.
+    """Write the scene as a self-contained model whose reference pose `qpos0` is the scene's current state.
 
     Meshes and textures are copied into the folder `assets` next to the file and named by their content. Paths are
     relative, so the folder can be moved. The XML file is written last, atomically.

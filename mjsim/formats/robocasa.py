@@ -17,7 +17,7 @@ from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
 SUFFIXES = (".yaml", ".yml")
-# Width, depth and height, m, for fixtures whose layout leaves a side to the mesh.
+# Width, depth and height, in metres, of fixtures for which a layout leaves a side to the mesh.
 _SIZES = {
     "counter": (1.0, 0.65, 0.92),
     "stove": (0.76, 0.66, 0.92),
@@ -38,16 +38,12 @@ _SIZES = {
 }
 _COLOURS = {"counter": 0xD8D3C8, "wall": 0xEDE8DF, "floor": 0xB08D66, "steel": 0xA9AEB3, "wood": 0xC9B08C}
 _STEEL = ("stove", "oven", "microwave", "hood", "dishwasher", "fridge", "sink")
-_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")  # ignored, on walls
+_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")  # ignored wall fixtures
 _AXES = (("left", "right"), ("front", "back"), ("bottom", "top"))
-_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12  # base of stacks, thickness of worktops, set-back below them, m
-_SIDES = {
-    "left": (0, -1),
-    "right": (0, 1),
-    "back": (1, 1),
-    "front": (1, -1),
-}  # axis and direction out of the room
-_WALL, _BACKING = 0.02, 0.1  # half thickness of walls, and of their backing, m
+_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12  # base of stacks, worktop thickness, cabinet setback, in metres
+# Axis of each side, and its direction out of the room.
+_SIDES = {"left": (0, -1), "right": (0, 1), "back": (1, 1), "front": (1, -1)}
+_WALL, _BACKING = 0.02, 0.1  # half thickness of walls and of their backing, in metres
 
 
 def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
@@ -74,7 +70,7 @@ class _LayoutReader:
         self._left_out: dict[str, int] = {}
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Notes about ignored fixtures and about boxes."""
+        """Report lines about ignored fixtures and about the use of boxes."""
         small = ", ".join(f"{n} {kind}" for kind, n in sorted(self._left_out.items()))
         boxes = ImportDecision("fixtures", "boxes", "the layout has sizes and places; meshes are RoboCasa's")
         return (boxes, left_out(small, "on walls and worktops")) if small else (boxes,)
@@ -108,7 +104,7 @@ class _LayoutReader:
         placed = "pos" in fixture or "align_to" in fixture
         centre = _centre(fixture, size, known)
         known[self.name] = centre, size
-        if not placed:  # it is drawn as part of the fixture that it is built into
+        if not placed:  # drawn as part of the fixture that contains it
             return
         if "z_rot" in fixture:
             spin = rotation_matrix(fixture["z_rot"], [0, 0, 1])
@@ -143,9 +139,7 @@ def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Float
 
 
 def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Centre of a fixture in the frame of its group, m: as given, or next to another fixture and flush with
-    its faces.
-    """
+    """Centre, m, of a fixture in its group's frame: as given, or next to another fixture, flush with its faces."""
     if "align_to" not in fixture:
         standing = (0.0, 0.0, size[2] / 2)
         given = fixture.get("pos") or [None] * 3
@@ -176,7 +170,7 @@ def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
 
 
 def _counter(name: str, centre: Floats, size: Floats, frame: Floats) -> Iterator[ScenePiece]:
-    """A worktop and the cabinet below, set back so that fronts are visible; together one solid."""
+    """A worktop, and a cabinet set back below it so that its fronts are visible. They collide as one solid."""
     yield _box(name, "counter", centre, size, frame, seen=False)
     top = np.array([0.0, 0.0, (size[2] - _TOP) / 2])
     yield _box(name, "counter", centre + top, np.array([*size[:2], _TOP]), frame, solid=False)

@@ -28,9 +28,9 @@ from mjsim.values.errors import AssetError
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
 _BUILT_IN = ("sun", "ground_plane")  # models that come with Gazebo
-_THIN = 0.002  # thickness of planes, m
-_DEPTH = 20  # greatest nesting of models
-_PLANE = 30.0  # greatest side of a plane, m
+_THIN = 0.002  # thickness of planes, in metres
+_DEPTH = 20  # maximum nesting of models
+_PLANE = 30.0  # maximum side of a plane, in metres
 
 
 def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
@@ -51,7 +51,7 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Pose and owner of a link."""
+    """Pose of a link, and the model that it belongs to."""
 
     name: str  # name of the outermost model
     frame: Floats  # (4, 4)
@@ -71,7 +71,7 @@ class _WorldReader:
         self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
-        """Notes about shapes that cannot be read."""
+        """Report lines about shapes that cannot be read."""
         return tuple(
             left_out(f"{n} of shape <{kind}>", "it cannot be read") for kind, n in self._unknown.items()
         )
@@ -93,7 +93,7 @@ class _WorldReader:
     ) -> Iterator[ScenePiece]:
         uri = (element.findtext("uri") or "").strip()
         built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
-        if built_in == "ground_plane":  # marks the height of the floor; the house gets a floor of its own
+        if built_in == "ground_plane":  # only its height is used; the house gets its own floor
             ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
             surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
             yield ScenePiece(built_in, surface, seen=False, solid=False)
@@ -157,7 +157,7 @@ class _WorldReader:
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
-        """File or folder of a URI; None if it is missing and left out."""
+        """File or folder of a URI, or None if it is missing and may be left out."""
         scheme, _, rest = uri.rpartition("://")
         if scheme.startswith("http"):  # Gazebo Fuel: the model may have been downloaded
             rest = rest.rstrip("/").rpartition("/")[2]

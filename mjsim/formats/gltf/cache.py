@@ -24,7 +24,7 @@ _COMPRESSED = (".webp",)  # suffixes of files that are already compressed
 
 
 def scene_hash(catalogue: Catalogue) -> str:
-    """Hash (20 hex digits) of all that scene files depend on: the house and the code that writes them."""
+    """Hash everything that determines the scene files: the house, mjsim, MuJoCo and OpenCV. Return 20 hex digits."""
     parts = (catalogue.content, source_digest("mjsim"), mujoco.__version__, cv2.__version__)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
@@ -50,7 +50,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
 
 
 def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
-    """Write the walking kernel's floor for a trunk of this radius, m, unless it exists. Return its file name.
+    """Write the floor data for walking with this trunk radius, in metres, unless the file exists. Return its name.
 
     Raises:
         OSError: The file cannot be written.

@@ -7,10 +7,10 @@ import numpy as np
 from mjsim.formats.gltf.shapes import Floats, Indices, Shape
 
 FACES = 6  # +x, -x, +y, -y, +z, -z, stacked in an image in this order
-_MAX_SHIFT = 0.015  # greatest shift of the image in the middle of an edge, as a share of a face
-_MAX_CUTS = 4  # how often each edge is halved at most
-_EDGE = 1e-6  # tolerance for directions on an edge of the cube, as a share of their length
-# For each face, axis and sign of the directions of its columns and rows, as in OpenGL.
+_MAX_SHIFT = 0.015  # largest image shift at the midpoint of an edge, as a fraction of the face width
+_MAX_CUTS = 4  # maximum number of times an edge is halved
+_EDGE = 1e-6  # relative tolerance for directions that lie on an edge of the cube
+# For each face, the cube axis and sign along which its columns and rows increase (OpenGL's convention).
 _COLUMNS = ((2, -1.0), (2, 1.0), (0, 1.0), (0, 1.0), (0, 1.0), (0, -1.0))
 _ROWS = ((1, -1.0), (1, -1.0), (2, 1.0), (2, -1.0), (1, -1.0), (1, -1.0))
 
@@ -22,7 +22,7 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
         shape: Triangles. The direction of a vertex from the cube's centre is `unscaled * scale`.
         scale: Factors (3,).
         side: Width of a face in pixels.
-        faces: Number of faces in the image: 6, or 1 that is shown on all sides.
+        faces: Number of faces in the image, 6 or 1. A single face is shown on all sides.
     """
     directions = shape.unscaled * scale
     corners = np.concatenate((shape.positions, shape.normals, directions), axis=1)[shape.triangles]
@@ -33,7 +33,7 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
         corners = _halved(corners)
     face = _faces_of(corners)
     uv = _coordinates(corners[..., 6:], face)
-    inset = 0.5 / side  # for the texture filter, so that no other face is blended in
+    inset = 0.5 / side  # keeps the texture filter from blending in the next face
     uv = np.clip(uv, inset, 1.0 - inset)
     if faces > 1:
         uv[..., 1] = (uv[..., 1] + face[:, None]) / faces
@@ -47,7 +47,7 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
     crossing = (values.min(axis=1) < 0.0) & (values.max(axis=1) > 0.0)
     pieces = [corners[~crossing]]
     corners, values = corners[crossing], values[crossing]
-    # Rotate the corners so that the first is alone on its side of the cut, or on the cut between the other two.
+    # Rotate the corners so that the first is alone on its side of the cut, or is on it and the others on both sides.
     signs = np.sign(values)
     alone = np.where(
         (signs == 0.0).any(axis=1),
@@ -67,7 +67,7 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
 
 
 def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
-    """The points (t, k) where values are zero that are `at` (t,) at the points `a` (t, k) and `bt` at `b`."""
+    """Points (t, k) between `a` and `b` at which linear interpolation of the values `at` and `bt` (t,) gives zero."""
     share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
     return a + share * (b - a)
 

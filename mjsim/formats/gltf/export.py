@@ -26,7 +26,7 @@ from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
-_AWAY = -100.0  # height of the object models, below the house, m
+_AWAY = -100.0  # height of the object models, far below the house, in metres
 _HANDS = tuple(f"{avatar.PREFIX}{hand}_hand" for hand in avatar.HANDS)
 
 
@@ -49,7 +49,7 @@ def export_episode(scene: Scene) -> bytes:
 
 
 def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
-    """The walking kernel's floor for a trunk of this radius, m, as JSON with each array row by row."""
+    """The floor data for walking with this trunk radius, in metres, as JSON. Arrays are flattened row by row."""
     floor = Floor.of(compiled_house(catalogue).model, body_radius)
     plain = {
         name: np.ravel(value).tolist() if isinstance(value, np.ndarray) else value
@@ -88,7 +88,7 @@ class _Export:
 
     @cached_property
     def _by_body(self) -> dict[int, list[GeomSurface]]:
-        """Visible geoms by the body that they move with, 0 for what never moves."""
+        """Visible geoms by the id of the body that carries them, 0 if they are static."""
         found: dict[int, list[GeomSurface]] = {}
         carried = self._model.body_weldid[self._model.geom_bodyid]
         for surface in surfaces(self._model, self._data, self._drawn):
@@ -152,7 +152,7 @@ class _Export:
         return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
 
     def _rooms(self, glb: Glb) -> list[int]:
-        """Nodes of what never moves, in parts that can be culled. Ceilings are apart: top-down views omit them."""
+        """Nodes of all static geoms, split for culling. Ceilings are separate because top-down views omit them."""
         groups: dict[tuple[bool, str], list[GeomSurface]] = {}
         for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
@@ -220,7 +220,7 @@ class _Export:
         return webp(np.tile(image, (faces, 1, 1)), lossless=True)
 
     def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
-        """Parameters and texture of the spots under objects; None if the house has no material for them."""
+        """Parameters and texture of contact shadows under objects, or None if the house has no material for them."""
         material = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_MATERIAL, shadows.MATERIAL)
         textures = self._model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
         texture = textures[material] if material >= 0 else -1

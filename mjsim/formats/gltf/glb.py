@@ -18,7 +18,7 @@ from mjsim.formats.gltf.surfaces import GeomSurface
 from mjsim.house.compiled.sites import RoomMap
 
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion xyzw that turns z up into y up
-_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # between quantised positions, m: 1/128 mm to 128 mm
+_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # quantisation steps of positions: 1/128 mm to 128 mm
 _UV_STEP = 2.0**-13
 _COMPONENTS = {
     np.dtype(kind): code
@@ -26,8 +26,8 @@ _COMPONENTS = {
 }
 _VERTICES, _TRIANGLES = 34962, 34963  # buffer view targets
 _EXTENSIONS = {"mesh": "KHR_mesh_quantization", "texture": "EXT_texture_webp"}
-_MANY_TRIANGLES = 50_000  # of one material, from which it gets a draw call in every room
-_SQUARE = 16.0  # side of a part, m; its positions are quantised to 0.25 mm
+_MANY_TRIANGLES = 50_000  # a material with more triangles gets one draw call per room
+_SQUARE = 16.0  # side of a square of floor, in metres; positions in it are quantised to 0.25 mm
 _QUALITY, _LOSSLESS = 90, 101  # of OpenCV's WebP encoder
 
 
@@ -221,11 +221,11 @@ def linear(rgba: Floats) -> Floats:
 
 
 def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[GeomSurface, str]]:
-    """Divide what never moves into parts, few enough for drawing and small enough for culling and quantisation.
+    """Divide static surfaces into parts that are few enough for drawing and small enough for culling and quantisation.
 
     Yield each surface with the name of its part. The part is the room if the material has many triangles. Otherwise it
-    is a square of the floor, the smallest that is as wide as the surface, because next to much larger surfaces small
-    ones would be quantised more coarsely.
+    is the smallest square of floor as wide as the surface, because small surfaces would be quantised more coarsely next
+    to much larger ones.
     """
     x_min, y_min, x_max, y_max = rooms.bounds
     centre = np.array([x_min + x_max, y_min + y_max]) / 2
@@ -245,7 +245,7 @@ def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[G
 def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
     """The image of a texture, uint8, (height, width, channels).
 
-    For cubes and skies it holds six stacked faces, or one that is shown on all sides.
+    For cubes and skies, it holds six stacked faces, or a single face that is shown on all sides.
     """
     sizes = model.tex_height, model.tex_width, model.tex_nchannel
     shape = tuple(int(size[texture]) for size in sizes)
@@ -255,7 +255,7 @@ def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
 
 
 def texture_encoder(model: Any) -> Callable[[int, bool], tuple[str, bytes]]:
-    """A cached function for `Glb` that encodes the textures of a model."""
+    """Return a cached function that encodes a model's textures for `Glb`."""
 
     @functools.cache
     def encode(texture: int, alpha: bool) -> tuple[str, bytes]:

@@ -32,7 +32,7 @@ from mjsim.values.errors import AssetError
 
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"
-RECEPTACLE = "mjsim_receptacle"  # in a template's user_defined: the bin of ours that it was
+RECEPTACLE = "mjsim_receptacle"  # user_defined key of templates that were exported from an mjsim bin
 
 
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
@@ -51,9 +51,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
     unit, longest = options.units, float(sides.max())
-    if unit is None and (
-        not known or longest > MAX_SIDE
-    ):  # many glTF files are not in metres, as they should be
+    if unit is None and (not known or longest > MAX_SIDE):  # many glTF files are not in metres
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
@@ -83,7 +81,7 @@ def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _stage_up(path: Path) -> str | None:
-    """The vertical axis of a mesh by the Habitat stage_config.json next to it; None without one."""
+    """The vertical axis given by the Habitat stage_config.json next to a mesh, or None if there is no such file."""
     config = path.with_suffix(".stage_config.json")
     if not config.is_file():
         return None

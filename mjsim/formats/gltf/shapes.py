@@ -1,4 +1,4 @@
-"""Triangles of geoms, with the vertices and normals of MuJoCo's renderer."""
+"""Triangulation of geoms with the same vertices and normals as in MuJoCo's renderer."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ Indices = NDArray[np.int64]
 
 _Geom = mujoco.mjtGeom
 MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
-_FLATTENED_BELOW = 0.8  # cosine of vertex and face normals below which MuJoCo uses the face's
+_FLATTENED_BELOW = 0.8  # cosine between vertex and face normal below which MuJoCo uses the latter
 
 
 class Shape(NamedTuple):
@@ -70,7 +70,7 @@ def _grid(rows: int, columns: int) -> Indices:
 
 
 def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
-    """The unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
+    """The part of the unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
     halves = max(stacks // 2, 1)
     heights = np.arange(low * halves, high * halves + 1) / halves
     around, up = np.meshgrid(np.arange(slices + 1) / slices, heights)
@@ -78,7 +78,7 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
     axes = flat * np.cos(angle), flat * np.sin(angle), np.sin(0.5 * math.pi * up)
     points = np.stack(axes, axis=-1).reshape(-1, 3)
     uv = np.column_stack((around.ravel(), (high - up.ravel()) / (high - low)))
-    # At a pole each cell is one triangle, whose corner there is in the middle of the cell's part of the image.
+    # At a pole, a cell is one triangle. Its corner at the pole is midway between the other two in the image.
     is_pole = np.abs(points[:, 2]) > 1.0 - 1e-9
     uv[is_pole, 0] -= 0.5 / slices * np.sign(points[is_pole, 2])
     triangles = _grid(len(up) - 1, slices)
@@ -118,7 +118,7 @@ def _quad() -> Shape:
 
 
 def _plane(size: Floats, far: float) -> Shape:
-    """A plane of half-sizes (x, y, ...), m. A plane of size 0 is infinite and drawn up to `far`."""
+    """A plane of half-sizes (x, y, ...), in metres. A half-size of 0 means infinite and is drawn up to `far`."""
     shape = _quad()
     endless = size[:2] <= 0.0
     half = np.where(endless, far, size[:2])
@@ -128,7 +128,7 @@ def _plane(size: Floats, far: float) -> Shape:
 
 
 def _box() -> Shape:
-    """Six quads, with the image upright on the sides and mirrored on three of them."""
+    """Six quads. The image is upright on the vertical quads, and mirrored on three of the six."""
     quad, sides = _quad(), []
     for normal, right, up in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for sign in (-1.0, 1.0):

@@ -16,7 +16,7 @@ from mjsim.values.errors import AssetError
 
 _OPAQUE_FROM = 0.995  # alpha below which MuJoCo blends a geom
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
-_MAX_LIGHTS = 8  # of OpenGL, including the headlight
+_MAX_LIGHTS = 8  # OpenGL's limit, including the headlight
 _AMBIENT_ALONE = 0.3  # ambient light of a scene without any light
 _COLOURS = ("ambient", "diffuse", "specular")
 _LIGHTS = {mujoco.mjtLightType.mjLIGHT_SPOT: "spot", mujoco.mjtLightType.mjLIGHT_DIRECTIONAL: "directional"}
@@ -86,7 +86,7 @@ def _surface(model: Any, data: Any, geom: Any) -> GeomSurface:
             f"geom {name!r} is of the type {kind}, which cannot be exported; make it a mesh"
         ) from None
     is_translucent = bool(geom.rgba[3] < _OPAQUE_FROM)
-    # Not from the scene, which moves infinite planes along with its camera.
+    # Poses are read from the data, because the abstract scene moves infinite planes along with its camera.
     position, rotation = data.geom_xpos[geom.objid], data.geom_xmat[geom.objid].reshape(3, 3)
     shape, texture = _textured(model, geom, shape)
     return GeomSurface(
@@ -117,7 +117,7 @@ def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
         if shape.uv is not None:
             is_endless = geom.type == mujoco.mjtGeom.mjGEOM_PLANE and size[:2].min() <= 0.0
             return shape._replace(uv=shape.uv * repeat - 0.5 * is_endless), texture
-        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # along the mesh's x and y axes
+        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # texture coordinates from the mesh's x and y
         return shape._replace(uv=over * repeat + 0.5), texture
     if shape.uv is not None and geom.type in MESHES:
         return shape, -1  # MuJoCo does not draw cubes on meshes with texture coordinates

@@ -1,4 +1,4 @@
-"""Furniture of ours for the objects in ProcTHOR's houses, stretched to their sizes."""
+"""Replacement of the objects in ProcTHOR houses by mjsim furniture, stretched to their sizes."""
 
 import math
 import re
@@ -25,15 +25,15 @@ from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
 DATABASE = "asset-database.json"  # ProcTHOR's file with types and sizes of its assets
-_DRAWN = 4  # pieces of each kind, from which the most similar is chosen
-_STRETCH = math.log(2.2)  # greatest factor by which a side is stretched
+_DRAWN = 4  # number of pieces drawn of each kind; the most similar one is used
+_STRETCH = math.log(2.2)  # log of the largest factor by which a side is stretched
 _GREY, _BLACK = np.array([0.62, 0.6, 0.57]), np.array([0.08, 0.08, 0.09])
 _SCREENS = ("desktop", "microwave", "television")
 _Entry = tuple[tuple[str, ...], tuple[float, float, float]]
 _CAN: _Entry = ((), (0.45, 0.35, 0.55))
 _SHELVES: _Entry = (("bookcase", "low_bookcase", "cube_shelf"), (0.9, 0.35, 1.45))
 _PICTURE: _Entry = ((), (0.8, 0.16, 0.6))
-# Word in a name -> similar kinds of ours, and typical width, depth and height, m. Without a kind it becomes a box.
+# Word in a name -> similar mjsim kinds (a box is used if there are none), and typical width, depth and height, m.
 _TYPES: Mapping[str, _Entry] = {
     "armchair": (("armchair",), (0.95, 0.9, 0.9)),
     "bathtub": (("bathtub",), (1.7, 0.8, 0.6)),
@@ -86,8 +86,8 @@ class AssetDatabase:
     """Types and sizes of ProcTHOR's assets, from its database if available, otherwise from their names."""
 
     types: Mapping[str, str]  # asset -> type
-    sizes: Mapping[str, Floats]  # asset -> width, depth and height, m
-    source: str  # of the sizes, for the report
+    sizes: Mapping[str, Floats]  # asset -> width, depth and height, in metres
+    source: str  # where the sizes are from, for the report
 
     @classmethod
     def read(cls, folders: Iterable[Path]) -> "AssetDatabase":
@@ -112,7 +112,7 @@ class AssetDatabase:
         return cls(types, sizes, f"of {DATABASE}")
 
     def type_of(self, thing: Thing) -> str:
-        """The longest key of `_TYPES` in a thing's type, asset or id, tried in this order;  if none."""
+        """The longest key of `_TYPES` in a thing's type, asset or id, in this order; empty if none is found."""
         for text in (self.types.get(thing.asset_id, ""), thing.asset_id, thing.id):
             plain = re.sub(r"[^a-z]", "", text.lower())
             if found := [key for key in _TYPES if key in plain]:
@@ -122,8 +122,7 @@ class AssetDatabase:
     def size_of(self, thing: Thing, kind: str) -> Floats | None:
         """Width, depth and height of a thing, m; None if unknown.
 
-        Without a database it is the typical size of the type, with twice the height of the thing's middle above the
-        floor.
+        Without a database, it is the type's typical size, with twice the height of the thing's centre if plausible.
         """
         size = self.sizes.get(thing.asset_id)
         if size is None and kind:
@@ -131,7 +130,7 @@ class AssetDatabase:
             if 0.5 < 2 * thing.position.y / size[2] < 1.6:
                 size[2] = 2 * thing.position.y
         if size is not None and _TYPES.get(kind) is _PICTURE:
-            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # so that it protrudes from the wall
+            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # deep enough to protrude from the wall
         return size
 
 
@@ -146,7 +145,7 @@ def in_our_style(world: str, assets: Iterable[str]) -> str:
 
 
 class FurnitureLibrary:
-    """Pieces of the kinds that some types need, written as one MJCF file and read back as surfaces."""
+    """Furniture for some types of things. Pieces are written as one MJCF file and read back as surfaces."""
 
     def __init__(self, types: Iterable[str], folder: Path) -> None:
         self.file = folder / "furniture.xml"
@@ -178,7 +177,7 @@ class FurnitureLibrary:
             self._pieces.setdefault(name.partition(":")[0], []).append(found)
 
     def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[ScenePiece], str]:
-        """A thing in its place, and the kind of ours that it became; a box and "" if none is similar.
+        """A thing in its place, as the most similar piece or a box. Return also the piece's kind, empty for a box.
 
         Args:
             thing: The thing.
@@ -190,10 +189,8 @@ class FurnitureLibrary:
         for kind in _TYPES[name][0] if name else ():
             for pieces in self._pieces.get(kind, []):
                 corners = np.concatenate([p.surface.corners.reshape(-1, 3) for p in pieces if p.solid])
-                low, high = (
-                    corners.min(axis=0) * (1, 1, 0),
-                    corners.max(axis=0),
-                )  # from z = 0, since legs may not be solid
+                # Measured from z = 0, because legs may not be solid.
+                low, high = corners.min(axis=0) * (1, 1, 0), corners.max(axis=0)
                 stretch = float(np.abs(np.log(size / (high - low))).max())
                 choices.append((stretch, kind, pieces, low, high))
         best = min(choices, default=None, key=lambda choice: choice[0])

@@ -1,7 +1,8 @@
 """Rooms, walls, openings and objects of ProcTHOR's house JSON.
 
-Its axes are x, y up and z, left-handed; seen from above, (x, z) are our (x, y). Its walls have no thickness and are the
-centre lines of ours. An object's position is the centre of its box, and at a rotation of 0 its front faces z.
+Its axes are x, y up and z, left-handed; seen from above, (x, z) are mjsim's (x, y). Its walls, which have no
+thickness, are the centre lines of mjsim's. An object's position is the centre of its box. At a rotation of 0, its front
+faces z.
 """
 
 import math
@@ -28,7 +29,7 @@ _Number = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
 
 
 class Vector(msgspec.Struct):
-    """A point, m, or angles in degrees."""
+    """A point in metres, or angles in degrees."""
 
     x: _Number = 0.0
     y: _Number = 0.0

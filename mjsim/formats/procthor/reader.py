@@ -1,4 +1,4 @@
-"""Reader of ProcTHOR houses: the plan becomes floors and walls, the objects furniture of ours in their size."""
+"""Reader of ProcTHOR houses. The plan becomes floors and walls; objects become mjsim furniture of the same size."""
 
 import math
 import tempfile
@@ -23,8 +23,8 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.validation.object_rules import SIZE
 
 SUFFIXES = (".json",)
-_ON = 0.05  # distance within which an opening belongs to a wall, m
-_THICK = {"door": 0.04, "window": 0.02}  # thickness of panels in openings, m
+_ON = 0.05  # distance within which an opening belongs to a wall, in metres
+_THICK = {"door": 0.04, "window": 0.02}  # thickness of panels in openings, in metres
 
 
 def read_procthor(path: Path, options: HouseOptions) -> SourceScene:

@@ -1,7 +1,7 @@
 """Export of a plan as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
 
-Walls have no thickness there and are the centre lines of ours. Doors and windows become the ProcTHOR assets of the
-nearest size.
+ProcTHOR's walls have no thickness: they are the centre lines of mjsim's walls. Doors and windows become the
+ProcTHOR assets of the nearest size.
 """
 
 from collections.abc import Iterator
@@ -12,8 +12,8 @@ from mjsim.generator.values import CEILING_HEIGHT, SIDES, WALL, Door, HomePlan, 
 
 NAMES = "mjsim_rooms"  # key of the metadata: room id -> [key, label], since ProcTHOR has only four room types
 _TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
-_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # width from which a door is a passage, m
-_WINDOWS = {  # by width, m
+_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # doors wider than _WIDE metres are passages
+_WINDOWS = {  # by width, in metres
     0.92: "Window_Fixed_36x48",
     1.22: "Window_Slider_48x48",
     1.53: "Window_Slider_60x48",
@@ -22,7 +22,7 @@ _WINDOWS = {  # by width, m
 
 
 def procthor_house(plan: HomePlan) -> dict[str, Any]:
-    """A plan as a house of ProcTHOR, ready for JSON."""
+    """A plan as a ProcTHOR house, ready for JSON."""
     ids = {room.key: f"room|{number}" for number, room in enumerate(plan.rooms, 2)}
     walls = [wall for room in plan.rooms for wall in _walls(plan, room, ids)]
     return {
@@ -74,7 +74,7 @@ def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str
 
 
 def _ordered(side: Side, start: float, end: float) -> tuple[float, float]:
-    """The ends of a wall in the order of the floor's outline, clockwise from above."""
+    """The ends of a wall in clockwise order around the floor, as seen from above."""
     return (start, end) if side in ("west", "north") else (end, start)
 
 
@@ -92,7 +92,7 @@ def _wall_name(room: str, at: Room, side: Side, start: float, end: float) -> str
 def _hole(
     plan: HomePlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
 ) -> tuple[str, dict[str, Any]]:
-    """The wall of a room that has an opening, and the opening's hole along it."""
+    """The id of a room's wall with an opening, and the fields that describe the hole in it."""
     of = plan.room(room)
     start, end, _ = min(
         wall_stretches(of, side, plan.rooms),

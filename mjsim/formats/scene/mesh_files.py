@@ -37,7 +37,7 @@ class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
     """Resolver for files that a mesh names, such as its materials."""
 
     def absolute(self, name: str) -> Path:
-        """Path of a named file. Raise OSError for special files, which could be read for ever."""
+        """Path of a named file. Raise `OSError` for special files, because reading them may never end."""
         path = Path(super().absolute(name))
         if path.exists():
             check_input(path)
@@ -111,7 +111,7 @@ def _what_it_has(geometries: list[Any]) -> str:
 
 
 def _named(path: Path, keyword: str) -> list[str]:
-    """Last words of the lines of an OBJ or MTL file with a keyword; none without the file."""
+    """The last word of each line of an OBJ or MTL file that starts with a keyword. Empty if the file is missing."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -124,7 +124,7 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
 
     Args:
         mesh: The mesh.
-        linear: Whether its plain colours are linear, as in glTF.
+        linear: True if its plain colours are linear, as in glTF.
         side: Longest side in pixels to which its image is reduced; None to leave it as it is.
     """
     count = len(mesh.faces)
@@ -236,7 +236,7 @@ def _without_comments(path: Path) -> io.BytesIO:
 
 
 def _collada_frame(path: Path) -> Floats:
-    """Transform (4, 4) from a COLLADA file to metres and z up by its <asset>, which trimesh ignores."""
+    """Transform (4, 4) to metres and z up from the unit and axes in a COLLADA file's <asset>, which trimesh ignores."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
         for tag, element in _elements(path):

@@ -16,13 +16,13 @@ from mjsim.values.errors import AssetError
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # in metres; guessed in this order
 AXES = ("y", "z")
 TEXTURE_SIDE = 512  # longest side of an image, in pixels
-MIN_SIDE, MAX_SIDE = 3.0, 60.0  # limits of a house's longest side, m
-_STEP = 0.1  # width of rectangles that cover slanted outlines, m
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # limits of a house's longest side, in metres
+_STEP = 0.1  # width of the rectangles that approximate slanted outlines, in metres
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """Options of an object import; None for values to be determined."""
+    """Options of an object import. Values of None are determined automatically."""
 
     units: str | None = None  # key of `UNITS`
     up: str | None = None  # one of `AXES`
@@ -37,7 +37,7 @@ class ImportDecision:
 
     what: str  # subject
     choice: str
-    reason: str = ""  # why, or what to do if another choice was meant
+    reason: str = ""  # reason for the choice, or how to change it
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class NamedRoom:
 
     key: str
     label: str
-    boxes: tuple[tuple[float, float, float, float], ...]  # rectangles: xmin, ymin, xmax, ymax, m
+    boxes: tuple[tuple[float, float, float, float], ...]  # rectangles: xmin, ymin, xmax, ymax, in metres
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Bin:
 
     key: str
     room: str  # room key
-    x: float  # middle of its base, m
+    x: float  # middle of its base, in metres
     y: float
     yaw: float  # rad
     z: float = 0.0
@@ -81,17 +81,17 @@ class SourceScene:
     kind: str  # kind of source, such as `SDF world`
     notes: tuple[ImportDecision, ...] = ()  # the reader's decisions
     rooms: tuple[NamedRoom, ...] = ()  # if the source names them
-    bins: tuple[Bin, ...] = ()  # if the source was exported from a house of ours
+    bins: tuple[Bin, ...] = ()  # if the source is an exported mjsim house
 
 
 @dataclass(frozen=True)
 class HouseOptions:
-    """Options of a house import; None for values to be determined."""
+    """Options of a house import. Values of None are determined automatically."""
 
     units: str | None = None  # key of `UNITS`
     up: str | None = None  # one of `AXES`
     scale: float = 1.0  # factor on top of the unit
-    floor: float | None = None  # height of the floor in the source, m
+    floor: float | None = None  # height of the floor in the source, in metres
     rooms: Path | None = None  # TOML file that names rooms
     models: tuple[Path, ...] = ()  # folders with the source's models
     skip_missing: bool = False  # leave out missing files
@@ -136,8 +136,9 @@ def unit_of(longest: float) -> str | None:
 
 
 def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
-    """Rectangles, m, that cover a polygon (k, 2), in steps of 0.1 m if its sides are slanted. Raise `ValueError` if it
-    has no area.
+    """Rectangles, m, that cover a polygon (k, 2). Raise `ValueError` if its area is 0.
+
+    Slanted sides are approximated in steps of 0.1 m.
     """
     polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
     if not polygon.is_valid or polygon.area < _STEP**2:

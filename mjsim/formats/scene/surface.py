@@ -1,4 +1,4 @@
-"""Triangles of a mesh with their colours, as arrays."""
+"""Arrays of a mesh's triangles and their colours."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 WELD_DIGITS = 6  # corners are equal if they agree to 1e-6 m
-_MIN_AREA = 1e-13  # area below which a triangle has no normal, m^2
+_MIN_AREA = 1e-13  # area below which a triangle has no normal, in m^2
 
 
 @dataclass(frozen=True, eq=False)
