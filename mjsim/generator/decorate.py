@@ -12,12 +12,12 @@ from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
 from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
-LOW = 1.15  # height, m, up to which furniture has pictures above it
-BESIDE_TILES = 0.3  # distance from the tiles of a kitchen to a picture, m
-LAMPS_APART = 0.8  # least distance between lamps, m
-LARGE = 15.0  # area, m^2, from which a room looks bare without a large rug
-LONG = 2.0  # length, m, from which a stretch of wall looks bare with nothing on it
-MOST_HUNG = 4  # objects on the walls of a room; each picture has a texture of its own
+LOW = 1.15  # maximum height of furniture with pictures above it, in metres
+BESIDE_TILES = 0.3  # distance between kitchen tiles and a picture, in metres
+LAMPS_APART = 0.8  # minimum distance between lamps, in metres
+LARGE = 15.0  # floor area from which a room looks bare without a large rug, in m^2
+LONG = 2.0  # length from which a free stretch of wall looks bare, in metres
+MOST_HUNG = 4  # maximum per room, because each picture has its own texture
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -71,7 +71,7 @@ def _at_wall(space: Space, side: Side, along: float) -> PiecePose:
 
 
 def _tallest(space: Space, side: Side, start: float, end: float, deep: float) -> float:
-    """Height, m, of the tallest piece within `deep` of a stretch of a wall."""
+    """Height, in metres, of the tallest piece along a stretch of wall and within `deep` of it."""
     zone = space.room.floor.along(side, start, end, 0.0, deep)
     tops = [
         top
@@ -82,7 +82,7 @@ def _tallest(space: Space, side: Side, start: float, end: float, deep: float) ->
 
 
 def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng: np.random.Generator) -> None:
-    """Add a radiator, and curtains or a blind."""
+    """Add a radiator below a window, and curtains or a blind."""
     side, half = window.side, window.width / 2
     fit = (window.width, window.sill, window.top)
     low, high = space.room.floor.wall(side)
@@ -111,7 +111,7 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
 
 
 def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
-    """Hang a ceiling lamp, or two in a long room, away from lamps over tables."""
+    """Hang one ceiling lamp, or two in a long room, but not close to lamps that hang over tables."""
     floor = space.room.floor
     hanging = [
         moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
@@ -192,7 +192,8 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
         for side in (SIDES[i] for i in rng.permutation(4))
         for stretch in _stretches(space, side, *space.room.floor.wall(side))
     ]
-    found.sort(key=lambda stretch: stretch[2] - stretch[1] < LONG)  # long ones first, so that none stays bare
+    # Long stretches come first, so that none of them stays bare.
+    found.sort(key=lambda stretch: stretch[2] - stretch[1] < LONG)
     for side, start, end in found:
         if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
             continue

@@ -1,4 +1,4 @@
-"""Furniture and bins by the use of a room: required, default, and at most how much."""
+"""Required and default furniture by room use, limits for its amount, and bins with their rooms."""
 
 Options = tuple[str, ...]
 
@@ -11,7 +11,7 @@ REQUIRED: dict[str, tuple[Options, ...]] = {  # one kind of each tuple
 }
 PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
-# One kind of each tuple, with this probability, while there is space.
+# Each entry adds one of its kinds with the given probability, as long as the room has space.
 DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
     "bedroom": (
         (("chest_of_drawers", "dressing_table"), 1.0),
@@ -83,7 +83,7 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
 }
 FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")  # if nothing else fits
 MAX_PLANTS = 3  # per room
-ROUNDS = 3  # how often these lists are gone through
+ROUNDS = 3  # number of passes through these lists
 MAX_OF_KIND = {
     "armchair": 2,
     "bush": 2,
@@ -92,23 +92,23 @@ MAX_OF_KIND = {
     "sideboard": 2,
 }  # per room; 1 for others
 FURNISHED_SHARES = {"hall": (0.15, 0.25), "living_room": (0.31, 0.38), "studio": (0.33, 0.4)}  # of the floor
-# Uses of rooms for a kitchen, a table and a desk, the best first; "child" is the bedroom of a child.
+# Room uses for a kitchen, a table and a desk, in order of preference. "child" is a child's bedroom.
 COOKING: Options = ("kitchen", "living_room", "studio", "dining_room")
 DINING: Options = ("dining_room", "kitchen", "living_room", "studio")
 WORKING: Options = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
-BIN_SIZES = {  # width, depth and height, m, of bins that stand on the floor
+BIN_SIZES = {  # width, depth and height of floor-standing bins, in metres
     "recycling_bin": (0.48, 0.42, 0.5),
     "laundry_hamper": (0.51, 0.51, 0.55),
     "toy_box": (0.62, 0.47, 0.4),
     "bookshelf": (0.9, 0.34, 0.75),
 }
-BIN_ROOMS: dict[str, Options] = {  # uses of rooms, the best first
+BIN_ROOMS: dict[str, Options] = {  # room uses, in order of preference
     "recycling_bin": ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
     "laundry_hamper": ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio"),
     "toy_box": ("child", "bedroom", "living_room", "studio", "hall", "office", "dining_room"),
     "bookshelf": ("living_room", "studio", "office", "dining_room", "hall", "bedroom", "child"),
 }
-SHOWN_NAMES = {  # of kinds, where descriptions of places use another word
+SHOWN_NAMES = {  # names of kinds in descriptions of places, if they differ
     "lounge": "sofa",
     "dining": "dining table",
     "straight_kitchen": "kitchen counter",

@@ -13,17 +13,12 @@ from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 
-STYLE = "houses/apartment"  # its classes, materials, categories and objects are those of generated houses
-_ALWAYS = {
-    "white",
-    "ceiling",
-    "shadow_box",
-    "shadow_round",
-    "shadow_edge",
-}  # materials of classes and drawn shadows
-_SHADOWS = 15.0  # range of shadows, m; shorter ones are sharper but speckle round objects
-POINTS_PER_M2 = 0.32  # points for objects that fit into a furnished home, with a margin
-POINTS = (8, 40)  # least and most
+STYLE = "houses/apartment"  # generated houses use its classes, materials, categories and objects
+# Materials that the default classes and the drawn shadows need.
+_ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
+_SHADOWS = 15.0  # shadow range in metres; a shorter one is sharper but speckles round objects
+POINTS_PER_M2 = 0.32  # points at which objects may be dropped; fewer than fit into a furnished home
+POINTS = (8, 40)  # minimum and maximum
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -49,7 +44,7 @@ _HEAD = """\
 
 
 def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping[str, bytes]:
-    """The files of a house by path, including its recipe; the same bytes in every process.
+    """The files of a house by path, including its recipe. Every process generates the same bytes.
 
     Args:
         recipe: The house.

@@ -33,14 +33,12 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
-SIZES = 4  # how often a piece is made smaller to fit
+SIZES = 4  # number of sizes that are tried for a piece
 BARE = 0.285  # furnished share of the floor below which a home gets more furniture
 LEAST, MOST = 0.26, 0.44  # limits of the furnished share of the floor
-MAX_FAILURES = 4  # furniture that does not fit before a room is left as it is
-AWAY_FROM_DOORS = (
-    "wash_corner",
-    "kitchenette",
-)  # one has a screen that would hide a door, the other a cooker
+MAX_FAILURES = 4  # number of pieces that may fail to fit before a room is left as it is
+# The screen of a wash corner would hide a door, and the cooker of a kitchenette should not be next to one.
+AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 
 
@@ -65,7 +63,7 @@ class FurnishedHome:
         return "child" if is_child else room.use
 
     def rooms(self, uses: Iterable[str]) -> list[Space]:
-        """The rooms with one of some uses, in the order of the uses."""
+        """The rooms with one of these uses, in the order of the uses."""
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
@@ -146,7 +144,7 @@ class FurnishedHome:
             raise HouseError(f"only {self.seats} of {wanted} seats fit in seed {self.seed}")
 
     def _put_first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
-        """Put the first of some kinds that fits into the first room in which one fits."""
+        """Put a piece into the first room with space for one of these kinds. Prefer earlier kinds."""
         for space in self.rooms(uses):
             if any(self.put(space, kind) for kind in kinds):
                 return
@@ -175,7 +173,7 @@ class FurnishedHome:
                 self.put(space, "armchair")
 
     def add_default_furniture(self) -> None:
-        """Furnish rooms until enough of their floor is covered, and add more if the home is still bare."""
+        """Furnish each room until enough of its floor is covered. Add more if the home as a whole is still bare."""
         for space in self.spaces:
             self._put_defaults(space)
         for space in self.spaces:
@@ -209,7 +207,7 @@ class FurnishedHome:
                 failures += not self._put_one_more(space, order, number, again)
 
     def _put_one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
-        """Put the first of some kinds that fits and of which the room may have `more` than it has."""
+        """Put the first of these kinds that fits. `more` raises the number of a kind that a room may have."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
         if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MAX_PLANTS:
             return False
@@ -230,16 +228,16 @@ class FurnishedHome:
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
-    """Place furniture, decoration and bins in a plan, the same for the same arguments in any process.
+    """Place furniture, decoration and bins in a plan. The result depends only on the arguments.
 
     Args:
         plan: Rooms, doors and windows.
         bins: Receptacles of the apartment's catalogue.
         palette: The colours of the home.
-        seed: Seed of the random streams, of which each room and purpose has its own.
+        seed: Seed of the random streams. Each room and purpose has its own stream.
 
     Raises:
-        HouseError: Something that a home must have does not fit. Another plan may do.
+        HouseError: A required piece does not fit. Another plan may work.
     """
     return furnish_home(plan, bins, palette, seed).furnishing()
 

@@ -11,7 +11,7 @@ from mjsim.values.errors import HouseError
 
 ATTEMPTS = 40  # plans
 _BINS = ("dish_bin", "laundry_hamper")  # in every home
-_MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")  # one in a studio, more in larger homes
+_MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")  # a studio has only one of them
 
 
 def generate(seed: int, rooms: int) -> tuple[Recipe, Furnishing]:

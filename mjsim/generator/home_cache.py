@@ -86,7 +86,7 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 @functools.cache
 def _digest(models: Path) -> str:
-    """Digest of everything that homes depend on, except their names."""
+    """Digest of everything besides its name that determines a home: code, styles and library versions."""
     random_streams = Path(__file__).parents[1] / "house" / "catalogue" / "generated_names.py"
     style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
     code = digest_of(Path(__file__).parent, random_streams, *style)

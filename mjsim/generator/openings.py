@@ -22,17 +22,17 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 # Lengths in m.
-CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear width of doors, and of the front door
+CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear widths of doors and of the front door
 WIDE_CLEAR = (1.4, 1.6, 1.8)  # clear width of passages
-TOP, WIDE_TOP = 2.05, 2.2  # height of doors, and of passages
-JAMB = 0.12  # wall between an opening and a corner
+TOP, WIDE_TOP = 2.05, 2.2  # heights of doors and of passages
+JAMB = 0.12  # minimum length of wall between an opening and a corner
 LEAF_DEPTH = 0.06
-LEAST_GLASS = 1 / 10  # window area by floor area, in rooms that need daylight
+LEAST_GLASS = 1 / 10  # minimum ratio of window area to floor area in rooms that need daylight
 WINDOW_TOP = 2.2
-BESIDE_SHOWER = 1.85  # least length of a bathroom wall with a window and a shower beside it
+BESIDE_SHOWER = 1.85  # minimum length of a bathroom wall with a window next to a shower
 NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1
 SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # probabilities
-EXTRA_WAYS = (  # rooms that a further door may connect, which makes a loop
+EXTRA_WAYS = (  # pairs of rooms that an extra door may connect, which makes a loop
     ("kitchen", "living_room"),
     ("dining_room", "living_room"),
     ("dining_room", "kitchen"),
@@ -62,7 +62,7 @@ def add_openings(seed: int, programme: Programme, rooms: Sequence[Room], attempt
 
 
 def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
-    """The side of `a` that faces `b`, and the start and end of the wall that they share; None without one."""
+    """The side of `a` that faces `b`, and the start and end of their shared wall; None if they share none."""
     for side in SIDES:
         across = a.floor.along(side, *a.floor.wall(side), -2 * WALL, 0.0)
         if b.floor.overlaps(across) and not b.floor.overlaps(a.floor):
@@ -75,7 +75,7 @@ def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
 def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[float, float, bool]]:
     """Divide a wall of a room into stretches (start, end, is_outside), from corner to corner of the room's cell.
 
-    A cell is a floor with half of the inner walls around it. The cells of a home leave no gaps.
+    A cell is a room's floor together with half of the inner walls around it. The cells of a home leave no gaps.
     """
     start, end = (value + sign * WALL / 2 for value, sign in zip(room.floor.wall(side), (-1, 1), strict=True))
     cuts = []
@@ -107,7 +107,7 @@ def _extra_ways(programme: Programme, rooms: Sequence[Room], rng: np.random.Gene
 
 
 def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Generator) -> Door | None:
-    """A door that overlaps no other door and, if possible, is not close to one; None if there is none."""
+    """A door that overlaps no other door and, if possible, is not close to one. None if no door fits."""
     wall = shared_wall(a, b)
     if wall is None:
         return None
@@ -248,7 +248,7 @@ def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
 
 
 def _from_corner(floor: Rectangle, side: Side, corner: Side, width: float) -> Rectangle:
-    """The rectangle of a leaf along `side`, starting at the corner with the wall `corner`."""
+    """The rectangle of a leaf that stands along `side` and begins at its corner with the wall `corner`."""
     low, high = floor.wall(side)
     start = low + 0.03 if corner in ("south", "west") else high - 0.03 - width
     end = low + 0.03 + width if corner in ("south", "west") else high - 0.03

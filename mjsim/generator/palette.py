@@ -1,4 +1,4 @@
-"""Colours of a house: of its furniture, and of the walls and floors of each room."""
+"""Colours of a house's furniture, and of each room's walls and floor."""
 
 import colorsys
 from collections.abc import Iterator, Mapping
@@ -24,10 +24,8 @@ _PLANKS: tuple[Rgb, ...] = (
     (0.72, 0.66, 0.60),
     (0.76, 0.56, 0.38),
 )
-_GROUNDS: Mapping[str, Rgb] = {
-    "damask": (0.95, 0.95, 0.95),
-    "polka_dots": (0.98, 0.9, 0.72),
-}  # mean colours of wallpapers
+# Mean colours of wallpapers.
+_GROUNDS: Mapping[str, Rgb] = {"damask": (0.95, 0.95, 0.95), "polka_dots": (0.98, 0.9, 0.72)}
 _HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # of walls and cloth
 
 
@@ -54,7 +52,7 @@ def draw_palette(seed: int) -> Palette:
 
 
 def surfaces(seed: int, plan: HomePlan) -> list[str]:
-    """MJCF materials of a plan: facade, front door, and each room's floor and walls, with and without pattern."""
+    """MJCF materials of a plan's facade, front door, and each room's floor and walls, patterned and plain."""
     rng = stream(seed, "surfaces")
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]

@@ -1,7 +1,7 @@
 """Room layouts by a constraint solver: rectangles on a grid that cover a rectangular or L-shaped outline.
 
-There is no objective: any layout near the wanted areas is accepted, and variety comes from the programme. Solving time
-is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
+There is no objective: any layout close to the target areas is accepted, and variety comes from the programme. Solving
+time is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
 """
 
 import math
@@ -19,13 +19,10 @@ from mjsim.values.errors import HouseError
 
 GRID = 0.2  # m
 TRIES = 500  # programmes
-EFFORT = 0.025  # deterministic seconds for one programme; most layouts are found sooner
-SLACK, LARGE_SLACK = (
-    0.25,
-    0.45,
-)  # share by which an area may differ from the wanted one, in small and large homes
-LARGE = 9  # rooms from which a home is large
-VOID = 1.2  # least side of the corner that an L-shaped outline lacks, m
+EFFORT = 0.025  # limit of the solver's deterministic time per programme, in seconds
+SLACK, LARGE_SLACK = 0.25, 0.45  # relative tolerance of room areas in small and large homes
+LARGE = 9  # number of rooms from which a home is large
+VOID = 1.2  # minimum side of the corner cut out of an L-shaped outline, in metres
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ class _Box:
 
 
 def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tuple[Room, ...]]:
-    """Draw the programme and the rooms of a seed. Each `attempt` gives another layout.
+    """Draw a programme from a seed, and lay out its rooms. Each `attempt` gives a different layout.
 
     Raises:
         HouseError: No layout was found, or the number of rooms is out of range.
@@ -132,7 +129,7 @@ def _add_room(
 
 
 def _add_void(model: Any, rng: np.random.Generator, outline: tuple[int, int]) -> _Box:
-    """Add the corner that an L-shaped outline lacks."""
+    """Add the corner that is cut out of an L-shaped outline."""
     box = _add_box(model, round(VOID / GRID), outline)
     for axis, at_end in enumerate(rng.random(2) < 0.5):
         if at_end:

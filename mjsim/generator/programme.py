@@ -1,4 +1,4 @@
-"""The programme of a home: its rooms, their wanted areas, and which of them doors connect."""
+"""The programme of a home: its rooms, their target areas, and the doors between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ class RoomNeeds:
     """Requirements of a kind of room. The sources are in docs/generated-houses.md."""
 
     label: str
-    area: tuple[float, float]  # least and most, m^2
-    side: float  # shortest side, m
-    aspect: float  # greatest ratio of the sides
+    area: tuple[float, float]  # minimum and maximum, in m^2
+    side: float  # shortest side, in metres
+    aspect: float  # maximum ratio of the sides
     daylight: bool  # needs an outer wall with a window
 
 
@@ -58,7 +58,7 @@ _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
     ),
 }
 _CORE = ("hall", "living_room", "kitchen", "bedroom", "bathroom")
-# Further rooms of larger homes, and their weights in the draw.
+# Additional rooms of larger homes, with their relative probabilities.
 _MORE = {
     "bedroom_2": 3.0,
     "office": 2.0,
@@ -69,7 +69,7 @@ _MORE = {
 }
 _LIVELY = ("living_room", "studio", "hall")
 HALL_PER_DOOR = (1.2, 1.9)  # m^2
-DOOR, WIDE = 1.3, 2.0  # length of shared wall needed for a door and for an open passage, m
+DOOR, WIDE = 1.3, 2.0  # length of shared wall needed for a door and for an open passage, in metres
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Way:
 
     @property
     def wall(self) -> float:
-        """Least length of the wall that the rooms share, m."""
+        """Minimum length of the wall that the rooms share, in metres."""
         return WIDE if self.is_wide else DOOR
 
 
@@ -90,7 +90,7 @@ class Way:
 class Programme:
     """Requirements of a floor plan."""
 
-    areas: Mapping[str, float]  # wanted area by room key, m^2
+    areas: Mapping[str, float]  # target area by room key, in m^2
     ways: tuple[Way, ...]  # connect all rooms
     hub: str  # the room with the front door
 
@@ -101,7 +101,7 @@ def use_of(key: str) -> str:
 
 
 def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
-    """Draw rooms, areas and ways. Raise `HouseError` if the number of rooms is out of range."""
+    """Draw rooms, their areas, and doors between them. Raise `HouseError` if the number of rooms is out of range."""
     if not ROOMS[0] <= rooms <= ROOMS[1]:
         raise HouseError(f"a home of {rooms} rooms cannot be generated; ask for {ROOMS[0]} to {ROOMS[1]}")
     keys = _keys(rooms, rng)
@@ -113,7 +113,7 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
         areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
     hub = next(key for key in ("hall", *_LIVELY) if key in keys)
     ways = _ways(keys, hub, rng)
-    if hub == "hall":  # a hall is as large as its doors need
+    if hub == "hall":  # the size of a hall depends on its number of doors
         doors = sum("hall" in (way.a, way.b) for way in ways)
         areas[hub] = float(np.clip(rng.uniform(*HALL_PER_DOOR) * doors, *NEEDS[hub].area))
     return Programme(areas, tuple(ways), hub)
@@ -132,7 +132,7 @@ def _keys(rooms: int, rng: np.random.Generator) -> tuple[str, ...]:
 
 
 def _ways(keys: Sequence[str], hub: str, rng: np.random.Generator) -> list[Way]:
-    """A tree of ways, from the hub."""
+    """Connect all rooms in a tree with the hub as its root."""
     ways = []
     for key in keys:
         if key == hub:

@@ -13,7 +13,7 @@ RECIPE = "recipe.json"
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stored house. The floor plan is part of it because another solver may find another plan for the seed."""
+    """A stored house. It includes the floor plan, because another solver may find a different plan for the seed."""
 
     version: int
     seed: int

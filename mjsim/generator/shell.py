@@ -23,7 +23,7 @@ from mjsim.generator.values import (
 )
 
 HALF = WALL / 2
-TILED = NARROW_SILL  # height of tiles on walls, m
+TILED = NARROW_SILL  # height of tiles on walls, in metres
 _NORMAL = {"south": "y", "north": "y", "east": "x", "west": "x"}
 _SHADOW_TURN = {"south": 0.0, "north": math.pi, "west": -math.pi / 2, "east": math.pi / 2}
 
@@ -103,7 +103,7 @@ class _RoomShell:
             yield (0.0, CEILING_HEIGHT), f"{paper}_plain" if holes else paper
 
     def _extension(self, side: Side, end: float, sign: int) -> float:
-        """Length by which an outer wall extends beyond an end, at a corner of the house, m."""
+        """Length in metres by which an outer wall is extended to close a corner of the house; 0 at other ends."""
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]
@@ -148,7 +148,7 @@ class _RoomShell:
             yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
-        """Skirting, and the soft shadow at the foot of the wall."""
+        """Skirting board and soft shadow along the foot of the wall."""
         at, last = self._room.floor.wall(side)
         for hole in [*(hole for hole in holes if hole.bottom == 0), _Hole(last, last, 0, 0)]:
             start = at + 0.05 if at > self._room.floor.wall(side)[0] else at

@@ -1,4 +1,4 @@
-"""A room that is being furnished: poses of pieces at which doors, windows and ways stay free."""
+"""Search for poses of furniture in a room that keep doors, windows and walkways clear."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,27 +13,25 @@ from mjsim.generator.furniture.piece import Piece, Spot, moved
 from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
 # Lengths in m.
-BODY = 0.36  # radius of the body for which ways must be wide enough
-# Radii of people of different size, with the planner's clearance. Each of them gets to all floor that it fits on.
+BODY = 0.36  # radius of the body for which walkways must be wide enough
+# Radii of people of different sizes plus the planner's clearance. Each can reach all floor on which it fits.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
-POCKET = 0.005  # largest area of unreachable floor that is ignored, m^2
+POCKET = 0.005  # largest area of unreachable floor that is ignored, in m^2
 STEP = 0.1  # distance between the poses tried along a wall
-BESIDE = 0.6  # width beside a door that bins avoid if they can
-DOORWAY = 1.0  # depth of the floor in front of a door that stays free
-SNUG, APART = 0.09, 0.62  # gaps are at most, or at least, this wide, so that no person gets stuck in one
-BEFORE_LEAF = (
-    0.45  # depth of the free floor in front of a door leaf, so that it looks as if it could be closed
-)
+BESIDE = 0.6  # width beside a door that bins avoid if possible
+DOORWAY = 1.0  # depth of the floor that stays free in front of a door
+SNUG, APART = 0.09, 0.62  # gaps of a width in between, in which people get stuck, are avoided
+BEFORE_LEAF = 0.45  # depth of the floor that stays free in front of an open leaf, as if it could close
 WALL_GAP = 0.01  # gap behind furniture
-BEFORE_WINDOW = 0.6  # depth in which nothing is higher than the sill
-CURTAIN = 0.3  # width beside a window in which nothing is higher than the sill
-LEAVES = 0.1  # the same without curtains, because leaves of plants reach beyond their parts
+BEFORE_WINDOW = 0.6  # depth of the zone at a window in which nothing is higher than the sill
+CURTAIN = 0.3  # width of this zone on both sides of a window with curtains
+LEAVES = 0.1  # the same at a window with a blind, because leaves of plants reach beyond their parts
 BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms with blinds instead of curtains
-AROUND = 0.76  # free width around a free-standing piece
-NEAR = BODY + 0.15  # greatest distance from the middle of a body to a piece in use
+AROUND = 0.76  # width of the free floor around a free-standing piece
+NEAR = BODY + 0.15  # largest distance between the centre of a body and a piece in use
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
-TRIES = 14  # poses of a piece whose ways are checked
-_CELL, _FINE = 0.05, 0.0125  # cells of the grids for ways, and for unreachable floor
+TRIES = 14  # number of poses of a piece for which walkways are checked
+_CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids for walkways and for unreachable floor
 
 Floats = NDArray[np.float64]
 
@@ -42,11 +40,11 @@ Floats = NDArray[np.float64]
 class PiecePose:
     """Pose of a piece in the house."""
 
-    x: float  # of the piece's origin, m
+    x: float  # of the piece's origin, in metres
     y: float
     turns: int  # quarter turns
     side: Side | None  # the wall behind it
-    along: float = 0.0  # position of its middle along this wall, m
+    along: float = 0.0  # position of its middle along this wall, in metres
 
     @property
     def yaw(self) -> float:
@@ -55,26 +53,24 @@ class PiecePose:
 
 @dataclass
 class Space:
-    """A room with its pieces so far.
+    """A room with the pieces placed so far.
 
-    Rectangles are x0, y0, x1, y1; those of `solids` and `windows` have a height as their fifth number; all in m.
+    Rectangles are x0, y0, x1, y1, followed by a height in `solids` and `windows`. All are in metres.
     """
 
     room: Room
     rng: np.random.Generator
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    hit: list[Spot] = field(default_factory=list)  # what people bump into: below leaves, less than the solids
+    hit: list[Spot] = field(default_factory=list)  # what people bump into: solids without overhanging leaves
     keep: list[Spot] = field(default_factory=list)  # floor that stays free
-    use: list[Spot] = field(default_factory=list)  # floor that stays free and reachable
-    near: list[Spot] = field(default_factory=list)  # solids that people must get near to
-    corners: list[Spot] = field(
-        default_factory=list
-    )  # beside doors, where a person would reach around the frame
+    use: list[Spot] = field(default_factory=list)  # floor that must stay free and reachable
+    near: list[Spot] = field(default_factory=list)  # solids that people must be able to approach
+    corners: list[Spot] = field(default_factory=list)  # floor beside doors, which bins avoid if possible
     doors: list[tuple[float, float]] = field(default_factory=list)  # a point in front of each door
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, from, to, lowest point
+    hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, start, end, bottom
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
-    area: float = 0.0  # floor covered by furniture, m^2
+    area: float = 0.0  # floor covered by furniture, in m^2
 
     @classmethod
     def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
@@ -116,7 +112,7 @@ class Space:
     def put(
         self, piece: Piece, sides: Sequence[Side] = SIDES, avoid: Sequence[Spot] = ()
     ) -> PiecePose | None:
-        """Put a piece at the best pose on one of some sides and off `avoid`. Return None if there is none."""
+        """Put a piece at the best pose along one of some sides that keeps off `avoid`. Return None if there is none."""
         free = piece.stands == "free"
         places = self._free_poses() if free else self._wall_poses(piece, sides)
         if not len(places):
@@ -149,7 +145,7 @@ class Space:
         zones: Iterable[Spot],
         hit: Iterable[Spot],
     ) -> None:
-        """Record a piece that stands."""
+        """Record a piece that has been placed."""
         for spot, low, part in zip(spots, hit, piece.parts, strict=True):
             self.solids.append((*spot, part.top))
             self.hit.append(low)
@@ -201,7 +197,7 @@ class Space:
         return ok
 
     def _scores(self, boxes: Floats, free: bool) -> Floats:
-        """Scores (n,) of poses: for gaps that are snug or wide, for a central place if free-standing, and at random."""
+        """Score n poses: prefer snug or wide gaps, and the middle of the room for free-standing pieces. Add noise."""
         floor = self.room.floor
         score = 1.2 * self.rng.random(len(boxes))
         if len(boxes) == 0:
@@ -220,18 +216,18 @@ class Space:
         return np.asarray(score)
 
     def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
-        """True if a body gets from each door to all places of use, used pieces and free floor.
+        """True if a body can get from every door to all places of use, used pieces and free floor.
 
         Args:
-            spots: Rectangles of a further piece.
+            spots: Rectangles of an additional piece.
             zones: Its places of use.
-            near: Those of its rectangles that a person must get near to.
+            near: Those of its rectangles that a person must be able to approach.
         """
         floor, spots = self.room.floor, [*self.hit, *spots]
         _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
-        # Grown along one axis at a time, since a point off a corner would be farther away than NEAR.
+        # Grow spots along one axis at a time, because a point off a corner would be farther away than NEAR.
         targets += [(_grown(spot, NEAR, 0), _grown(spot, 0, NEAR)) for spot in (*self.near, *near)]
         common: set[int] | None = None
         for boxes in targets:

@@ -15,7 +15,7 @@ CEILING_HEIGHT = 2.6
 
 Side = Literal["south", "east", "north", "west"]
 SIDES: tuple[Side, ...] = ("south", "east", "north", "west")
-# Quarter turns of a piece with its back to this wall.
+# Quarter turns of a piece that stands with its back to the wall.
 BACK: Mapping[Side, int] = {"south": 0, "east": 1, "north": 2, "west": 3}
 Rgb = tuple[float, float, float]
 
@@ -50,7 +50,7 @@ class Rectangle:
         return Rectangle(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
 
     def overlaps(self, other: "Rectangle", slack: float = 1e-6) -> bool:
-        """True if the rectangles share more than a border."""
+        """True if the rectangles share an area, not just an edge."""
         return (
             self.x0 < other.x1 - slack
             and other.x0 < self.x1 - slack
@@ -67,7 +67,7 @@ class Rectangle:
         return (self.x0, self.x1) if side in ("south", "north") else (self.y0, self.y1)
 
     def along(self, side: Side, start: float, end: float, near: float, far: float) -> "Rectangle":
-        """The rectangle along a wall from `start` to `end` (see `wall`), at distances from `near` to `far`."""
+        """The rectangle from `start` to `end` along a wall (see `wall`), and from `near` to `far` away from it."""
         if side == "south":
             return Rectangle(start, self.y0 + near, end, self.y0 + far)
         if side == "north":
@@ -79,7 +79,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Room:
-    """A room with all of its floor, which is one rectangle.
+    """A room, whose floor is one rectangle.
 
     Keys are `hall`, `living_room`, `kitchen`, `dining_room`, `bedroom`, `bedroom_2`, `bedroom_3`, `bathroom`,
     `shower_room`, `office`, `utility` and `studio`. Uses are the keys without numbers.
@@ -124,7 +124,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Window:
-    """A window in an outer wall of a room; `center` as of a door. Furniture in front ends below the sill."""
+    """A window in an outer wall, with `center` as in `Door`. Furniture in front of it is lower than the sill."""
 
     room: str
     side: Side
@@ -162,7 +162,7 @@ class Asset:
     """A material or texture of a piece.
 
     Those of `models/houses/apartment/materials.xml` need no asset. Assets of the same name must have the same content,
-    so begin names with the kind's name, such as `rug_stripes_3f2a`.
+    so names should begin with the kind's name, such as `rug_stripes_3f2a`.
 
     Attributes:
         xml: One `<material .../>` or `<texture .../>`. A texture names a file of the package, or has an `image`.
@@ -187,23 +187,23 @@ class Palette:
 
 @dataclass(frozen=True)
 class Placement:
-    """A piece in a room: MJCF of its geoms in its own frame, and its pose."""
+    """A piece in a room: its pose, and the MJCF of its geoms in its own frame."""
 
     name: str  # the kind, such as "sofa"; bodies are named by room, kind and number
     room: str
     geoms: str
     position: tuple[float, float, float]
     quarter_turns: int
-    footprint: Rectangle | None  # in the house; None for pieces that hang or lie flat
+    footprint: Rectangle | None  # in the house's frame; None for pieces that hang or lie flat
     assets: tuple[Asset, ...] = ()
     turn: float = 0.0  # additional yaw, rad, such as of a chair beside a desk
 
 
 @dataclass(frozen=True)
 class BinPlacement:
-    """Pose of a bin, whose origin is the middle of its base and which is used from its local -y.
+    """Pose of a bin. Its origin is the middle of its base, and people use it from its local -y side.
 
-    The shell turns it by `quarter_turns` + 2, so that 0 has its back to the south wall, as for pieces.
+    The shell turns it by `quarter_turns` + 2, so that at 0 its back is to the south wall, as for pieces.
     """
 
     receptacle: str  # key in the catalogue

@@ -23,7 +23,7 @@ _MATERIAL = re.compile(r'material="([^"]+)"')
 
 @dataclass(frozen=True)
 class Appearance:
-    """Materials of a home's furniture. Pieces pick from these roles, in which frequent materials are repeated."""
+    """Materials of a home's furniture by role. Pieces draw from these tuples, which repeat common materials."""
 
     assets: dict[str, Asset]  # by material
     colours: tuple[Rgb, ...]  # for rugs and pictures
@@ -35,7 +35,7 @@ class Appearance:
     metals: tuple[str, ...] = ("metal_a", "metal_a", "chrome", "black")
 
     def assets_of(self, geoms: str) -> tuple[Asset, ...]:
-        """The assets of the materials that some geoms name. Materials of the apartment need none."""
+        """The assets of the materials that some geoms use. The apartment's own materials need none."""
         names = sorted(set(_MATERIAL.findall(geoms)))
         return tuple(self.assets[name] for name in names if name in self.assets)
 
@@ -82,7 +82,7 @@ def draw_appearance(palette: Palette, rng: np.random.Generator) -> Appearance:
 
 
 def _muted(rgb: Rgb) -> Rgb:
-    """A less saturated and darker colour, above all of greens and purples, which are rarely vivid in homes."""
+    """Mute a colour. Greens and purples are muted most, because they are rarely vivid in homes."""
     hue, saturation, value = colorsys.rgb_to_hsv(*rgb)
     loud = 0.19 < hue < 0.48 or 0.7 < hue < 0.9
     return colorsys.hsv_to_rgb(hue, saturation * (0.55 if loud else 0.9), value * (0.85 if loud else 1.0))

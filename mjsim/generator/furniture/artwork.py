@@ -26,7 +26,7 @@ def painting(rng: np.random.Generator, look: Appearance, wide: int = 128, high: 
 
 
 def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) -> DrawnTexture:
-    """Draw the pattern of a rug, in one of six styles, or in rings for a round one."""
+    """Draw the pattern of a rug in one of six styles, or in rings if the rug is round."""
     n = 128
     y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
     ground, one, two, three = _palette(rng, look, 4)

@@ -12,14 +12,14 @@ from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Spot
 Span = tuple[float, float]
 Point = tuple[float, float, float]
 T = TypeVar("T")
-PANEL = 0.016  # thickness of doors and drawers, m
-GAP = 0.008  # gap between doors or drawers, m
+PANEL = 0.016  # thickness of doors and drawers, in metres
+GAP = 0.008  # gap between doors or drawers, in metres
 _THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
 FACING = 'xyaxes="-1 0 0 0 0 1"'  # turns an image to be seen from +y
 
 
 def numbers(*values: float) -> str:
-    """Format numbers for MJCF, to a tenth of a millimetre."""
+    """Format numbers for MJCF with at most four decimals."""
     return " ".join(f"{round(float(v), 4) + 0.0:g}" for v in values)
 
 
@@ -31,8 +31,8 @@ def _extent(w: float, y: Span, z: Span, x: float) -> str:
 class Builder:
     """Collects the geoms of a piece in its own frame.
 
-    In all methods `w` is a full width along x and `x` its middle, `y` and `z` are intervals; all in m. Geoms with
-    `seen` are drawn and do not collide. Those of `guard` collide and are not drawn.
+    In all methods `w` is a full width along x and `x` is its middle; `y` and `z` are intervals. All are in metres.
+    Geoms with `seen` are drawn and do not collide. Those of `guard` collide and are not drawn.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Builder:
         return options[int(self.rng.integers(len(options)))]
 
     def size(self, low: float, high: float, step: float = 0.05) -> float:
-        """Draw a length, m, from `low` to `high` in steps, nearer to `low` the smaller the piece has to be."""
+        """Draw a length in metres from `low` to `high` in steps. A smaller piece has a lower maximum."""
         count = round((high - low) / step)
         drawn = int(self.rng.integers(count + 1))
         return round(low + step * max(0, min(drawn, round(count * (1 - 0.5 * self.smaller)))), 4)
@@ -86,18 +86,18 @@ class Builder:
         self.add("ellipsoid", material, True, f'pos="{numbers(*at)}" size="{numbers(*half)}"{euler}')
 
     def disc(self, material: str, x: float, y: float, z: float, radius: float, thick: float = 0.012) -> None:
-        """Add a disc that faces the room, with its middle at `y`."""
+        """Add a disc that faces the room, centred at depth `y`."""
         size = numbers(radius, thick / 2)
         self.add("cylinder", material, True, f'pos="{numbers(x, y, z)}" size="{size}" euler="1.5708 0 0"')
 
     def image(self, material: str, w: float, z: Span, y: float, x: float = 0.0, thick: float = 0.008) -> None:
-        """Add a panel that shows an image to the room, with its front at `y`."""
+        """Add a panel that shows an image to the room. Its front is at depth `y`."""
         middle = numbers(x, y - thick / 2, sum(z) / 2)
         half = numbers(w / 2, (z[1] - z[0]) / 2, thick / 2)
         self.add("box", material, True, f'pos="{middle}" size="{half}" {FACING}')
 
     def shadow(self, w: float, y: Span, x: float = 0.0, *, round_one: bool = False) -> None:
-        """Add a contact shadow around a footprint. Heights differ, so that overlapping shadows do not flicker."""
+        """Add a contact shadow around a footprint. Its height varies so that overlapping shadows do not flicker."""
         height = 0.0038 + 0.0001 * int(self.rng.integers(12))
         material = ' material="shadow_round"' if round_one else ""
         half = numbers(w / 2 + 0.1, (y[1] - y[0]) / 2 + 0.09, 0.1)
@@ -162,7 +162,7 @@ class Builder:
     def clutter(
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
-        """Add small objects on a surface at height `z`. With `low` they end 0.13 m above it."""
+        """Add small objects on a surface at height `z`. With `low`, none is taller than 0.13 m."""
         things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
@@ -208,7 +208,7 @@ class Builder:
         self.post("shade", x, y, (z + 0.2, z + 0.37), self.pick(0.1, 0.12))
 
     def pillow(self, material: str, at: Point, half: Point, tilt: float = 0.0) -> None:
-        """Add a cushion: an ellipsoid with a box inside, so that it looks square."""
+        """Add a cushion: an ellipsoid around a box, which makes it look square."""
         self.soft(material, at, half, (tilt, 0.0, 0.0))
         euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
         core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
@@ -220,7 +220,7 @@ class Builder:
         return picture.name
 
     def on_ceiling(self) -> None:
-        """Mark the geoms so far as hanging from the ceiling, which views from above leave out."""
+        """Mark the geoms added so far as hanging from the ceiling. Top-down views omit them."""
         self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
 
     def piece(
@@ -232,13 +232,13 @@ class Builder:
         stem: float = 0.0,
         **more: Any,
     ) -> Piece:
-        """The piece with the geoms so far.
+        """The piece with the geoms added so far.
 
         Args:
-            size: Width along the wall, depth into the room, height, m.
-            use: Depth, m, of the free floor needed in front of it, or rectangles of it, each (x0, y0, x1, y1).
-            parts: Obstacles, each (x0, y0, x1, y1, height), m; the whole size by default.
-            stem: Half the width, m, of what people bump into, if it is narrower than the parts.
+            size: Width along the wall, depth into the room, and height, in metres.
+            use: Depth, in metres, of the free floor needed in front of it, or that floor's rectangles (x0, y0, x1, y1).
+            parts: Obstacles (x0, y0, x1, y1, height), in metres; one of the whole size by default.
+            stem: Half the width, in metres, of a pot or stand below wider parts. People bump into nothing else.
             more: Other fields of `Piece`.
         """
         w, d, h = (float(v) for v in size)
@@ -260,7 +260,7 @@ class Builder:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of furniture, of which every random generator makes a different piece."""
+    """A kind of furniture. Each random generator makes a different piece of it."""
 
     name: str
     draw: Callable[[Builder], Piece]
@@ -273,7 +273,7 @@ class Kind:
         Args:
             rng: Draws size, materials and form.
             look: Materials of the home.
-            smaller: 0 for a piece as large as drawn; 1, 2, ... for ever smaller ones.
-            fit: Width, lower and upper end, m, of what it has to fit, such as a window; None for any.
+            smaller: 0 for a piece as large as drawn; 1, 2, ... for smaller and smaller ones.
+            fit: Width, lower and upper end, in metres, of a window or the like that it has to fit, if any.
         """
         return self.draw(Builder(self.name, rng, look, smaller, fit))

@@ -113,7 +113,7 @@ def _window(b: Builder) -> tuple[float, float, float]:
 
 
 def curtains(b: Builder) -> Piece:
-    """Curtains beside a window, to the floor, or to below the sill if `smaller`."""
+    """Curtains on both sides of a window, down to the floor, or to just below the sill if `smaller`."""
     w, low, high = _window(b)
     long = b.smaller == 0
     side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING_HEIGHT - 0.05)

@@ -1,4 +1,4 @@
-"""Kitchens: runs of modules of 0.6 m, straight or around a corner, and single pieces."""
+"""Kitchens of 0.6 m wide modules, straight or around a corner, and single pieces of kitchen furniture."""
 
 import math
 
@@ -10,12 +10,12 @@ WIDE = 0.6  # width of a module
 SIZES = 4  # number of kitchen sizes
 DEEP = 0.62  # depth of the worktop
 TOP = 0.9  # height of the worktop
-ON_TOP = 1.09  # height of objects on the worktop, a little below the sills of kitchens
+ON_TOP = 1.09  # highest point of objects on the worktop, a little below kitchen window sills
 TALL = 2.05  # height of fridges and tall ovens
 LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets; the dish rack needs 0.3 m of air above its bin
-HOOD = 2.5  # top of the pipe of a cooker hood
-FRONT = 0.57  # depth at which fronts begin
-GAP = 0.012  # between the doors of a fridge
+HOOD = 2.5  # top of a cooker hood's duct
+FRONT = 0.57  # distance of cabinet fronts from the wall
+GAP = 0.012  # gap between the doors of a fridge
 
 
 class KitchenRun:
@@ -34,7 +34,7 @@ class KitchenRun:
             top = getattr(self, f"_{name}")(x)
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
-            if name not in ("fridge", "tall_oven"):  # low if a window may be above
+            if name not in ("fridge", "tall_oven"):  # tiles stay low where a window may be above
                 self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > LOW else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
@@ -156,7 +156,7 @@ class KitchenRun:
         return TALL
 
 
-_STRAIGHT = (  # modules by size, the largest first
+_STRAIGHT = (  # alternative runs of modules for each kitchen size, the largest size first
     (
         "fridge drawers sink rack cooker doors dishwasher",
         "tall_oven doors cooker drawers rack sink fridge",
@@ -180,9 +180,9 @@ def straight_kitchen(b: Builder) -> Piece:
 
 
 def _size(b: Builder) -> int:
-    """The size of a kitchen, 0 being the largest.
+    """The size number of a kitchen, 0 for the largest.
 
-    If no size fits with wall cabinets, the two smallest are tried without, the larger first.
+    If no size fits with wall cabinets, the two smallest sizes are tried without them, the larger one first.
     """
     return b.smaller if b.smaller < SIZES else b.smaller - 2
 
@@ -202,7 +202,7 @@ def corner_kitchen(b: Builder) -> Piece:
     other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if size < 2 else ("cooker",)
     if size == 3:
         other = ("rack", "cooker")
-    # A closed module in the corner, which both runs touch.
+    # The two runs meet at a closed module in the corner.
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
     run = KitchenRun(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
     leg = KitchenRun(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)

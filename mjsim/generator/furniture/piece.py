@@ -1,6 +1,6 @@
 """Pieces of furniture, and groups of pieces.
 
-The origin of a piece is on the floor in the middle of its back edge; +y points into the room, z up; in m.
+The origin of a piece is on the floor in the middle of its back edge; +y points into the room, +z up. Units are metres.
 """
 
 import math
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 from mjsim.generator.values import Asset
 
-Spot = tuple[float, float, float, float]  # a rectangle on the floor: x0, y0, x1, y1, m
+Spot = tuple[float, float, float, float]  # a rectangle on the floor: x0, y0, x1, y1, in metres
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A rectangle of the floor on or over which a piece stands, and its height there."""
+    """A rectangle of floor that a piece covers or overhangs, and the height of the piece there."""
 
     spot: Spot
     top: float  # m
-    # Half the width, m, of what people bump into, if leaves or a shade reach farther; 0 for the whole rectangle.
+    # Half the width, in metres, of the pot or stand below leaves or a lampshade; 0 if people bump into the whole spot.
     stem: float = 0.0
 
     @property
@@ -32,9 +32,9 @@ class Obstacle:
 class Mount:
     """A place for a bin on a piece."""
 
-    receptacle: str  # key of the bin, such as "dish_bin"
-    position: tuple[float, float, float]  # middle of the bin's base, m
-    yaw: float = math.pi  # yaw of the bin, whose front is its local -y
+    receptacle: str  # catalogue key of the bin, such as "dish_bin"
+    position: tuple[float, float, float]  # middle of the bin's base, in metres
+    yaw: float = math.pi  # of the bin, in radians; its front is its local -y side
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Piece:
     """A piece of furniture, or a group that belongs together."""
 
     kind: str
-    size: tuple[float, float, float]  # width along the wall, depth into the room, height, m
+    size: tuple[float, float, float]  # width along the wall, depth into the room, height, in metres
     geoms: str  # MJCF elements in the frame of the piece
     parts: tuple[Obstacle, ...]
     use: tuple[Spot, ...] = ()  # floor on which people stand to use it; it stays free and reachable
@@ -66,7 +66,7 @@ class Piece:
     seats: int = 0
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
-    members: tuple["Member", ...] = ()  # a group has members and no geoms of its own
+    members: tuple["Member", ...] = ()  # for a group, which has no geoms of its own
 
 
 Member = tuple[Piece, float, float, float]  # a piece and its pose in the group: x, y, m, and yaw

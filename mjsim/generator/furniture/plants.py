@@ -24,8 +24,8 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
 
 
 def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
-    """A plant whose leaves reach `wide` around the middle of its pot, at y = wide. People bump only into the pot."""
-    reach = max(r, 0.8 * wide)  # neighbouring pieces stay out of the leaves
+    """A plant whose leaves reach `wide` from its pot, which is centred at y = wide. People bump only into the pot."""
+    reach = max(r, 0.8 * wide)  # keeps neighbouring pieces out of the leaves
     return b.piece(
         (2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),), stem=r
     )

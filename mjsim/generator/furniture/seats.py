@@ -86,7 +86,7 @@ def armchair(b: Builder) -> Piece:
     form = b.pick("box", "round", "thin", "shell", "none")
     back = b.pick(0.78, 0.88, 1.0)
     b.shadow(w, (0, d), round_one=form == "shell")
-    if form == "shell":  # a round seat within a wall of upright rolls
+    if form == "shell":  # a round seat with a back made of upright rolls
         r = min(w, d) / 2 - 0.02
         b.post(b.cloth, 0, d / 2, (0.14, 0.3), r, seen=False)
         for i in range(11):

@@ -1,4 +1,4 @@
-"""Tables and desks, and groups of them with seats."""
+"""Tables and desks, single or grouped with seats."""
 
 import math
 
@@ -79,7 +79,7 @@ def dining(b: Builder) -> Piece:
     made = Builder(name, b.rng, b.look, b.smaller)
     base = table(made) if name == "table" else round_table(made)
     w, d, _ = base.size
-    state = int(b.rng.integers(2**31))  # the same for all chairs, so that they are alike
+    state = int(b.rng.integers(2**31))  # the same for all chairs, so that they look alike
 
     def chair() -> Piece:
         return seats.dining_chair(
@@ -170,7 +170,7 @@ def _screen(b: Builder, x: float) -> None:
 
 
 def _desk(b: Builder) -> Piece:
-    """A desk with a place for the box of office supplies at the right of the person who sits at it."""
+    """A desk with a place for the office supplies box to the right of a person who sits at it."""
     w, d, h = (b.pick(1.4, 1.5, 1.6), b.pick(1.2, 1.3), 1.0)[min(b.smaller, 2)], b.pick(0.6, 0.66), 0.75
     form, side = b.pick("panels", "pedestal", "legs"), -1
     b.shadow(w, (0, d))
