@@ -11,7 +11,7 @@ EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "P
 
 
 def require_extra() -> None:
-    """Raise `AssetError` unless all libraries of the extra are installed. Some would fail only late, inside trimesh."""
+    """Raise `AssetError` if a library of the extra is missing. Otherwise, some would fail only late, inside trimesh."""
     if missing := [name for name in EXTRA if find_spec(name) is None]:
         raise AssetError(
             f"importing needs {', '.join(missing)}: pip install 'mjsim[import]' adds what is missing"

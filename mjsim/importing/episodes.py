@@ -21,9 +21,7 @@ import numpy as np
 from mjsim.support.files import MAX_INPUT, read_bytes
 from mjsim.values.errors import EpisodeError, brief
 
-MOVED = (
-    0.05  # distance from which an object counts as moved, m; RoomR's poses vary by less between simulations
-)
+MOVED = 0.05  # distance above which an object counts as moved, m; RoomR's poses vary by less between runs
 HOUSE = 60.0  # largest plausible distance, m; objects that fell out of the scene are farther away
 IN_PLACE, MISPLACED, OPENED = "in place", "misplaced", "opened"
 

@@ -16,14 +16,14 @@ from mjsim.importing.house.floor_grid import BODY, CELL, FloorGrid, Mask, cleara
 from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
-AREA = 5.0  # walkable floor for each bin, m^2
-_STAND = 0.8  # depth of free floor in front of a bin, m
-_ASIDE = 0.05  # free width at the sides, m
-_WALL = 0.15  # greatest distance to the wall behind, m
-_WIDE = 0.4  # radius for which ways must stay connected, m
-_TRIES = 300  # poses that are tried for a bin in each room
-_LOST = 1.0  # walkable floor that may be lost in addition to the bin and its surroundings, m^2
-# Bins by importance, with the rooms where people would look for them.
+AREA = 5.0  # walkable floor per bin, in m^2
+_STAND = 0.8  # depth of free floor in front of a bin, in metres
+_ASIDE = 0.05  # free width at the sides, in metres
+_WALL = 0.15  # maximum distance to the wall behind, in metres
+_WIDE = 0.4  # body radius for which the floor must stay connected, in metres
+_TRIES = 300  # maximum number of poses tried for a bin in each room
+_LOST = 1.0  # walkable floor that may be lost beyond the bin and its surroundings, in m^2
+# Bins, the most important first, and the kinds of room in which people would look for them.
 _HOMES = {
     "dish_bin": ("kitchen", "living_kitchen", "dining_room"),
     "toy_box": ("bedroom", "living_room"),
@@ -32,7 +32,7 @@ _HOMES = {
     "office_box": ("office", "bedroom", "living_room"),
     "bookshelf": ("living_room", "living_kitchen", "office"),
 }
-# Yaw, and the resulting direction of the back.
+# Yaw of a bin, and the direction in which its back then faces.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
 
 
@@ -82,7 +82,7 @@ def _placed(
 ) -> tuple[Bin, FloorGrid] | None:
     """Place a bin. Return it with the new grid, or None if it does not fit.
 
-    It is put into a room where people would look for it, or else into a room with few bins.
+    Prefer a room where people would look for it, then a room with few bins.
     """
     numbers = list(range(1, len(rooms.names) + 1))
     homes = _HOMES[key]
@@ -116,7 +116,7 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
     """Poses in a room with the back to a wall, in random order."""
     free = grid.free & room
     standing = grid.walkable & room
-    walls = (grid.walls & ~grid.doors) | ~grid.indoors  # outside is closed by the shell
+    walls = (grid.walls & ~grid.doors) | ~grid.indoors  # the shell closes off the outside
     ahead = round(_STAND / CELL)
     found: list[_Choice] = []
     for yaw, back in _TURNS:
@@ -126,7 +126,7 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
         before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
         behind = np.zeros_like(walls)
         for step in range(1, round(_WALL / CELL) + 1):
-            behind |= _shifted(walls, back, step)  # cells with a wall that close behind them
+            behind |= _shifted(walls, back, step)  # cells with a wall at most _WALL behind them
         fits = _all(free, spans) & _all(behind, edge) & _all(free, before) & (_count(standing, before) > 0)
         found += [
             _Choice(_at(spans, place), _at(before, place), yaw, back) for place in np.argwhere(fits).tolist()
@@ -136,19 +136,19 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
 
 
 def _last(span: Span, way: int) -> Span:
-    """The last cell of a span in direction `way` (1 or -1); the whole span for 0."""
+    """The last cell of a span in direction `way` (1 or -1). If `way` is 0, the whole span."""
     start, stop = span
     return {1: (stop - 1, stop), 0: span, -1: (start, start + 1)}[way]
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """A number of cells beyond a span in direction `way` (1 or -1); the span itself for 0."""
+    """The first `cells` cells beyond a span in direction `way` (1 or -1). If `way` is 0, the span itself."""
     start, stop = span
     return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
 
 
 def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
-    """Spans relative to `place` as slices of the grid."""
+    """Convert spans relative to `place` into slices of the grid."""
     x, y = (slice(at + start, at + stop) for at, (start, stop) in zip(place, spans, strict=True))
     return x, y
 
@@ -170,7 +170,7 @@ def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> Fl
 
 
 def _parts(grid: FloorGrid, radius: float) -> int:
-    """Number of connected parts of the floor above 0.2 m^2, for a body of a radius, m."""
+    """Number of connected parts of the floor above 0.2 m^2 for a body with this radius, in metres."""
     parts, _ = label(clearance(grid.free) > radius)
     return int((np.bincount(parts.ravel())[1:] * CELL**2 > 0.2).sum())
 
@@ -189,7 +189,7 @@ def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """For each cell, the number of cells of a mask within two spans relative to it."""
+    """For each cell, count the cells of `mask` in the rectangle that two spans describe relative to it."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]
@@ -199,11 +199,11 @@ def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
 
 
 def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
-    """Cells for which all cells within two spans relative to them are in a mask."""
+    """Cells for which `mask` is true in the whole rectangle that two spans describe relative to them."""
     (a, b), (c, d) = spans
     return np.asarray(_count(mask, spans) == (b - a) * (d - c))
 
 
 def _shifted(mask: Mask, by: tuple[int, int], steps: int) -> Mask:
-    """Cells whose neighbour a number of steps away is in a mask."""
+    """Cells whose neighbour `steps` cells away in direction `by` is in `mask`."""
     return np.roll(mask, (-by[0] * steps, -by[1] * steps), (0, 1))

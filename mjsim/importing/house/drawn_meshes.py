@@ -15,10 +15,10 @@ from mjsim.importing.object.closed_body import is_closed
 from mjsim.importing.object.visual_mesh import VisualMesh, corner_normals
 
 BUDGET = 150_000  # triangles of a house
-_LEAST = 100  # triangles that every mesh keeps
+_LEAST = 100  # simplification stops at this number of triangles per mesh
 _LEAST_VERTICES = 4  # required by MuJoCo
-_SMALL, _FEW = 0.3, 1000  # size of small things, m, and triangles that they keep
-CEILING = 2.2  # height above which geoms are omitted from views from above, m
+_SMALL, _FEW = 0.3, 1000  # size of small things in metres, and their limit of triangles
+CEILING = 2.2  # height above which geoms are omitted from views from above, in metres
 _SAME = 8  # of 255; colours that differ by less are merged
 
 
@@ -28,7 +28,7 @@ class DrawnMesh:
 
     name: str  # name of its piece
     visual: VisualMesh
-    high: bool  # above `CEILING` and not a wall
+    high: bool  # above `CEILING` and over a room, so that top-down views omit it
 
 
 def make_drawn_meshes(
@@ -36,7 +36,7 @@ def make_drawn_meshes(
 ) -> tuple[DrawnMesh, ...]:
     """Meshes of all visible pieces.
 
-    `over_floor` returns which points (k, 2), m, are over rooms and not over walls.
+    `over_floor` returns a mask of the points (k, 2), in metres, that are over rooms and not over walls.
     """
     parts = []
     for name, surface in _by_name(pieces):
@@ -57,7 +57,7 @@ def make_drawn_meshes(
 
 
 def _over(surface: Surface, over_floor: Callable[[Floats], Mask]) -> Mask:
-    """Mask (n,) of the triangles that are over a room at their centre or halfway to a corner."""
+    """Mask (n,) of the triangles whose centre, or a point halfway from it to a corner, is over a room."""
     middle = surface.corners.mean(axis=1)[:, :2]
     halfway = (middle[:, None] + surface.corners[:, :, :2]) / 2
     return np.asarray(over_floor(middle) | over_floor(halfway.reshape(-1, 2)).reshape(-1, 3).any(axis=1))
@@ -69,7 +69,7 @@ def picture_key(mesh: VisualMesh) -> str:
 
 
 def _by_name(pieces: Iterable[ScenePiece]) -> Iterator[tuple[str, Surface]]:
-    """All visible surfaces of each name, joined."""
+    """Yield each name with all visible surfaces of this name joined into one."""
     groups: dict[str, list[Surface]] = {}
     for piece in pieces:
         if piece.seen:
@@ -79,7 +79,7 @@ def _by_name(pieces: Iterable[ScenePiece]) -> Iterator[tuple[str, Surface]]:
 
 
 def _by_material(surface: Surface) -> Iterator[Surface]:
-    """Parts of one image, or of one colour."""
+    """Split a surface into parts, each with one image and one colour."""
     colours = np.round(surface.colours.mean(axis=1) * 255 / _SAME).astype(int)
     keys = np.column_stack((surface.image, colours))
     kinds, number = np.unique(keys, axis=0, return_inverse=True)

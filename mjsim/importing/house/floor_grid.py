@@ -15,17 +15,15 @@ from mjsim.importing.house.solids import Solid
 from mjsim.values.errors import AssetError
 
 CELL = 0.05  # m
-BODY = 0.27  # radius of a person, with a margin, m
-_MAX_AREA = 1500.0  # largest walkable area, m^2
-_BAND = (0.05, 1.8)  # heights at which a person bumps into things, m
-_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # a wall has something at all these heights, m
-_GAP = 0.6  # half width of openings in the outer wall that count as closed, m
-_PAD = 2 * _GAP + 0.3  # margin of the grid, m
-_DRAWN = 10.0  # weight of cells with a drawn floor
-_LEAST_SHARE = (
-    0.15  # of the whole floor; a smaller enclosed area is a closet of a house that is open elsewhere
-)
-_MIN_AREA = 3.0  # least area enclosed by the walls of a house, m^2
+BODY = 0.27  # radius of a person, with a margin, in metres
+_MAX_AREA = 1500.0  # largest walkable area, in m^2
+_BAND = (0.05, 1.8)  # heights at which a person bumps into things, in metres
+_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # in metres; a wall is solid in all of these ranges
+_GAP = 0.6  # half width up to which openings in outer walls count as closed, in metres
+_PAD = 2 * _GAP + 0.3  # margin of the grid, in metres
+_DRAWN = 10.0  # additional weight of cells with a drawn floor
+_LEAST_SHARE = 0.15  # walls that enclose less of the floor are a closet in an otherwise open house
+_MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in m^2
 
 Mask = NDArray[np.bool_]
 
@@ -40,7 +38,7 @@ class FloorGrid:
     doors: Mask  # open doors
     indoors: Mask  # enclosed by the outer walls, including these
     floor: Mask  # floor drawn by the source
-    enclosed: bool  # False if no outer walls enclose a floor, so that `indoors` is a rectangle
+    enclosed: bool  # False if no outer walls enclose a floor; `indoors` is then a rectangle
 
     @cached_property
     def free(self) -> Mask:
@@ -53,7 +51,7 @@ class FloorGrid:
 
     @cached_property
     def walkable(self) -> Mask:
-        """Cells where a person's middle can be: the largest connected part, above all of those with a drawn floor."""
+        """Cells where a person's centre can be: the largest connected part. Cells with a drawn floor count most."""
         parts, count = label(self.clearance > BODY)
         if not count:
             return np.zeros_like(self.free)
@@ -104,7 +102,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
     standing = _box(shape, origin, solids)  # a ground plane reaches far beyond the house
-    for count in (len(_WALL), len(_WALL) - 1):  # walls up to eye level, or else lower ones
+    for count in (len(_WALL), len(_WALL) - 1):  # first with walls up to eye level, then with lower ones
         walls = np.logical_and.reduce(levels[:count]) | shut
         # Low parts count as closed, too, because of windows with sills.
         indoors = _enclosed(walls | levels[0])
@@ -115,7 +113,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
             break
     else:
         grid = whole
-    if not grid.walls.any():  # none is that high, so use everything that people bump into
+    if not grid.walls.any():  # no wall is that high, so use everything that people bump into
         grid = replace(grid, walls=levels[0] | shut)
     if grid.area > _MAX_AREA:
         raise AssetError(

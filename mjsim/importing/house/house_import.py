@@ -46,9 +46,9 @@ from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError
 
 REPORT, PICTURE = "report.json", "preview.png"
-_FLOOR_SEEN = 0.8  # share of the floor drawn by the source from which no other floor is added
-_FEW = 4  # least number of obstacles in a house without walls
-_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # greatest thickness, and ranges of width and height of a door leaf, m
+_FLOOR_SEEN = 0.8  # if the source draws at least this share of the floor, none is added
+_FEW = 4  # minimum number of obstacles in a house without walls
+_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # of a door leaf: maximum thickness, ranges of width and height
 
 
 def import_house(
@@ -78,7 +78,7 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
-        if fits < POINTS:  # a little fewer than fit, since other samples pack them less densely
+        if fits < POINTS:  # use fewer than fit, because other samples pack them less densely
             points = max(fits - 2, 1)
             set_points(path, points)
             report = check_house_name(str(path))
@@ -102,7 +102,7 @@ def _without(scene: SourceScene) -> str:
 
 
 def _refusal(found: Sequence[Finding]) -> str:
-    """Message about the first error in a house made of a scene, without file names."""
+    """Message about the first error in an imported house, without file names."""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     subject = "" if found[0].subject == "house" else f"{found[0].subject} "
     return f"the house made of it cannot be used: {subject}{found[0].message}{more}; correct the source"
@@ -238,7 +238,7 @@ def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
 
 
 def _floor(pieces: Sequence[ScenePiece]) -> Floats:
-    """Triangles at floor height, from above, m, (n, 3, 2)."""
+    """Horizontal corners (n, 3, 2), in metres, of the triangles at floor height."""
     found = [
         p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces if p.seen
     ]

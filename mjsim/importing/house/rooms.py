@@ -19,20 +19,15 @@ from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
-_NARROW = (
-    0.65,
-    0.9,
-    1.2,
-    1.5,
-    1.8,
-)  # half width of passages that separate rooms, m; wider ones only for halls
-_HALL = 45.0  # floor area from which a room is divided at wider passages, m^2
-_HALL_PART = 5.0  # least area of such a part, m^2
-_MIN_AREA = 1.5  # least floor area of a room, m^2; smaller ones are merged with their neighbours
-_MIN_WALK = 0.5  # least walkable area of a room, m^2
-_COARSE = 2  # cells along each side of a block, in which rectangles of rooms are measured
-_LARGE = 0.5  # least size of furniture that determines the use of a room, m
-# Key, label, and words in names of furniture, of which a room needs one from each group. The first match counts.
+# Half widths, in metres, of passages that separate rooms. All except the first are only for halls.
+_NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)
+_HALL = 45.0  # floor area above which a room is divided at wider passages, in m^2
+_HALL_PART = 5.0  # such a room is divided only if at least two parts are larger, in m^2
+_MIN_AREA = 1.5  # minimum floor area of a room, m^2; smaller ones are merged with their neighbours
+_MIN_WALK = 0.5  # minimum walkable area of a room, in m^2
+_COARSE = 2  # side, in cells, of the blocks that make up a room's rectangles
+_LARGE = 0.5  # minimum size of furniture that determines a room's use, in metres
+# Key, label and groups of words. A room gets the first use of which every group has a word in its furniture's names.
 _USES = (
     ("living_kitchen", "Living room with kitchen", ("kitchen fridge refrigerator", "sofa couch")),
     (
@@ -128,7 +123,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
     ]
     if not kept and given:
         raise AssetError("no given room has walkable floor; boxes are in the source's coordinates, in m")
-    if not kept:  # no part is as wide as a room
+    if not kept:  # no part is wide enough for a room
         seeds, kept, reason = grid.walkable.astype(np.int32), [1], "one room"
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
@@ -140,7 +135,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
 
 
 def _parted(floor: Mask) -> Labels:
-    """Rooms (nx, ny) of a floor with nothing but walls."""
+    """Divide a floor without furniture into rooms at narrow passages. Return each cell's room number (nx, ny)."""
     distance = clearance(floor)
     labels = np.zeros(floor.shape, np.int32)
     waiting = [(floor, 0)]

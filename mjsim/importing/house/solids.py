@@ -15,20 +15,19 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import _few_vertices
 
 BUDGET = 1500  # colliding geoms
-LOW, HIGH = 0.051, 1.9  # people walk over what is lower, and do not reach what begins higher, m
-_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # sides of voxels, m, of which the first within the budget is used
-_BOX = 0.95  # least share of its bounding box that the hull of a box fills
-_CONVEX = 0.85  # least share of its hull that a convex mesh fills
-_SMALL = 0.5  # size below which a mesh becomes its hull, m
-_HANGING = 1.6  # height from which lamps and pictures do not collide, m
-_OVERHEAD = (
-    0.8  # height from which furniture becomes a box, whose hull would seem to cover the floor below, m
-)
-_FURNITURE = 1.5  # largest side of furniture, which counts as filled if it is closed, m
-_ROOM = (2.0, 2.0, 1.8)  # a larger closed mesh is a room with people inside, not a block, m
-_FEW = 30  # most boxes of voxels for a piece of furniture
-_MAX_PARTS = 60  # most connected parts of a piece that are treated separately
-_THIN = 0.01  # least thickness of colliding geoms, m
+LOW, HIGH = 0.051, 1.9  # people step over lower solids and pass under higher ones, in metres
+_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # voxel sides, in metres; the first one within the budget is used
+_BOX = 0.95  # minimum share of its bounding box that the hull of a box fills
+_CONVEX = 0.85  # minimum share of its hull that a convex mesh fills
+_SMALL = 0.5  # size below which a mesh is replaced by its hull, in metres
+_HANGING = 1.6  # height above which lamps and pictures do not collide, in metres
+# Furniture that begins above this height, in metres, becomes a box. A hull would seem to cover the floor below.
+_OVERHEAD = 0.8
+_FURNITURE = 1.5  # maximum side of furniture, in metres; its inside counts as filled
+_ROOM = (2.0, 2.0, 1.8)  # a larger closed mesh is a room with people inside, not a block, in metres
+_FEW = 30  # maximum number of boxes of voxels for a piece of furniture
+_MAX_PARTS = 60  # maximum number of connected parts of a piece that are treated separately
+_THIN = 0.01  # minimum thickness of colliding geoms, in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ class Solids:
     boxes: int  # number of boxes
     hulls: int  # number of hulls
     voxels: int  # number of boxes of merged voxels
-    pitch: float  # side of a voxel, m
+    pitch: float  # side of a voxel, in metres
 
 
 def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
@@ -99,14 +98,14 @@ def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Parts of a thing, joined if it is furniture with many of them, such as the keys of a keyboard."""
+    """Parts of a thing. If furniture has many parts, such as the keys of a keyboard, they are joined."""
     if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
         return meshes
     return [trimesh.util.concatenate(meshes)]
 
 
 def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
-    """A box or a hull if the mesh is close to one or small, otherwise None."""
+    """A box or a hull if the mesh is small or has nearly this shape, otherwise None."""
     low, high = mesh.bounds
     extents = high - low
     if (extents > _ROOM).all():
@@ -150,12 +149,12 @@ def _box(name: str, low: Floats, high: Floats) -> Solid:
 
 
 def _compact(extents: Floats) -> bool:
-    """True for the extents of furniture rather than walls. The inside of furniture counts as filled."""
+    """True if the extents are those of furniture, whose inside counts as filled, rather than of walls."""
     return bool(extents[:2].max() < _FURNITURE)
 
 
 def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
-    """Boxes of voxels with sides of `pitch`, or larger ones for furniture that would need too many."""
+    """Boxes of voxels with sides of `pitch`. Furniture that would need too many boxes gets larger voxels."""
     boxes: list[Solid] = []
     for side in (p for p in _PITCHES if p >= pitch):
         boxes = list(_voxels(name, mesh, side))
@@ -170,9 +169,8 @@ def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
     samples = samples[samples[:, 2] < HIGH + pitch]
     if not len(samples):
         return
-    origin = (
-        samples.min(axis=0) - 0.3 * pitch
-    )  # no face on a cell border, since walls are often multiples of 5 cm thick
+    # The offset keeps faces off cell borders, because walls are often multiples of 5 cm thick.
+    origin = samples.min(axis=0) - 0.3 * pitch
     cells = np.floor((samples - origin) / pitch).astype(int)
     grid = np.zeros(cells.max(axis=0) + 1, bool)
     grid[tuple(cells.T)] = True
@@ -189,7 +187,7 @@ def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
 
 
 def _samples(corners: Floats, step: float) -> Floats:
-    """Points (k, 3) on triangles (n, 3, 3), at most about `step`, m, apart."""
+    """Points (k, 3) on triangles (n, 3, 3), at most about `step` metres apart."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first, count = lengths.argmax(axis=1), np.arange(len(corners))
     a, b, c = (corners[count, (first + k) % 3] for k in range(3))

@@ -9,13 +9,13 @@ from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.house.solids import LOW
 from mjsim.values.errors import AssetError
 
-_STOREY = 2.1  # height above a floor from which another floor is another storey, m
-_LEVEL = 0.4  # least area of a floor, as a share of the largest level
-_BIN, _STEP = 0.02, 0.3  # resolution of heights, and height within which layers form one floor, m
-_UPWARD = 0.2  # share of upward-facing level surfaces from which only these count
+_STOREY = 2.1  # minimum height of a storey, in metres
+_LEVEL = 0.4  # minimum area of a floor, as a share of the largest level
+_BIN, _STEP = 0.02, 0.3  # resolution of heights, and range within which layers form one floor, in metres
+_UPWARD = 0.2  # if more than this share of level surfaces faces upwards, only those count
 _FLAT = 0.95  # cosine of the greatest slope of a floor
-FAR = 200.0  # size above which a scene cannot be a house in any unit, m
-_MOST = 0.9  # share of pieces close together from which the others are removed
+FAR = 200.0  # a larger scene cannot be a house in any unit, in metres
+_MOST = 0.9  # distant pieces are removed only if at least this share of pieces is near
 
 
 def near_pieces(pieces: Sequence[ScenePiece]) -> tuple[list[ScenePiece], list[ImportDecision]]:
@@ -30,7 +30,7 @@ def near_pieces(pieces: Sequence[ScenePiece]) -> tuple[list[ScenePiece], list[Im
 
 
 def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:
-    """Height of the floor, and of the floor of the storey above, m, or infinity without one."""
+    """Heights, in metres, of the floor and of the floor above, which is infinite if there is none."""
     corners = np.concatenate([p.surface.corners for p in pieces])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area = np.linalg.norm(normals, axis=1)
@@ -46,9 +46,8 @@ def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:
     total = np.bincount(bins - first, area[flat])
     wide = np.convolve(total, np.ones(3))[1:-1]
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
-    near_ground = levels[
-        levels <= levels[0] + round(_STEP / _BIN)
-    ]  # ground, slab and floor are often separate layers
+    # Ground, slab and floor are often separate layers.
+    near_ground = levels[levels <= levels[0] + round(_STEP / _BIN)]
     lowest = near_ground[np.argmax(total[near_ground])] if np.ptp(near_ground) <= 2 else near_ground[-1]
     if (lowest + first) * _BIN >= corners[:, :, 2].max() - LOW:  # the tops of walls, without a floor
         return float(corners[:, :, 2].min()), np.inf
@@ -61,7 +60,7 @@ def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:
 
 
 def of_one_storey(pieces: list[ScenePiece], ceiling: float) -> tuple[list[ScenePiece], list[ImportDecision]]:
-    """Remove loose objects, and what is above the ceiling or below the floor, m."""
+    """Remove loose objects, and everything above the ceiling height, in metres, or below the floor."""
     kept, loose = [], []
     dropped = 0
     for piece in pieces:

@@ -22,15 +22,15 @@ from mjsim.importing.object.model_writer import comment, obj_lines, write_png
 
 MODEL = "house.xml"
 MESHES = "meshes"
-_HEIGHT = 2.5  # height of the closing shell, m
-_DEPTH = 0.1  # thickness of the colliding floor, m
-_UNDER = 0.002  # depth of the added drawn floor below z = 0, so that it does not hide rugs and floors of the source, m
+_HEIGHT = 2.5  # height of the boxes that close off the house, in metres
+_DEPTH = 0.1  # thickness of the colliding floor, in metres
+_UNDER = 0.002  # depth of the added floor below z = 0, where it cannot hide rugs and floors of the source
 _LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2 0.5 1", 0.3))
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedHouse:
-    """Everything that is written."""
+    """Contents of an imported house's files."""
 
     label: str  # shown to participants
     source: str  # name of the source file

@@ -1,4 +1,4 @@
-"""The closed body of a surface, and its mass: as it is, with holes filled, or the convex hull of what stays open."""
+"""Closed bodies of surfaces, and their mass. Holes are filled; pieces that stay open become convex hulls."""
 
 from dataclasses import dataclass
 
@@ -10,11 +10,11 @@ from mjsim.house.validation.object_rules import MASS
 from mjsim.values.errors import AssetError
 
 MAX_TRIANGLES = 20_000  # finer surfaces are simplified first
-MAX_PIECES = 400  # most pieces of a surface that are closed one by one
-SHEET = 0.001  # thickness given to a flat sheet, m
+MAX_PIECES = 400  # maximum number of pieces of a surface that are closed one by one
+SHEET = 0.001  # thickness given to a flat sheet, in metres
 MIN_MASS, MAX_MASS = MASS
-DENSITY = 400.0  # kg/m^3, between that of wood, and that of cloth and hollow plastic
-_MIN_GYRATION = 0.005  # radius of gyration of a body as wide as the thinnest part, m
+DENSITY = 400.0  # kg/m^3; lower than wood, higher than cloth and hollow plastic
+_MIN_GYRATION = 0.005  # radius of gyration of a body as wide as the thinnest part, in metres
 _GENTLE = 3  # aggression of edge collapses, from 1 to 10; the default is 7
 _FLAT = 1e-5  # m
 
@@ -46,9 +46,9 @@ def close(mesh: trimesh.Trimesh) -> ClosedBody:
 
 
 def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """The mesh with about `faces` faces at most, by quadric edge collapse (Garland and Heckbert 1997).
+    """Simplify a mesh to at most about `faces` faces by quadric edge collapse (Garland and Heckbert 1997).
 
-    Thin wires cannot be collapsed, and whole pieces would disappear instead. In this case it keeps more faces.
+    Thin wires cannot be collapsed, and whole pieces would disappear instead. Such a mesh keeps more faces.
     """
     if len(mesh.faces) <= faces:
         return mesh
@@ -60,7 +60,7 @@ def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
 
 def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """The mesh itself if it is closed, inverted if necessary; otherwise None."""
+    """A copy of the mesh with outward normals if it is closed, otherwise None."""
     if not (mesh.is_watertight and mesh.is_winding_consistent):
         return None
     whole = mesh.copy()
@@ -160,14 +160,14 @@ class Weight:
     reason: str  # origin of the mass
 
     def moved(self, transform: Floats) -> "Weight":
-        """The same after a rigid transform (4, 4)."""
+        """The mass properties after a rigid transform (4, 4)."""
         turn = transform[:3, :3]
         centre = turn @ self.centre + transform[:3, 3]
         return Weight(self.mass, centre, turn @ self.inertia @ turn.T, self.reason)
 
 
 def weigh(body: trimesh.Trimesh, *, mass: float | None, density: float | None) -> Weight:
-    """Mass properties of a closed body, m, from its mass, kg, or density, kg/m^3, or else from `DENSITY`.
+    """Mass properties of a closed body in metres, from its mass in kg, its density in kg/m^3, or `DENSITY`.
 
     Raise `AssetError` if a hand cannot carry the mass.
     """
@@ -193,5 +193,5 @@ def _inertia(body: trimesh.Trimesh, mass: float) -> Floats:
     """Inertia (3, 3) about the centre of mass, kg m^2, at least that of a thin rod about itself."""
     values, axes = np.linalg.eigh(np.asarray(body.moment_inertia) * mass / body.volume)
     values = np.maximum(values, mass * _MIN_GYRATION**2)
-    values[2] = min(values[2], values[0] + values[1])  # which self-intersecting bodies may seem to exceed
+    values[2] = min(values[2], values[0] + values[1])  # physical limit, which self-intersection can violate
     return np.asarray(axes @ np.diag(values) @ axes.T)

@@ -7,12 +7,12 @@ import trimesh
 
 from mjsim.formats.scene.surface import Floats
 
-MAX_OFFSET = 0.15  # greatest horizontal distance from a carried object's centre of mass to the hand, m
-_RIM = 0.01  # depth below the highest point, m; lower points may be at the bottom of a hollow object
-_POINTS = 100_000  # points of the surface among which the grip is chosen
-_FINGERS = 0.02  # radius around the nearest point within which a hand grasps the crest, m
-_CREST = 0.001  # depth below the crest, m
-_ABOVE = 0.005  # horizontal distance from the centre of mass at which a point counts as above it, m
+MAX_OFFSET = 0.15  # maximum horizontal distance from a carried object's centre of mass to the hand, in metres
+_RIM = 0.01  # range below the highest point, in metres; lower points may be the bottom of a hollow
+_POINTS = 100_000  # number of surface points among which the grip is chosen
+_FINGERS = 0.02  # radius around the nearest point in which the hand may grasp the crest, in metres
+_CREST = 0.001  # range below the crest, in metres
+_ABOVE = 0.005  # a point this close horizontally counts as above the centre of mass, in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +20,8 @@ class Grip:
     """A grasp."""
 
     point: Floats  # m, (3,)
-    yaw: float  # direction of the fingers, across the rim towards the centre of mass, rad
-    offset: float  # horizontal distance from the centre of mass, m
+    yaw: float  # direction of the fingers, across the rim towards the centre of mass, in radians
+    offset: float  # horizontal distance from the centre of mass, in metres
 
 
 def find_grip(mesh: trimesh.Trimesh, centre: Floats) -> Grip:

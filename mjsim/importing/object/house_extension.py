@@ -21,18 +21,18 @@ from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 
-HELD = 4  # objects of a kind that a bin must hold, by their bounding boxes
+HELD = 4  # minimum number of objects of a kind that a bin must hold, by bounding boxes
 _SLOTS = 2  # slots along each side of a bin (mjsim.world.body.slots)
 MAX_LABEL = 40
 _UNNAMED = ".unnamed"  # marks the folder of an object that is not yet in the catalogue
-_WALL_GAP = 0.02  # distance between an object and the walls of its bin, m
+_WALL_GAP = 0.02  # distance between an object and the walls of its bin, in metres
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
 _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
 
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """How a catalogue names an object."""
+    """Names of an object in a catalogue."""
 
     key: str  # its key and the name of its folder
     label: str  # name shown to participants
@@ -55,7 +55,7 @@ class HouseExtension:
     """A folder, which need not exist, with a catalogue and the objects that it adds to a house."""
 
     def __init__(self, folder: Path, house: str | None = None) -> None:
-        """Open a folder, or plan a new one, which extends `house` (the same as before, or `apartment`, if None).
+        """Open a folder, or plan a new one, that extends `house`. If None, it is the previous house or `apartment`.
 
         Raise `AssetError` if it is not a folder, or its catalogue is invalid or extends another house.
         """
@@ -162,12 +162,12 @@ class HouseExtension:
 
 
 def held_in(room: Floats, size: Floats) -> int:
-    """Number of objects with extents (3,), m, that a bin with inner sides (3,), m, holds at least, from any side.
+    """Number of objects of extents (3,) that surely fit into a bin of inner sides (3,), in metres, used from any side.
 
-    They stand upright in layers, side by side where people put them, with their centres inside the bin.
+    The objects stand upright in layers, side by side in the slots that people use, with their centres inside the bin.
     """
     layers = int(room[2] / size[2] + 0.5)
-    turned = (size[:2], size[1::-1])  # a carried object is turned with the person
+    turned = (size[:2], size[1::-1])  # a person may place a carried object either way
     beside = [np.minimum((room[:2] - 2 * _WALL_GAP) // across, _SLOTS).prod() for across in turned]
     return int(min(beside)) * layers
 

@@ -32,9 +32,7 @@ PREVIEW, REPORT = "preview.png", "report.json"
 
 
 def write_preview(model: Path, out: Path) -> None:
-    """Draw an object's MJCF file, visual mesh and parts side by side. Arrows are the grips' x axes, ahead of
-    the hand.
-    """
+    """Draw an object's visual mesh and parts side by side, with arrows along its grips' x axes."""
     pictures = []
     for shown in (_LOOK, _PART):
         spec = read_model(model, body="object")
@@ -120,7 +118,7 @@ def add_mesh(
 
 
 def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
-    """Why an object cannot be held; empty if it can."""
+    """The reason why an object cannot be held, or an empty string if it can."""
     if found := errors(findings):
         return found[0].message
     if item.grip.offset <= MAX_OFFSET:

@@ -127,5 +127,5 @@ def _numbers(values: Floats) -> str:
 
 
 def comment(text: str) -> str:
-    """Text made safe for an XML comment."""
+    """Make text safe for an XML comment."""
     return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

@@ -19,8 +19,8 @@ from mjsim.importing.object.scaling import Scaling, scaling
 from mjsim.importing.object.visual_mesh import VisualMesh, make_visual_mesh
 from mjsim.values.errors import AssetError
 
-_COARSE = 0.005  # greatest spacing of 32-bit floats, as a share of the longest side
-_FAR = 10.0  # distance from the origin that is reported, in longest sides
+_COARSE = 0.005  # maximum rounding step of 32-bit coordinates, as a share of the longest side
+_FAR = 10.0  # distance from the origin, in longest sides, above which it is reported
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class ImportedObject:
     hulls: tuple[Floats, ...]  # vertices of the convex parts that collide, m, (k, 3) each
     weight: Weight
     grip: Grip
-    rolls: bool  # round, so that it gets a foot and rolling friction
+    rolls: bool  # True for a round object, which gets a foot and rolling friction
     decisions: tuple[ImportDecision, ...]  # the report
 
     @property
@@ -41,7 +41,7 @@ class ImportedObject:
 
 
 def import_object(path: Path, options: ImportOptions) -> ImportedObject:
-    """Make an object of a mesh file, bit-identical for the same file and options.
+    """Make an object from a mesh file. The result is bit-identical for the same file and options.
 
     Raise `AssetError` if the file cannot be read, or a hand cannot carry the object.
     """

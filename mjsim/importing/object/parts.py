@@ -13,14 +13,14 @@ from mjsim.importing.object.closed_body import ClosedBody, simplified
 
 MAX_PARTS = 6
 MAX_VERTICES = 64  # per part
-MIN_WIDTH = THIN  # of every part in every direction
+MIN_WIDTH = THIN  # minimum width of each part in every direction
 _WALL = 0.008  # width below which a part is a wall, m; an object of walls collides as its hull
-_CONVEX = 0.9  # least share of its convex hull that a convex body fills
-_TRIANGLES = 1000  # to which a body is simplified before decomposition
+_CONVEX = 0.9  # minimum share of its convex hull that a convex body fills
+_TRIANGLES = 1000  # limit to which a body is simplified before decomposition
 _CONCAVITY = 0.12  # CoACD's threshold
-_COARSE = 0.35  # the same for bodies that would take minutes: with many pieces, or intersecting themselves
+_COARSE = 0.35  # the same for slow bodies, which have many pieces or intersect themselves
 _MANY = 8  # pieces
-_CUT = 1e-6  # least overlap of an intersecting edge and triangle, as a share of their sides
+_CUT = 1e-6  # minimum overlap of an intersecting edge and triangle, relative to their sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ def convex_parts(solid: ClosedBody) -> Parts:
     hulls, reason = [np.asarray(hull.vertices)], "convex: its own hull"
     filled = solid.mesh.volume / hull.volume
     if filled < _CONVEX:
-        # The mean thickness of walls of area a on either side, and volume v, is 2 v / a.
+        # The mean thickness of walls with volume v and total area a of both sides is 2 v / a.
         walls = 2 * solid.mesh.volume / solid.mesh.area < _WALL
         pieces = [] if walls else _decomposed(solid)
         if walls or min(width(points) for points in pieces) < _WALL:
@@ -56,7 +56,7 @@ def convex_parts(solid: ClosedBody) -> Parts:
 
 
 def width(points: Floats) -> float:
-    """Least extent of the convex hull of points (n, 3) in any direction, m."""
+    """Minimum extent of the convex hull of points (n, 3) in any direction, in metres."""
     return _narrowest(points)[1]
 
 
@@ -106,7 +106,7 @@ def _few_vertices(points: Floats) -> Floats:
         coarse = hull.simplify_quadric_decimation(face_count=faces).convex_hull
         if len(coarse.vertices) <= MAX_VERTICES:
             break
-    else:  # no edge can be collapsed, so take the farthest vertices in evenly spread directions
+    else:  # no edge can be collapsed, so take the extreme vertex in each of many directions
         turn = np.arange(MAX_VERTICES) + 0.5
         z, angle = 1 - 2 * turn / MAX_VERTICES, np.pi * (1 + 5**0.5) * turn
         level = np.sqrt(1 - z * z)

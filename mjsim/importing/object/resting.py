@@ -10,11 +10,11 @@ import trimesh
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import MIN_WIDTH
 
-STEADY = math.radians(12.0)  # least tilt that a stable object withstands
-_CONTACT = 0.0005  # height above the lowest point up to which points touch the floor, m
+STEADY = math.radians(12.0)  # minimum tilt that a stable object withstands
+_CONTACT = 0.0005  # points up to this height above the lowest one touch the floor, in metres
 _FOOT_SLOPE = 0.45  # half width of a foot divided by the height of the centre of mass
-_MAX_FACES = 300  # faces of the hull that are tried
-_LOWER = 1.2  # height of the centre of mass up to which the file's pose is kept, by that on the best side
+_MAX_FACES = 300  # maximum number of hull faces tried as the base
+_LOWER = 1.2  # factor by which the best pose must lower the centre of mass to replace the file's pose
 _SMALLER = 0.95  # factor by which a rotation has to shrink the footprint's bounding box
 
 
@@ -23,8 +23,8 @@ class RestingPose:
     """A pose of an object on the floor."""
 
     rotation: Floats  # from the file's axes to the object's, (3, 3)
-    tilt: float  # tilt at which it tips over, rad
-    turned: bool  # on another side than in the file
+    tilt: float  # tilt at which it tips over, in radians
+    turned: bool  # True if the object rests on a different side than in the file
 
 
 def resting_pose(points: Floats, centre: Floats) -> RestingPose:

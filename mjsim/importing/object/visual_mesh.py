@@ -14,16 +14,16 @@ from mjsim.formats.scene.surface import Floats, Ints, Surface
 from mjsim.importing.object.closed_body import is_closed, simplified
 
 SIDE = 512  # side of the image, in pixels
-_GUTTER = 2  # pixels around a triangle, so that its neighbours do not bleed in
-_SHRINK = 0.93  # factor on the scale until all triangles fit
-_MIN_SIDE = 2  # least width of a triangle, in pixels
+_GUTTER = 2  # margin around a triangle against bleeding colours, in pixels
+_SHRINK = 0.93  # factor by which the scale is reduced until all triangles fit
+_MIN_SIDE = 2  # minimum width of a triangle, in pixels
 MAX_TRIANGLES = 1400
-_SAMPLES = 200_000  # points of the file's surface from which colours are taken
-_FACING = 0.01  # distance that a triangle facing the other way counts as, m
+_SAMPLES = 200_000  # number of surface points at which the file's colours are sampled
+_FACING = 0.01  # weight of normals in the search for the nearest surface point, in metres
 _CREASE = math.radians(40.0)
-_SHEET = 2e-4  # distance between the two sides of an open surface, m
+_SHEET = 2e-4  # distance between the two sides of an open surface, in metres
 _PLAIN = 3 / 255  # colours that differ by less are equal
-_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the R2 sequence (Roberts 2018)
+_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence (Roberts 2018)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Atlas:
         return faces, weights / weights.sum(axis=1, keepdims=True)
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
-        """The image, shape (SIDE, SIDE, 3), for colours (k, 3) of all `texels`, RGB from 0 to 1."""
+        """The image (SIDE, SIDE, 3) that results from the colours (k, 3) of all `texels`, RGB from 0 to 1."""
         picture = np.empty((SIDE, SIDE, 3), np.uint8)
         picture[:] = np.round(255 * np.clip(colours.mean(axis=0), 0, 1))
         across, down = self._pixels().T
@@ -127,8 +127,8 @@ class VisualMesh:
     normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, (m, 3, 3)
     uv: Floats | None  # texture coordinates of the corners, from 0 to 1 from the lower left, (m, 3, 2)
     picture: NDArray[np.uint8] | None  # RGB, (height, width, 3)
-    colour: tuple[float, float, float]  # RGB from 0 to 1, without a picture
-    doubled: bool  # every face is there twice, because the surface is open and visible from both sides
+    colour: tuple[float, float, float]  # RGB from 0 to 1, used if there is no picture
+    doubled: bool  # True if each face exists twice, because the surface is open and visible from both sides
 
 
 def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
@@ -187,7 +187,7 @@ def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
 
 
 def corner_normals(vertices: Floats, faces: Ints) -> Floats:
-    """Normal at every corner of every face, (m, 3, 3): the mean of adjacent faces at less than the angle `_CREASE`."""
+    """Normals (m, 3, 3) of the corners of all faces: means over adjacent faces at angles below `_CREASE`."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     units = _normals(corners)
