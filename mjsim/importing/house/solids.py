@@ -24,7 +24,7 @@ _HANGING = 1.6  # height above which lamps and pictures do not collide, in metre
 # Furniture that begins above this height, in metres, becomes a box. A hull would seem to cover the floor below.
 _OVERHEAD = 0.8
 _FURNITURE = 1.5  # maximum side of furniture, in metres; its inside counts as filled
-_ROOM = (2.0, 2.0, 1.8)  # a larger closed mesh is a room with people inside, not a block, in metres
+_ROOM = (2.0, 2.0, 1.8)  # closed meshes larger than this, in metres, are hollow rooms rather than blocks
 _FEW = 30  # maximum number of boxes of voxels for a piece of furniture
 _MAX_PARTS = 60  # maximum number of connected parts of a piece that are treated separately
 _THIN = 0.01  # minimum thickness of colliding geoms, in metres

@@ -14,7 +14,7 @@ MAX_PIECES = 400  # maximum number of pieces of a surface that are closed one by
 SHEET = 0.001  # thickness given to a flat sheet, in metres
 MIN_MASS, MAX_MASS = MASS
 DENSITY = 400.0  # kg/m^3; lower than wood, higher than cloth and hollow plastic
-_MIN_GYRATION = 0.005  # radius of gyration of a body as wide as the thinnest part, in metres
+_MIN_GYRATION = 0.005  # minimum radius of gyration, in metres, that of a body as wide as the thinnest part
 _GENTLE = 3  # aggression of edge collapses, from 1 to 10; the default is 7
 _FLAT = 1e-5  # m
 
