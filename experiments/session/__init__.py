@@ -1,4 +1,4 @@
-"""One session: the loop of participant, assistant and world, what the participant perceives, and films.
+"""A session: the loop of participant, assistant and world, the participant's percept, and films.
 
 Trials, replays and the browser's worker run the same `Session`.
 """

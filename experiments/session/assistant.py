@@ -1,4 +1,4 @@
-"""The assistant, which plans with full knowledge of the house and determines what the HUD shows."""
+"""The assistant, which plans with full knowledge of the house and determines the content of the HUD."""
 
 import functools
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ class Assistant:
         )
         self._deliveries = deliveries(self._house, self._episode)
         self._paths = PathsToNext(self._house.geodesics)
-        self._path_from: Observation | None = None  # state from which paths are still to be computed, if any
+        self._path_from: Observation | None = None
         self.shown_roles: frozenset[str] = frozenset()
         self.shows_plan = self._rerouted = False
         self.is_custom = is_own(self._show)
@@ -76,7 +76,7 @@ class Assistant:
             self._planner.settle()
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
-        """Process the last control step and its events. Make a new plan if the person has left the plan."""
+        """Process the last control step and its events. Make a new plan if the person has left the current one."""
         for event in events:
             if event.kind in VISIT_KIND:
                 made = Visit(VISIT_KIND[event.kind], event.object)
@@ -94,13 +94,15 @@ class Assistant:
 
     @property
     def expecting(self) -> bool:
-        """True if a better plan may arrive at any moment, so that every control step has to be observed."""
+        """True if a better plan may arrive at any moment, so that the assistant must observe every control step."""
         return self._planner.pending
 
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
         """Process a walk without events. The result is the same as if `observe` were called at every step.
 
-        `positions` are those of the person after every control step, m, shape (n, 2). `observation` is the final state.
+        Args:
+            positions: Position of the person in metres after every control step, shape (n, 2).
+            observation: State after the last step.
         """
         if (places := self._places_to_follow(observation)) is not None:
             self._paths.path.follow(positions, *places)
@@ -121,7 +123,7 @@ class Assistant:
                 self.scroll(int(event["rows"]))
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or a refusal in the message bar."""
+        """Show a message about an event or a refused action in the message bar."""
         self._board.show_message(key, time, object_name)
 
     def scroll(self, rows: int) -> None:
@@ -129,7 +131,10 @@ class Assistant:
         self._board.scroll(rows)
 
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
-        """Return the current HUD state. With `camera`, the eye camera, conditions can point to a goal out of view."""
+        """Return the current HUD state.
+
+        With `camera`, the eye camera, a condition can point towards a goal that is out of view.
+        """
         view = self._board.view(
             observation,
             ahead=PlanView(self._board, observation, lambda: self._planner.route, self._paths_to),
@@ -140,7 +145,7 @@ class Assistant:
         return shown_by(self._show, self._assistance, view)
 
     def guidance(self, observation: Observation) -> Guidance | None:
-        """Return the step and the path that the breadcrumbs mark, or None if there are none or all is done."""
+        """Return the step and the path that the breadcrumbs mark, or None if there is nothing to show."""
         if BREADCRUMB not in self.shown_roles or (visit := self._planner.next) is None:
             return None
         paths = self._paths_to(visit)
@@ -148,7 +153,7 @@ class Assistant:
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
-        """Return the possible next visits, best first. The result is empty until their regrets are known."""
+        """Return the possible next visits, best first. The result is empty until their regrets have been computed."""
         return tuple(
             Choice(
                 visit,
@@ -161,7 +166,7 @@ class Assistant:
         )
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not yet known when their visits were logged."""
+        """Log the regrets that were not yet computed when their visits were logged."""
         self._log.finish(time)
 
     def task_state(self, observation: Observation) -> TaskState:
@@ -175,7 +180,6 @@ class Assistant:
         )
 
     def _plan(self, observation: Observation) -> None:
-        """Keep the plan as long as the task follows it, otherwise make a new one."""
         before = self._planner.replans if self.shows_plan else 0
         self._log.plan(
             observation.time, self.task_state(observation), self._last_visit_at, shown=self.shows_plan
@@ -185,7 +189,6 @@ class Assistant:
             self._board.announce_replan(observation.time)
 
     def _paths_to(self, visit: Visit) -> PathsToNext:
-        """Return the paths to the next visit. They are computed when a condition first asks for them."""
         if self._path_from is not None:
             start, self._path_from = self._path_from, None
             self._paths.begin(self._last_visit_at, start.position, *self._places(start, visit))
@@ -194,7 +197,6 @@ class Assistant:
     def _places_to_follow(
         self, observation: Observation
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return `_places` of the next visit, or None if no condition has asked for a path to it."""
         if self._path_from is not None or (visit := self._planner.next) is None:
             return None
         return self._places(observation, visit)
@@ -205,7 +207,6 @@ class Assistant:
     def _places(
         self, observation: Observation, visit: Visit
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the end of the path to a visit, and the goal of the visit, both in m, shape (2,)."""
         goal = self._goal(observation, visit)
         if visit.kind is VisitKind.PICK:
             return goal, goal
@@ -213,7 +214,7 @@ class Assistant:
 
 
 def deliveries(house: House, episode: Episode) -> dict[str, XY]:
-    """Return by object name the place (m) where a person stands to deliver the object."""
+    """Return, for each object name, the position in metres where a person stands to deliver the object."""
     return {name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()}
 
 

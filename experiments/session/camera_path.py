@@ -14,32 +14,34 @@ from mjsim.house.compiled.house import compiled_house
 from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
 
-EYE_HEIGHT = PersonParameters().eye_height  # of the default person, because everyone sees the same film
-STEP = 0.04  # time between two rows, s
-SPEED = 1.3  # m/s
-TURNING = math.radians(75.0)  # rad/s
-LOOK_AHEAD = 0.8  # m; how far ahead on its path the moving camera looks
-BIN_TIME = 2.0  # how long the camera rests on a bin, in seconds
-BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)  # m to the end of the path, tried until the bin is seen
-SMOOTHING = 0.25  # standard deviation of the Gaussian filter, s
+# Of the default person, so that all participants see the same film
+EYE_HEIGHT = PersonParameters().eye_height
+STEP = 0.04  # time between two camera poses, in seconds
+SPEED = 1.3  # in m/s
+TURNING = math.radians(75.0)  # in rad/s
+LOOK_AHEAD = 0.8  # how far ahead on its path the moving camera looks, in metres
+BIN_TIME = 2.0  # how long the camera looks at each bin, in seconds
+# Distances in metres from the end of the path to a bin, tried until the bin is visible
+BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)
+SMOOTHING = 0.25  # standard deviation of the Gaussian filter in seconds
 _FIELD = FieldOfView.of(PersonParameters())
 
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """Pose of the camera, and the bin that it looks at, every `STEP` s."""
+    """Camera poses at intervals of `STEP` seconds, with the bin that the camera looks at."""
 
-    positions: NDArray[np.float64]  # m, shape (n, 3)
-    headings: NDArray[np.float64]  # yaw of the gaze, rad, 0 along +x, counter-clockwise, shape (n,)
-    pitches: NDArray[np.float64]  # elevation of the gaze, rad, shape (n,)
-    bins: tuple[str | None, ...]  # key of the bin that the camera rests on, or None; length n
+    positions: NDArray[np.float64]  # in metres, shape (n, 3)
+    headings: NDArray[np.float64]  # yaw of the gaze in radians, 0 along +x, counter-clockwise, shape (n,)
+    pitches: NDArray[np.float64]  # elevation of the gaze in radians, shape (n,)
+    bins: tuple[str | None, ...]  # key of the bin that the camera looks at, or None, for each pose
 
     @property
     def duration(self) -> float:
         return len(self.headings) * STEP
 
     def at(self, times: NDArray[np.float64]) -> "CameraPath":
-        """Return the camera path sampled at these times (s), shape (m,)."""
+        """Return the camera path sampled at these times in seconds, shape (m,)."""
         rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
         bins = tuple(self.bins[row] for row in rows)
         return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)
@@ -47,7 +49,7 @@ class CameraPath:
 
 @dataclass(frozen=True, eq=False)
 class _Stop:
-    """A place on the floor from which the camera looks at a bin, or around if `bin` is None."""
+    """A point on the floor from which the camera looks at a bin, or looks around if `bin` is None."""
 
     place: Point
     bin: str | None = None
@@ -61,7 +63,6 @@ class _Camera:
         self.bins: list[str | None] = []
 
     def move(self, place: Point) -> None:
-        """Move along the shortest path, looking ahead."""
         points = np.asarray(self._house.geodesics.shortest_path(self.place, place).points)
         gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(gaps)])
@@ -71,7 +72,7 @@ class _Camera:
         ahead = np.minimum(at + LOOK_AHEAD, along[-1])
         here, there = _interpolate(points, along, at), _interpolate(points, along, ahead)
         offsets = there - here
-        # Near the end the camera keeps its direction.
+        # Near its destination the camera keeps its direction.
         offsets[np.linalg.norm(offsets, axis=1) < 0.1] = points[-1] - points[-2]
         headings = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
         self.turn(float(headings[0]))
@@ -80,7 +81,6 @@ class _Camera:
         self.place = points[-1]
 
     def turn(self, heading: float, pitch: float = 0.0) -> None:
-        """Turn on the spot in the shorter direction."""
         change = (heading - self.heading + math.pi) % (2.0 * math.pi) - math.pi
         self._turn_by(change, pitch)
 
@@ -110,10 +110,10 @@ class _Camera:
 
 
 def camera_path(house: House) -> CameraPath:
-    """Return the path through a house. Calls with the same house return the same path.
+    """Return the camera path through a house. The same house always gives the same path.
 
-    In each room the camera looks around from the middle viewpoint, then visits the room's bins, each time the
-    nearest one left. It continues with the nearest room left.
+    In each room the camera first looks around from the central viewpoint. It then visits the bins of the room, always
+    choosing the nearest one that it has not visited yet, and moves on to the nearest unvisited room.
     """
     stops = {room: _stops(house, room) for room in house.viewpoints}
     room = next(iter(stops))
@@ -130,9 +130,9 @@ def camera_path(house: House) -> CameraPath:
 
 
 def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: float) -> dict[str, float]:
-    """Return by receptacle key the time (s) at which a viewer of the film first sees each bin.
+    """Return, for each bin that a viewer of the film can see, the time in seconds at which it first comes into view.
 
-    The viewer looks every `interval` s. Bins that are not seen are missing.
+    The viewer looks every `interval` seconds. Bins that are never seen are missing from the result.
     """
     compiled = compiled_house(house.catalogue)
     times = np.arange(0.0, path.duration, interval)
@@ -158,7 +158,6 @@ def _stops(house: House, room: str) -> list[_Stop]:
 
 
 def _bin_place(house: House, start: Point, key: str) -> Point:
-    """Return the place (m, shape (2,)) on the path to a bin from which the camera looks at the bin."""
     points = np.asarray(house.geodesics.shortest_path(start, house.approaches[key]).points)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     compiled, bin_ = compiled_house(house.catalogue), house.receptacles[key]
@@ -183,7 +182,6 @@ def _visit(camera: _Camera, house: House, stops: Sequence[_Stop]) -> None:
 
 
 def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
-    """Yield the first stop, then repeatedly the nearest remaining one."""
     left = list(stops)
     stop = left.pop(0)
     yield stop
@@ -196,5 +194,4 @@ def _nearest_first(house: House, stops: Sequence[_Stop]) -> Iterator[_Stop]:
 def _interpolate(
     points: NDArray[np.float64], along: NDArray[np.float64], at: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the points (m, 2) of a polyline (k, 2) at lengths (m,). `along` (k,) are the lengths at its corners, m."""
     return np.asarray(np.column_stack([np.interp(at, along, points[:, i]) for i in range(2)]))

@@ -1,4 +1,4 @@
-"""The familiarization of simulated participants: the story and the fly-through (PAPER sections 4 and 7)."""
+"""Familiarization of simulated participants: the story and the fly-through (PAPER sections 4 and 7)."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ READING_SPEED = 238.0  # words per minute (Brysbaert, Journal of Memory and Lang
 
 @dataclass(frozen=True)
 class Familiarisation:
-    """The phases before the task."""
+    """The phases that a simulated participant goes through before the task."""
 
     ended: tuple[dict[str, Any], ...]  # fields of the `phase_ended` event of each phase, in order
     seen: frozenset[str] | None  # keys of the bins that the participant has seen, or None if all are known
@@ -32,7 +32,7 @@ class Familiarisation:
         return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
 
     def log(self, log: EventLog) -> None:
-        """Log the phases before the clock of the task starts."""
+        """Log the phases. The task clock has not started then."""
         for end in self.ended:
             log.append(0.0, PHASE_BEGUN, phase=end["phase"])
             log.append(0.0, PHASE_ENDED, **end)
@@ -43,7 +43,7 @@ def familiarise(
 ) -> Familiarisation:
     """Let a simulated participant read the story and watch the fly-through, if the trial has these phases.
 
-    Rays along the camera path, within the participant's own field of view, determine which bins are seen.
+    The participant has seen a bin if a ray from a pose on the camera path, within their own field of view, hits it.
     """
     ended = tuple(_phases(phases, story, house, person))
     seen = next((frozenset(end["bins"]) for end in ended if "bins" in end), None)
@@ -68,7 +68,7 @@ def _phases(
 
 
 def story_text(path: Path | None = None) -> str:
-    """Read the story from a UTF-8 file, by default that of this package. Blank lines separate paragraphs."""
+    """Read the story from a UTF-8 file, or the default story. Blank lines separate paragraphs."""
     file = path or STORY_FILE
     try:
         text = read_text(file).strip()
@@ -82,5 +82,5 @@ def story_text(path: Path | None = None) -> str:
 
 
 def reading_time(text: str) -> float:
-    """Return the time (s) in which an adult reads a text silently."""
+    """Return the time in seconds that an adult needs to read a text silently."""
     return 60.0 * len(text.split()) / READING_SPEED

@@ -1,11 +1,12 @@
-"""Size and look of films."""
+"""Size and appearance of films."""
 
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
 from mjsim.render import PROFILES, RenderProfile
 
-FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")  # of a film of a replay
+# Views in which a replay can be filmed
+FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")
 
 
 @dataclass(frozen=True)
@@ -13,12 +14,12 @@ class FilmConfig:
     """Settings of the frames of a film.
 
     Attributes:
-        width: Picture width, px.
-        height: Picture height, px.
+        width: Picture width in pixels.
+        height: Picture height in pixels.
         profile: Render profile.
         beside: True if the panels of the HUD are next to the picture, as on the page of `mjsim play`. Frames are then
             larger than the picture.
-        field_of_view: Horizontal field of view, rad, or None for that of the person.
+        field_of_view: Horizontal field of view in radians, or None for that of the person.
 
     Raises:
         ConfigError: There is no such profile.
@@ -36,7 +37,7 @@ class FilmConfig:
 
     @property
     def margins(self) -> tuple[int, int, int, int]:
-        """Margins (px) above, below, left and right of the picture. They make the frame size even."""
+        """Margins in pixels above, below, left and right of the picture. They make the frame size even."""
         if not self.beside:
             return 0, 0, 0, 0
         from hud.layout import margins  # imported late, because the command line imports this module
@@ -46,6 +47,6 @@ class FilmConfig:
 
     @property
     def frame_size(self) -> tuple[int, int]:
-        """Width and height of a frame, px."""
+        """Width and height of a frame in pixels."""
         top, below, left, right = self.margins
         return left + self.width + right, top + self.height + below

@@ -28,8 +28,8 @@ from mjsim.world.world import World
 class FirstPersonRenderer:
     """Renders first-person frames with the HUD. Use it as a context manager to free the GL context.
 
-    `pictures` is the result of `render_pictures` for the house's catalogue, or None to render it. Raises RenderError if
-    there is no off-screen GL context, or the size or profile is not valid.
+    `pictures` is the result of `render_pictures` for the catalogue of the house. If it is None, the pictures are
+    rendered first. Raises RenderError if there is no off-screen GL context, or if the size or the profile is invalid.
     """
 
     def __init__(
@@ -46,16 +46,16 @@ class FirstPersonRenderer:
         self._film = film
 
     def camera_view(self, data: Any) -> CameraView:
-        """Return the eye camera of the next frame of `data`."""
+        """Return the eye camera for the state `data` of the scene's model."""
         pose = self._renderer.camera_pose(data, self._camera(data))
         width, height = self._film.width, self._film.height
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
 
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
-        """Render the view of the person with the HUD: RGB, uint8, (height, width, 3).
+        """Render the person's view with the HUD as an RGB image, uint8, shape (height, width, 3).
 
-        The frame is larger if panels are next to the picture. `data` is the state of the scene's model. Raises
-        RenderError if a marker cannot be drawn, or the renderer is closed.
+        The image is larger than the film's picture if the panels are next to it. `data` is the state of the scene's
+        model. Raises RenderError if a marker cannot be drawn or the renderer is closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
@@ -93,7 +93,7 @@ class Filming:
     def camera(self, world: World) -> CameraView:
         return self._renderer.camera_view(world.data)
 
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - the interface of viewers
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - required by the protocol
         self._video.write(self._renderer.frame(world.data, hud_state))
 
 
@@ -120,13 +120,13 @@ class TrialFilm:
 
     @property
     def frames_sha256(self) -> str | None:
-        """Hash of all frames after `close`, or None if there is no film."""
+        """Hash of all frames, available after `close`, or None if there is no film."""
         return self._video.frames_sha256 if self._video is not None and self.failure is None else None
 
     def camera(self, world: World) -> CameraView | None:
         return self._renderer.camera_view(world.data) if self._renderer is not None else None
 
-    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - the interface of viewers
+    def show(self, world: World, observation: Observation, hud_state: HudState) -> None:  # noqa: ARG002 - required by the protocol
         if self.failure is None and self._renderer is not None and self._video is not None:
             try:
                 self._video.write(self._renderer.frame(world.data, hud_state))
@@ -134,14 +134,15 @@ class TrialFilm:
                 self._give_up(error)
 
     def close(self) -> None:
-        """Finish the file, or remove it after a failure."""
+        """Complete the video file, or delete it if filming has failed."""
         try:
             if self._video is not None:
                 self._video.close()
         except RecordError as error:
             self._give_up(error)
         if self._renderer is not None:
-            with contextlib.suppress(RenderError):  # nothing is left to free if the driver has failed
+            # After a driver failure, freeing the GL context may fail too
+            with contextlib.suppress(RenderError):
                 self._renderer.close()
         if self.failure is not None:
             self._path.unlink(missing_ok=True)

@@ -14,17 +14,19 @@ from mjsim.render import CameraPose, Renderer, render_house_map
 from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PersonParameters
 
-SIZE = (960, 640)  # px
-FIELD = math.radians(62.0)  # vertical field of view, wider than a person's to show a room from its corner
-SCALE, MARGIN = 70.0, 0.4  # scale of the plan (px/m) and margin around it (m)
-TEXT, LINE = 13, 16  # font size and line height on the plan, px
-TARGET_HEIGHT = 0.9  # m; height of the point in the middle of a room at which views aim
-PLACES = 3000  # number of sampled places to stand
-SMALL, FAR = (96, 64), 4.0  # size (px) and maximum depth (m) of the depth images that rank the views
+SIZE = (960, 640)  # in pixels
+# Vertical field of view in radians, wider than a person's so that a corner view shows most of a room
+FIELD = math.radians(62.0)
+SCALE, MARGIN = 70.0, 0.4  # scale of the plan in pixels per metre, and the margin around it in metres
+TEXT, LINE = 13, 16  # font size and line height on the plan, in pixels
+TARGET_HEIGHT = 0.9  # height in metres of the point in the middle of a room at which views aim
+PLACES = 3000  # number of sampled viewpoints
+# Size in pixels and maximum depth in metres of the depth images that rank the views
+SMALL, FAR = (96, 64), 4.0
 
 
 def draw_house(house: House, folder: Path) -> list[Path]:
-    """Write `floorplan.png` and `room_<key>.png` into an existing folder, and return their paths."""
+    """Write `floorplan.png` and `room_<key>.png` to an existing folder, and return their paths."""
     pictures = {"floorplan": floor_plan(house)}
     model, data = compiled_house(house.catalogue).model, compiled_house(house.catalogue).data
     views_of = room_views(house, house.viewpoints)
@@ -41,9 +43,9 @@ def draw_house(house: House, folder: Path) -> list[Path]:
 
 
 def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Draw the house from above with names and areas of the rooms, RGB.
+    """Draw the house from above as an RGB image, with the names and areas of the rooms.
 
-    The plan fills the size `within` (width and height, px). Without it, the scale is fixed.
+    The plan fills the size `within` (width and height in pixels). If it is None, the scale is fixed.
     """
     x0, y0, x1, y1 = house.bounds
     bounds = x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
@@ -63,7 +65,6 @@ def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[n
 
 
 def _write_over(plan: NDArray[np.uint8], lines: tuple[str, ...], x: int, y: int) -> None:
-    """Write lines of text, centred at a pixel, on a lightened background."""
     widths = [_width(text) for text in lines]
     half, top = max(widths) // 2 + 3, y - len(lines) * LINE // 2
     ground = plan[max(top, 0) : top + len(lines) * LINE + 4, max(x - half, 0) : x + half]
@@ -78,7 +79,7 @@ def _width(text: str) -> int:
 
 
 def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]]:
-    """Return a view from each corner of each room, those with the least nearby obstruction first."""
+    """Return a view from each corner of each room, with the least obstructed view first."""
     compiled = compiled_house(house.catalogue)
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
     nearest = house.rooms.distances(floor).argmin(axis=1)
@@ -98,14 +99,12 @@ def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]
 def _corner_views(
     house: House, room: str, places: NDArray[np.float64], center: NDArray[np.float64]
 ) -> list[CameraPose]:
-    """Return views of a room from its corners: from the farthest of the `places` in each quadrant around the center."""
     offsets = places - center
     quarters = (offsets > 0) @ (1, 2)
     mine = [np.flatnonzero(quarters == quarter) for quarter in range(4)]
     corners = [places[rows[np.hypot(*offsets[rows].T).argmax()]] for rows in mine if len(rows)]
     views = []
     for place in corners or [house.viewpoints[room][0]]:
-        # From the middle of a room, look along x.
         target = center if np.hypot(*(place - center)) > 0.3 else place + np.array([1.0, 0.0])
         eye = np.array([*place, PersonParameters().eye_height])
         views.append(CameraPose.looking_at(eye, np.array([*target, TARGET_HEIGHT]), FIELD))

@@ -1,4 +1,4 @@
-"""Planners by name. Plans and claims of custom planners are checked."""
+"""Planners by name, and the verification of plans and bounds that custom planners return."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,23 +13,24 @@ from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solvers import SolveLimit, Solver, solver
 
-CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in a claimed length or bound
+CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in the length or bound that a planner reports
 
 
 def planner_named(name: str, *, exact: bool = True) -> Solver:
-    """Return the planner of this name. Custom plans are checked and, with `exact`, bounded by the exact planner.
+    """Return the planner with this name. The plans of a custom planner are verified.
 
-    Raises PlannerError if there is no such planner.
+    With `exact`, the exact planner computes the lower bounds of custom plans. Raises PlannerError if there is no
+    planner with this name.
     """
     found = solver(name)
     return OwnPlanner(name, found, ExactSolver() if exact else None) if is_own(found) else found
 
 
 class OwnPlanner:
-    """A custom planner, whose plans are replayed before use.
+    """A custom planner whose plans are verified before use.
 
-    Length, bound and status of its plans are computed again, and a wrong length is an error. The bound is that of the
-    planner `exact` or, without it, of the check.
+    The length, bound and status of each plan are recomputed, and a wrong length is an error. The bound comes from the
+    planner `exact`, or from the verification if `exact` is None.
     """
 
     def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
@@ -43,7 +44,10 @@ class OwnPlanner:
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the plans of the custom planner, and finally the last plan with its bound. Raises as `solve`."""
+        """Yield the plans of the custom planner, and then the last plan with its bound.
+
+        Raises UserCodeError if the planner failed or a plan is not feasible.
+        """
         plan = None
         if hasattr(self._planner, "improve"):
             with user_code(self._planner, self._what):
@@ -72,7 +76,6 @@ class OwnPlanner:
         return self._checked(problem, given)
 
     def _checked(self, problem: RoutingProblem, given: Any) -> Plan:
-        """Return the plan with its true length and the bound of the check."""
         where = definition(self._planner.solve)
         if not isinstance(given, Plan):
             raise UserCodeError(f"{self._what} answered {shown(given)}; it must be a Plan{where}")
@@ -101,12 +104,10 @@ class OwnPlanner:
 
 
 def _copied(problem: RoutingProblem) -> RoutingProblem:
-    """Return a copy that user code may change."""
     return replace(problem, distances=problem.distances.copy())
 
 
 def _bounded(problem: RoutingProblem, plan: Plan, cost: float, bound: float) -> Plan:
-    """Return the plan with this length and bound (m)."""
     optimal = cost - bound <= problem.tolerance(cost)
     status = Status.OPTIMAL if optimal else Status.FEASIBLE
     return Plan(plan.visits, cost, cost if optimal else bound, status, float(plan.seconds))

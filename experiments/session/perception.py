@@ -1,4 +1,4 @@
-"""The percept of participants in a session."""
+"""What a participant perceives in a session."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""The loop of a session, which simulated participants, people and replays share: show, perceive, act, step, record."""
+"""The loop of a session: show, perceive, act, simulate, record. Live trials and replays share it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from mjsim.values.errors import PhysicsError
 from mjsim.values.observation import ObjectStatus, Observation, Steps
 from mjsim.world.world import World
 
-# Logged events whose cause is outside the simulation.
+# Logged events with a cause outside the simulation, which a replay repeats from the log.
 EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display", "draw")
-FINAL_HOLD = 1.6  # how long the viewer sees the world after the last delivery, in seconds
+FINAL_HOLD = 1.6  # how long the viewer shows the world after the last delivery, in seconds
 
 
 class Viewer(Protocol):
@@ -37,7 +37,7 @@ class Viewer(Protocol):
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a session, for progress bars."""
+    """Progress of a session."""
 
     time: float
     delivered: int
@@ -48,7 +48,7 @@ OnProgress = Callable[[Progress], None]
 
 
 class Session:
-    """One trial, from the start pose until everything is delivered or the time is up.
+    """One trial, from the start pose until all objects are delivered or the time limit is reached.
 
     Args:
         world: The world, freshly made.
@@ -95,7 +95,7 @@ class Session:
         return self.finish(on_progress)
 
     def begin(self) -> None:
-        """Make the first plan and show it, before anything is simulated. Raises as `run`."""
+        """Make the first plan and show it, before anything is simulated. Raises the same errors as `run`."""
         self._now = self._world.reset()
         self._first_state = self._now, self._world.health_sample, self._world.state_hash()
         try:
@@ -106,7 +106,6 @@ class Session:
         self._start(self._now)
 
     def _start(self, observation: Observation) -> None:
-        """Start in the present state of the world and the assistant."""
         self._now = observation
         self._delivered = len(observation.names_with(ObjectStatus.DELIVERED))
         shown, needs = self.assistant.shown_roles, needs_of(self._participant)
@@ -118,7 +117,7 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Run a session to its end after `begin`. The result and the errors are those of `run`."""
+        """Run a session to its end after `begin`. The result and the errors are the same as those of `run`."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
@@ -149,7 +148,7 @@ class Session:
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
+        """Simulated time in seconds."""
         return self._now.time
 
     @property
@@ -158,16 +157,16 @@ class Session:
 
     @property
     def end_reason(self) -> str | None:
-        """Reason for the end, or None while the session continues."""
+        """Reason why the session ended, or None while it continues."""
         if self._delivered == len(self._now.object_names):
             return ALL_DELIVERED
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once. Paths and waits can take many control steps, other actions take one."""
+        """Let the participant act once. Walking and waiting can take many control steps, other actions take one."""
         self._observe()
         if self.assistant.is_custom:
-            self._hud_state()  # so that a faulty condition ends the session even without a viewer
+            self._hud_state()  # a faulty condition then ends the session even without a viewer
         world = self._world
         percept = SessionPercept(
             self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked
@@ -175,10 +174,10 @@ class Session:
         self._step(decide(self._participant, percept), self._step_limit())
 
     def restore(self, record: Record, step: int | None) -> None:
-        """Continue from the checkpoint before a control step of a record, or from the start if `step` is None.
+        """Restore the checkpoint before a control step of a record, or the start if `step` is None.
 
-        The assistant first observes the recorded steps, because its state is not in the checkpoint. Raises StateError
-        if the checkpoint does not fit the world.
+        The assistant first observes the recorded steps, because the checkpoint does not contain its state. Raises
+        StateError if the checkpoint does not match the world.
         """
         if step is None:
             self.begin()
@@ -194,7 +193,7 @@ class Session:
         self._start(restored)
 
     def resume(self, record: Record) -> None:
-        """Continue an unfinished record at its end. The actions after its last checkpoint are simulated again.
+        """Continue an unfinished record from its end. The actions after its last checkpoint are simulated again.
 
         Raises RecordError if the simulated states differ from the recorded ones.
         """
@@ -215,7 +214,7 @@ class Session:
         self._step(action, 1)
 
     def repeat_events(self, record: Record, step: int) -> None:
-        """Repeat external events before a control step, such as scrolling the task list."""
+        """Repeat the external events logged before a control step, such as scrolling the task list."""
         if step == self._restored_step:
             return
         first = record.events_before(step - 1) if step else 0
@@ -227,7 +226,7 @@ class Session:
                 self.note(kind, **fields)
 
     def note(self, event: str, **fields: Any) -> None:
-        """Log an external event at the present time."""
+        """Log an external event at the current simulated time."""
         self._log.append(self._now.time, event, **fields)
 
     def scroll(self, rows: int) -> None:
@@ -237,21 +236,19 @@ class Session:
         self._hud = None
 
     def _log_end(self, time: float, reason: str, **details: str) -> None:
-        """Log the end, after at least one recorded state."""
         if not self.record.step:
             self.record.append(*self._first_state, Steps(IDLE))
         self._log.append(time, "end", reason=reason, **details)
 
     def _observe(self) -> None:
-        """Store a checkpoint if one is due, and show the present state."""
         self._now = self.record.pass_checkpoint(self._world, self._now)
         if self.shows_each_step:
             self.show()
 
     def _step_limit(self) -> int:
-        """Return the largest number of control steps that the next action may take.
+        """Return the maximum number of control steps for the next action.
 
-        It is one if there is a viewer or a better plan may arrive.
+        The maximum is one if there is a viewer or a better plan may arrive.
         """
         if self._viewer is not None or self.assistant.expecting:
             return 1
@@ -274,7 +271,6 @@ class Session:
         self._log_events(step.events)
 
     def _record_end(self, reason: str) -> None:
-        """Record the last state. After the last delivery, show it for a moment that is not part of the record."""
         if reason == ALL_DELIVERED:
             self.assistant.show_message("finished", self._now.time)
         self.record.append(self._now, self._world.health_sample, self._world.state_hash(), Steps(IDLE))
@@ -301,13 +297,12 @@ class Session:
             self.assistant.show_message(refusal, time, result.object)
 
     def _hud_state(self) -> HudState:
-        """Return the current HUD state, which is computed once per world state."""
         if self._hud is None or self._hud[0] is not self._now:
             camera = self._viewer.camera(self._world) if self._viewer is not None else None
             self._hud = self._now, self.assistant.hud_state(self._now, camera)
         return self._hud[1]
 
     def show(self) -> None:
-        """Pass the present state to the viewer, if there is one."""
+        """Pass the current state to the viewer, if there is one."""
         if self._viewer is not None:
             self._viewer.show(self._world, self._now, self._hud_state())

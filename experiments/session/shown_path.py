@@ -1,4 +1,4 @@
-"""Paths to the next visit that a HUD can show: one as planned, and one from the person's position."""
+"""Paths to the next visit for the HUD: the planned path, and the path from the person's position."""
 
 import math
 
@@ -9,16 +9,16 @@ from experiments.participants.base import Point
 from mjsim.world.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
 
-TOLERANCE = 0.6  # m; a new path is shown if the person is farther than this from the path
-MAX_GOAL_SHIFT = 0.25  # m; a new path is shown if the goal was pushed farther than this
+TOLERANCE = 0.6  # a new path is computed if the person is farther than this from the path, in metres
+MAX_GOAL_SHIFT = 0.25  # a new path is computed if the goal has moved farther than this, in metres
 
 
 class ShownPath:
-    """A shortest path, computed at the first access, that stays until its goal moves or the person leaves it.
+    """A shortest path, computed at the first access. It is replaced if its goal moves or the person leaves it.
 
     Args:
         geodesics: Finds the path.
-        rerouted: True to replace the path when the person leaves it. The segment of a plan stays (PAPER section 5).
+        rerouted: True to replace the path when the person leaves it. The planned path stays (PAPER section 5).
     """
 
     def __init__(self, geodesics: Geodesics, *, rerouted: bool) -> None:
@@ -28,25 +28,28 @@ class ShownPath:
         self._points: NDArray[np.float64] | None = None
 
     def begin(self, start: Point, target: Point, goal: Point) -> None:
-        """Show a new path from `start` to `target`.
+        """Set the start and the end of a new path.
 
-        `goal` is the object or the receptacle. All are in m, shape (2,).
+        `goal` is the position of the object or receptacle. All positions are in metres, shape (2,).
         """
         self._start, self._target, self._goal, self._points = start.copy(), target.copy(), goal.copy(), None
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Points of the whole path, m, shape (k, 2). Raises UnreachableError if there is none."""
+        """Points of the whole path in metres, shape (k, 2). Raises UnreachableError if there is no path."""
         if self._points is None:
             self._points = self._geodesics.shortest_path(self._start, self._target).points
         return self._points
 
     def ahead(self, position: Point) -> NDArray[np.float64]:
-        """Return the path from its point nearest to the person, m, shape (k, 2)."""
+        """Return the part of the path ahead of the person in metres, shape (k, 2)."""
         return np.asarray(rest_of(self.points, position[0], position[1]))
 
     def follow(self, positions: NDArray[np.float64], target: Point, goal: Point) -> None:
-        """Show a new path each time the person has left the path. `positions` are successive, in m, shape (n, 2)."""
+        """Replace the path each time the person leaves it.
+
+        `positions` are the person's successive positions in metres, shape (n, 2).
+        """
         off = -1
         while self._rerouted and self._points is not None:
             off = first_off_path(self._points, positions, off + 1, TOLERANCE)
@@ -55,7 +58,7 @@ class ShownPath:
             self._renew(positions[off], target, goal)
 
     def follow_goal(self, position: Point, target: Point, goal: Point) -> None:
-        """Show a new path if the goal has moved. `position` is the person's, m, shape (2,)."""
+        """Replace the path if the goal has moved. `position` is that of the person in metres, shape (2,)."""
         if self._points is not None and math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
             self._renew(position if self._rerouted else self._start, target, goal)
 
@@ -72,12 +75,15 @@ class PathsToNext:
         self.path = ShownPath(geodesics, rerouted=True)
 
     def begin(self, last_visit: Point, position: Point, target: Point, goal: Point) -> None:
-        """Show paths to another visit. All positions are in m, shape (2,), as in `ShownPath`."""
+        """Set the paths to another visit. All positions are in metres, shape (2,)."""
         self.segment.begin(last_visit, target, goal)
         self.path.begin(position, target, goal)
 
     def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """Show new paths if the person has left one or the goal has moved. All positions are in m, shape (2,)."""
+        """Replace a path that the person has left, or both if the goal has moved.
+
+        All positions are in metres, shape (2,).
+        """
         self.segment.follow_goal(position, target, goal)
         self.path.follow_goal(position, target, goal)
         self.path.follow(np.array([position]), target, goal)

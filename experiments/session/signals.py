@@ -1,4 +1,4 @@
-"""Handling of SIGINT (Ctrl-C), SIGTERM (from clusters) and SIGHUP (closed terminal)."""
+"""Signal handlers for SIGINT (Ctrl-C), SIGTERM (sent by job schedulers) and SIGHUP (closed terminal)."""
 
 import asyncio
 import os
@@ -15,7 +15,7 @@ CHECK_TIMEOUT_S = 2.0  # a trial that does not check for signals within this tim
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal, `number`, asked the process to stop."""
+    """The process was asked to stop by the signal `number`."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -27,7 +27,7 @@ def signal_of(stop: KeyboardInterrupt) -> signal.Signals:
 
 
 def exit_code(number: int) -> int:
-    """Return the exit code that shells use for a process stopped by a signal."""
+    """Return the exit code that shells report for a process stopped by a signal."""
     return 128 + number
 
 
@@ -44,7 +44,10 @@ def signals_raised() -> Iterator[None]:
 
 @contextmanager
 def exit_raised() -> Iterator[None]:
-    """Make `os._exit` raise `SystemExit` in this thread during the block. Other threads and processes still exit."""
+    """Make `os._exit` raise `SystemExit` in this thread during the block.
+
+    Other threads and processes are not affected.
+    """
     leave, here = os._exit, (os.getpid(), threading.get_ident())
 
     def refuse(status: int) -> NoReturn:
@@ -60,7 +63,7 @@ def exit_raised() -> Iterator[None]:
 
 
 class PostponedSignals:
-    """Signals that have arrived but are not handled yet. `number` is the first one, or None."""
+    """Signals that have arrived but are not yet handled. `number` is the first one, or None."""
 
     def __init__(self) -> None:
         self.number: int | None = None
@@ -73,7 +76,7 @@ class PostponedSignals:
             raise Stopped(self.number)
 
     def save(self) -> None:
-        """Allow no interruption from now on."""
+        """Prevent interruptions from now on, so that results can be saved."""
         self._saving = True
         self._stop_timer()
 
@@ -126,7 +129,6 @@ def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
 
 @contextmanager
 def _handled(handler: Callable[[int, FrameType | None], Any]) -> Iterator[None]:
-    """Install a handler for all signals except those that the process ignores (as after `nohup`)."""
     previous: dict[signal.Signals, Any] = {}
     if threading.current_thread() is threading.main_thread():
         for number in SIGNALS:

@@ -22,7 +22,8 @@ from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
 
-READING_TIME = 2.0  # how long a message is shown before a new plan may be announced, in seconds
+# How long a message is shown before the announcement of a new plan may replace it, in seconds
+READING_TIME = 2.0
 REPLANNED = "replanned"
 
 
@@ -31,8 +32,6 @@ def task_step(visit: Visit) -> TaskStep:
 
 
 class _Shown(NamedTuple):
-    """A message in the message bar: its key, the time (s) at which it appeared, and its object."""
-
     key: str
     since: float
     object: str | None = None
@@ -40,7 +39,7 @@ class _Shown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanView:
-    """The planner's suggestion in one state of the world (a `PlanAhead`), computed when a condition asks for it."""
+    """The planner's suggestion for one state of the world, computed when a condition requests it."""
 
     board: "TaskBoard"
     observation: Observation
@@ -74,9 +73,9 @@ class PlanView:
 
 
 class TaskBoard:
-    """Describes the task to the conditions, and keeps the message and the steps done.
+    """Describes the task to the conditions, and stores the current message and the completed steps.
 
-    `order` are the object names in this participant's random order (PAPER section 5).
+    `order` lists the object names in the random order chosen for this participant (PAPER section 5).
     """
 
     def __init__(
@@ -94,7 +93,7 @@ class TaskBoard:
         self._scroll = 0
         self._latest = _Shown("started", -math.inf)
         self._replanned_at: float | None = None
-        self._objects: dict[int, TaskObject] = {}  # by number, ascending
+        self._objects: dict[int, TaskObject] = {}
         self._receptacles = tuple(self._task_receptacle(key) for key in episode.receptacles)
 
     def note_visit(self, visit: Visit) -> None:
@@ -102,31 +101,31 @@ class TaskBoard:
         self._scroll = 0
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end, until the next visit."""
+        """Scroll the task list by a number of rows, positive towards its end. The next visit resets it."""
         max_rows = 2 * len(self.episode.objects)
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or refusal at `time` (s), in place of the previous one."""
+        """Show a message about an event or a refused action, replacing the previous one. `time` is in seconds."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:
             self._replanned_at = None
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Announce a new plan made at `time` (s), after the previous message has been shown for `READING_TIME`."""
+        """Announce a plan made at `time` in seconds, once the current message has been shown for `READING_TIME`."""
         self._replanned_at = time
 
     def view(
         self,
         observation: Observation,
         *,
-        ahead: PlanAhead = KnownPlan(),  # noqa: B008 - it never changes
+        ahead: PlanAhead = KnownPlan(),  # noqa: B008 - immutable
         capacity: int = CAPACITY,
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
     ) -> TaskView:
-        """Return the task as a condition sees it now."""
+        """Return the task as a condition currently sees it."""
         return TaskView(
             objects=self._task_objects(observation),
             receptacles=self._receptacles,
@@ -168,7 +167,6 @@ class TaskBoard:
         )
 
     def _shown(self, time: float) -> "_Shown":
-        """Return the latest message at a time (s), even if it has already faded from the message bar."""
         if self._replanned_at is None:
             return self._latest
         since = max(self._replanned_at, self._latest.since + READING_TIME)
@@ -179,13 +177,12 @@ class TaskBoard:
         return self.house.catalogue.objects[model].label
 
     def goal(self, observation: Observation, visit: Visit) -> Vec3:
-        """Return the position of a visit's object, or the middle of its receptacle, m."""
+        """Return the position of a visit's object, or the centre of its receptacle, in metres."""
         if visit.kind is VisitKind.PICK:
             return _vec3(observation.object_positions[observation.object_names.index(visit.object)])
         return _vec3(self.house.receptacles[self.episode.targets[visit.object]].center)
 
     def _task_objects(self, observation: Observation) -> tuple[TaskObject, ...]:
-        """Return all objects. An object that has not changed since the last call is the same value."""
         positions, statuses = observation.object_positions.tolist(), observation.object_status
         for i, (position, status) in enumerate(zip(positions, statuses, strict=True)):
             known = self._objects.get(i)

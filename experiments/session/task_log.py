@@ -1,4 +1,4 @@
-"""The log of a session's plans and visits, with suggestions and regrets."""
+"""The log of a session's plans and visits, with the suggested visits and the regrets."""
 
 import itertools
 from typing import Any
@@ -16,9 +16,9 @@ from planner.service import Planner
 
 
 class TaskLog:
-    """Requests and logs plans. It does so even in conditions that show none, to measure deviations (PAPER section 6).
+    """Requests and logs plans, even in conditions that do not show them, to measure deviations (PAPER section 6).
 
-    Lines of the log are reserved at once and filled in when the planner has answered.
+    Each log line is reserved immediately and filled in when the planner has answered.
     """
 
     def __init__(
@@ -30,9 +30,9 @@ class TaskLog:
         self._visits = 0
 
     def plan(self, time: float, state: TaskState, position: NDArray[Any], *, shown: bool) -> None:
-        """Request the plan for a state, and log it if it is new. `position` is the person's, m, shape (2,).
+        """Request a plan for a state, and log it if it is new. `position` is that of the person in metres, shape (2,).
 
-        Raises UnreachableError, with names, if objects cannot be fetched or delivered.
+        Raises UnreachableError with the object names if objects cannot be fetched or delivered.
         """
         line, first = self._log.reserve(), self._state is None
         if first:
@@ -59,7 +59,7 @@ class TaskLog:
         return before is None or better.visits != before.visits
 
     def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
-        """Log a visit and the plan before it. `position` is the person's, m, shape (2,)."""
+        """Log a visit and the plan before it. `position` is that of the person in metres, shape (2,)."""
         assert self._state is not None  # noqa: S101 - for the type checker
         line, state, number = self._log.reserve(), self._state, self._visits
         walk = self._house.body_geodesics.shortest_path(self._last_visit_at, position)
@@ -85,14 +85,14 @@ class TaskLog:
         self._last_visit_at = position
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not yet known when their visits were logged."""
+        """Log the regrets that were not yet computed when their visits were logged."""
         for (number, names), regret in self._planner.finish():
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
     def _distance_to(self, state: TaskState, made: Visit) -> float:
-        """Return the planner's distance (m) from the place of the last visit to the place of this one.
+        """Return the planner's distance in metres between the locations of the previous visit and this one.
 
-        The place of a delivery is in front of the bin.
+        A delivery is located in front of its bin.
         """
         place = state.deliveries[made.object]
         if made.kind is VisitKind.PICK:
@@ -103,7 +103,6 @@ class TaskLog:
         return float(self._house.geodesics.shortest_path(here, there).geodesic_distance)
 
     def _alternatives(self, state: TaskState, made: Visit, suggested: Visit | None) -> dict[str, int | bool]:
-        """Count the other feasible visits, and those that place another object into the suggested bin."""
         feasible = len(state.carried) + (len(state.loose) if len(state.carried) < self._capacity else 0)
         tied: set[str] = set()
         if suggested is not None and suggested.kind is VisitKind.PLACE:
@@ -116,7 +115,6 @@ class TaskLog:
         }
 
     def _regret_fields(self, number: int, made: Visit, route: Route | None) -> dict[str, float | None]:
-        """Return the regrets of a visit and of the suggested one. The next visit of an optimal plan has regret 0."""
         proven = route is not None and route.plan.status is Status.OPTIMAL
         suggested = route.next if route else None
         names: dict[Visit, tuple[str, ...]] = {made: ("regret_m",)}
@@ -131,7 +129,6 @@ class TaskLog:
 
 
 def _plan_fields(route: Route) -> dict[str, Any]:
-    """Return the log fields of a plan. Cost and bound refer to the state for which the plan was made."""
     return {
         "cost_m": round(route.plan.cost, 6),
         "lower_bound_m": round(route.plan.lower_bound, 6),
@@ -149,10 +146,11 @@ def _rounded(metres: float | None) -> float | None:
 
 
 def reach_bound(tour: float, house: House, episode: Episode) -> float:
-    """Return a lower bound (m) on walking for any order of visits. `tour` (m) bounds it without reaching for objects.
+    """Return a lower bound in metres on the walking distance for any order of visits.
 
-    A person who picks and places from a distance can save that distance on the way to a place and again on the way from
-    it, except after the last visit. Objects are assumed to stay in place, and arms to reach over free floor only.
+    `tour` is a lower bound in metres without reaching. A person who picks and places from a distance saves that
+    distance on the way to a location and again on the way from it, except after the last visit. The bound assumes that
+    objects stay where they are and that a person reaches only across free floor.
     """
     reach = house.person.reach
     places = [
@@ -164,7 +162,6 @@ def reach_bound(tour: float, house: House, episode: Episode) -> float:
 
 
 def _extent(receptacle: ReceptacleGeometry) -> float:
-    """Return the horizontal distance (m) from a receptacle's approach to the farthest point of its volume."""
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) * receptacle.half_size
     floor = (corners @ receptacle.rotation.T + receptacle.center)[:, :2]
     return float(np.linalg.norm(floor - receptacle.approach, axis=1).max())

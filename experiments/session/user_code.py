@@ -1,4 +1,4 @@
-"""Calls of custom participants, conditions and planners, with errors that name their origin."""
+"""Calls of custom participants, conditions and planners, with errors that name the faulty code."""
 
 import os
 import signal
@@ -33,19 +33,19 @@ from mjsim.values.actions import Action
 from mjsim.values.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
-MAX_CALL_LIMIT = 1e6  # s
+MAX_CALL_LIMIT = 1e6  # in seconds
 PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, RenderError)
 
 
 class _Overdue(BaseException):
-    """A call exceeded its time limit. User code cannot stop this with `except Exception`."""
+    """A call exceeded its time limit. It is not an `Exception`, so that user code does not catch it by accident."""
 
 
 @contextmanager
 def user_code(code: object, what: str) -> Iterator[None]:
-    """Raise a `UserCodeError` for any exception of user code in the block, `SystemExit` included, and limit its time.
+    """Raise a `UserCodeError` for any exception in the block, including `SystemExit`, and limit the time of the block.
 
-    The block has no effect if `code`, a function or an object, belongs to this project. `what` is its name in messages.
+    The block is not affected if `code`, a function or an object, belongs to mjsim. `what` names the code in messages.
     """
     if not is_own(code):
         yield
@@ -72,7 +72,7 @@ def _call_limit() -> float:
 
 @contextmanager
 def _time_limit(limit: float) -> Iterator[None]:
-    """Interrupt the block after a time (s). 0 means no limit. Has no effect outside the main thread."""
+    """Interrupt the block after a time in seconds. 0 means no limit. Has no effect outside the main thread."""
     if not limit or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -131,7 +131,7 @@ def needs_of(participant: Participant) -> frozenset[str]:
 
 
 def decide(participant: Participant, percept: Percept) -> Action:
-    """Return the decision of a participant.
+    """Return the action that a participant chooses.
 
     Raises UserCodeError if a custom participant failed or returned another type.
     """

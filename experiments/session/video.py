@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 
 Image = NDArray[np.uint8]
-QUEUE_LENGTH = 8  # frames
+QUEUE_LENGTH = 8  # in frames
 
 
 class VideoWriter:
     """Writes frames to an MP4 file. Use it as a context manager to complete the file.
 
-    Width and height (px) must be even (4:2:0 chroma). Raises RecordError if one is odd, or if the encoder failed.
+    Width and height in pixels must be even because chroma is subsampled (4:2:0). Raises RecordError if one of them is
+    odd, or if the encoder failed.
     """
 
     def __init__(self, path: Path, *, width: int, height: int, fps: int = 25) -> None:
@@ -41,9 +42,9 @@ class VideoWriter:
         return self._hash.hexdigest()
 
     def write(self, frame: Image) -> None:
-        """Append a frame, uint8 RGB of shape (height, width, 3), which the caller must not change afterwards.
+        """Append an RGB frame, uint8, shape (height, width, 3), which the caller must not change afterwards.
 
-        Raises RecordError if the frame has another shape, or the encoder failed.
+        Raises RecordError if the frame has another shape, or if the encoder failed.
         """
         if frame.shape != self._shape:
             raise RecordError(f"frame of shape {frame.shape} does not fit a video of shape {self._shape}")
@@ -69,16 +70,16 @@ class VideoWriter:
     def _encode(self) -> None:
         try:
             self._encode_all()
-        except BaseException as failure:  # raised later, in the thread that adds frames
+        except BaseException as failure:  # raised again later, in the thread that adds frames
             self._failure = failure
             while self._queue.get() is not None:
                 pass
 
     def _encode_all(self) -> None:
         height, width, _ = self._shape
-        # faststart puts the index first, so that a browser can play the file while it is loading.
+        # faststart puts the index first, so that a browser can play the file while loading it.
         with av.open(str(self._path), "w", options={"movflags": "+faststart"}) as container:
-            # With one thread x264 is deterministic, and the renderer keeps the other cores.
+            # With one thread x264 is deterministic, and the renderer can use the other cores.
             stream = container.add_stream(
                 "libx264", rate=self._fps, options={"preset": "veryfast", "crf": "22", "threads": "1"}
             )
