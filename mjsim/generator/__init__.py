@@ -1,1 +1,1 @@
-"""Houses made from a seed: rooms, doors, windows, furniture and bins, the same bytes in every process."""
+"""Homes generated from a seed: rooms, doors, windows, furniture and bins. Every process generates the same bytes."""

@@ -12,12 +12,12 @@ from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
 from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
-LOW = 1.15  # maximum height of furniture with pictures above it, in metres
-BESIDE_TILES = 0.3  # distance between kitchen tiles and a picture, in metres
-LAMPS_APART = 0.8  # minimum distance between lamps, in metres
-LARGE = 15.0  # floor area from which a room looks bare without a large rug, in m^2
-LONG = 2.0  # length from which a free stretch of wall looks bare, in metres
-MOST_HUNG = 4  # maximum per room, because each picture has its own texture
+LOW = 1.15  # maximum height of furniture below a picture, in metres
+BESIDE_TILES = 0.3  # minimum distance between kitchen tiles and a picture, in metres
+LAMPS_APART = 0.8  # minimum distance between two lamps, in metres
+LARGE = 15.0  # minimum floor area of a room that gets a large rug, in square metres
+LONG = 2.0  # minimum length of a free stretch of wall that must get a picture or the like, in metres
+MOST_HUNG = 4  # maximum number of wall decorations per room, since each picture has its own texture
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -43,7 +43,7 @@ _RUGS: dict[str, tuple[str, ...]] = {
 def decorate(
     spaces: Sequence[Space], uses: Mapping[str, str], plan: HomePlan, look: Appearance, seed: int
 ) -> None:
-    """Add decoration to all rooms. Only radiators take up floor space."""
+    """Add decoration to all rooms. Of these pieces, only radiators take up floor space."""
     for door in plan.doors:
         if door.is_front:
             space = next(s for s in spaces if s.room.key == door.rooms[0])
@@ -71,7 +71,6 @@ def _at_wall(space: Space, side: Side, along: float) -> PiecePose:
 
 
 def _tallest(space: Space, side: Side, start: float, end: float, deep: float) -> float:
-    """Height, in metres, of the tallest piece along a stretch of wall and within `deep` of it."""
     zone = space.room.floor.along(side, start, end, 0.0, deep)
     tops = [
         top
@@ -82,7 +81,6 @@ def _tallest(space: Space, side: Side, start: float, end: float, deep: float) ->
 
 
 def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng: np.random.Generator) -> None:
-    """Add a radiator below a window, and curtains or a blind."""
     side, half = window.side, window.width / 2
     fit = (window.width, window.sill, window.top)
     low, high = space.room.floor.wall(side)
@@ -111,7 +109,7 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
 
 
 def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
-    """Hang one ceiling lamp, or two in a long room, but not close to lamps that hang over tables."""
+    """Hang one ceiling lamp, or two in a long room, away from lamps over tables."""
     floor = space.room.floor
     hanging = [
         moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]
@@ -134,7 +132,6 @@ def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> Non
 
 
 def _lay_rug(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
-    """Lay a rug on the largest free floor, or a mat in front of the bath."""
     lies = any(p.kind == "rug" for piece, _ in space.stood for p, *_ in flattened(piece))
     if use not in _RUGS or lies or (rng.random() > 0.85 and space.room.floor.area < LARGE):
         return
@@ -168,7 +165,6 @@ def _before(piece: Piece, place: PiecePose) -> tuple[float, float]:
 
 
 def _rug_poses(space: Space, rug: Piece) -> list[PiecePose]:
-    """Poses at which a rug fits into the room, those nearest to the middle first."""
     floor, found = space.room.floor, []
     for turns in (0, 1):
         w, d = (rug.size[0], rug.size[1]) if turns == 0 else (rug.size[1], rug.size[0])
@@ -182,7 +178,6 @@ def _rug_poses(space: Space, rug: Piece) -> list[PiecePose]:
 
 
 def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Generator) -> None:
-    """Hang something on each wall with a free stretch, above low furniture if there is any."""
     kinds = _WALLS.get(use, ("picture", "picture", "wall_shelf", "picture"))
     if use in ("bedroom", "living_room"):
         kinds = ("picture", "wall_lamp", "picture", "wall_mirror")
@@ -192,7 +187,7 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
         for side in (SIDES[i] for i in rng.permutation(4))
         for stretch in _stretches(space, side, *space.room.floor.wall(side))
     ]
-    # Long stretches come first, so that none of them stays bare.
+    # Start with the long stretches, because they would look bare without decoration.
     found.sort(key=lambda stretch: stretch[2] - stretch[1] < LONG)
     for side, start, end in found:
         if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
@@ -209,11 +204,10 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
 
 
 def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[float, float]]:
-    """Free stretches of a wall, m."""
     blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
     deep = space.room.floor.along(side, low, high, 0.0, 0.4)
     tiled = [
-        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles above worktops
+        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles above the worktop
         for piece, at in space.stood
         for part in piece.parts
         if "kitchen" in piece.kind
@@ -234,7 +228,6 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
 
 
 def _over(space: Space, side: Side, first: float, last: float) -> float:
-    """Position along a wall for a picture, m: above the middle of a piece, else midway between the limits."""
     for piece, place in space.stood:
         if place.side == side and piece.parts and first <= place.along <= last and piece.size[0] > 0.7:
             return place.along

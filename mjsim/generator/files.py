@@ -1,4 +1,4 @@
-"""The files of a generated house: MJCF, catalogue, recipe, and textures that were drawn for it."""
+"""Files of a generated house: MJCF model, catalogue, recipe and textures."""
 
 import json
 import math
@@ -13,12 +13,14 @@ from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 
-STYLE = "houses/apartment"  # generated houses use its classes, materials, categories and objects
-# Materials that the default classes and the drawn shadows need.
+# House whose classes, materials, categories and objects are used by all generated houses.
+STYLE = "houses/apartment"
+# Materials used by the default classes and by drawn shadows.
 _ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
-_SHADOWS = 15.0  # shadow range in metres; a shorter one is sharper but speckles round objects
-POINTS_PER_M2 = 0.32  # points at which objects may be dropped; fewer than fit into a furnished home
-POINTS = (8, 40)  # minimum and maximum
+_SHADOWS = 15.0  # range of shadows in metres; a shorter range is sharper but causes speckles on round objects
+# Number of drop points per square metre of floor, low enough to fit into a furnished home.
+POINTS_PER_M2 = 0.32
+POINTS = (8, 40)  # minimum and maximum number of drop points
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -44,7 +46,7 @@ _HEAD = """\
 
 
 def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping[str, bytes]:
-    """The files of a house by path, including its recipe. Every process generates the same bytes.
+    """Return the files of a house, including its recipe, by path. Every process generates the same bytes.
 
     Args:
         recipe: The house.
@@ -96,7 +98,7 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
 
 
 def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
-    """MJCF of the materials that a world uses, with their textures.
+    """Return the MJCF of the materials that a world uses, with their textures.
 
     Materials of the apartment are used only for names that neither `own` nor `brought` define.
     """

@@ -1,4 +1,4 @@
-"""Furniture and bins in a home plan, by rules: first required furniture, then default furniture."""
+"""Rule-based placement of furniture and bins in a home plan: first required furniture, then default furniture."""
 
 import itertools
 import math
@@ -33,11 +33,11 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
-SIZES = 4  # number of sizes that are tried for a piece
-BARE = 0.285  # furnished share of the floor below which a home gets more furniture
-LEAST, MOST = 0.26, 0.44  # limits of the furnished share of the floor
-MAX_FAILURES = 4  # number of pieces that may fail to fit before a room is left as it is
-# The screen of a wash corner would hide a door, and the cooker of a kitchenette should not be next to one.
+SIZES = 4  # number of sizes tried for each piece
+BARE = 0.285  # if furniture covers a smaller share of a home's floor, more is added
+LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor covered by furniture
+MAX_FAILURES = 4  # number of pieces that may fail to fit before a room counts as full
+# The screen of a wash corner would block a door. The cooker of a kitchenette should not be next to one.
 AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 
@@ -63,13 +63,13 @@ class FurnishedHome:
         return "child" if is_child else room.use
 
     def rooms(self, uses: Iterable[str]) -> list[Space]:
-        """The rooms with one of these uses, in the order of the uses."""
+        """Return the rooms with one of these uses, in the order of the uses."""
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
         self, space: Space, kind: str, *, largest: int = 0, smallest: int = SIZES - 1, number: int = 0
     ) -> bool:
-        """Put a piece of a kind into a room, as large as it fits. Return False if it does not fit."""
+        """Place the largest version of a furniture type that fits into a room. Return False if none fits."""
         rng = stream(self.seed, "furniture", space.room.key, kind, str(number), str(self.attempt))
         for smaller in range(min(max(largest, self.attempt - 2), smallest), smallest + 1):
             for sides in AXES if kind == "lounge" else ((*AXES[0], *AXES[1]),):
@@ -92,7 +92,7 @@ class FurnishedHome:
                 self.mounts.append(BinPlacement(key, space.room.key, place, position, turns))
 
     def put_bin(self, receptacle: str) -> bool:
-        """Put a bin that stands on the floor into the first room in which it fits."""
+        """Place a floor-standing bin in the first room with enough space. Return False if no room has space."""
         if receptacle not in BIN_SIZES:
             return any(mount.receptacle == receptacle for mount in self.mounts)
         w, d, h = BIN_SIZES[receptacle]
@@ -109,7 +109,7 @@ class FurnishedHome:
         return False
 
     def add_required_furniture(self) -> None:
-        """Add what every home has. Raise `HouseError` if something does not fit."""
+        """Add the furniture that every home has. Raise `HouseError` if a piece does not fit."""
         if not self.rooms(("bathroom", "shower_room")):
             self._put_first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
         cooking = next((space.room.use for space in self.rooms(COOKING)), "")
@@ -144,21 +144,18 @@ class FurnishedHome:
             raise HouseError(f"only {self.seats} of {wanted} seats fit in seed {self.seed}")
 
     def _put_first(self, kinds: Sequence[str], uses: Sequence[str], what: str) -> None:
-        """Put a piece into the first room with space for one of these kinds. Prefer earlier kinds."""
         for space in self.rooms(uses):
             if any(self.put(space, kind) for kind in kinds):
                 return
         raise HouseError(f"no place for {what} in seed {self.seed}")
 
     def _put_kitchen(self, space: Space) -> bool:
-        """Put the longest kitchen that fits, straight or around a corner."""
         narrow = min(space.room.floor.width, space.room.floor.depth) < 2.3
         order = ["corner_kitchen", "straight_kitchen"][int(narrow or space.rng.random() < 0.4) :]
         choices = itertools.product(range(SIZES + 2), order)
         return any(self.put(space, kind, largest=size, smallest=size) for size, kind in choices)
 
     def _put_any(self, space: Space, kinds: Sequence[str]) -> None:
-        """Put one of some kinds, in random order."""
         order = list(kinds)
         if kinds[0] != kinds[-1]:
             order = [kinds[i] for i in space.rng.permutation(len(kinds))]
@@ -173,7 +170,7 @@ class FurnishedHome:
                 self.put(space, "armchair")
 
     def add_default_furniture(self) -> None:
-        """Furnish each room until enough of its floor is covered. Add more if the home as a whole is still bare."""
+        """Furnish each room until enough of its floor is covered. Add more if the whole home is still too bare."""
         for space in self.spaces:
             self._put_defaults(space)
         for space in self.spaces:
@@ -183,7 +180,7 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Raise `HouseError` if a room is empty, or too little or too much of the floor is furnished."""
+        """Raise `HouseError` if a room is empty, or if too little or too much of the floor is covered by furniture."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
@@ -207,7 +204,6 @@ class FurnishedHome:
                 failures += not self._put_one_more(space, order, number, again)
 
     def _put_one_more(self, space: Space, kinds: Sequence[str], number: int, more: int) -> bool:
-        """Put the first of these kinds that fits. `more` raises the number of a kind that a room may have."""
         there = [member.kind for piece, _ in space.stood for member, *_ in flattened(piece)]
         if kinds[0] in PLANTS and sum(kind in PLANTS for kind in there) >= MAX_PLANTS:
             return False
@@ -243,7 +239,7 @@ def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) ->
 
 
 def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
-    """Furnish a home as `furnish` does, and return it with the spaces of its rooms."""
+    """Furnish a home, and return it with its rooms' spaces. Raise `HouseError` if a required piece does not fit."""
     look = draw_appearance(palette, stream(seed, "look"))
     for attempt in range(ATTEMPTS):
         home = FurnishedHome(plan, bins, look, seed, attempt)
@@ -260,7 +256,7 @@ def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: in
 
 
 def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[Placement]:
-    """The placements of a piece, or of the members of a group."""
+    """Return the placements of a piece, or of all members of a group."""
     found = []
     for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
         turns = round(yaw / (math.pi / 2))

@@ -1,4 +1,4 @@
-"""Generation of homes from a seed: plan, doors and windows, furniture."""
+"""Generation of homes from a seed: plan, doors, windows and furniture."""
 
 from mjsim.generator.furnish import furnish
 from mjsim.generator.openings import add_openings
@@ -9,13 +9,14 @@ from mjsim.generator.values import Furnishing, HomePlan
 from mjsim.house.catalogue.generated_names import VERSION, stream
 from mjsim.values.errors import HouseError
 
-ATTEMPTS = 40  # plans
-_BINS = ("dish_bin", "laundry_hamper")  # in every home
-_MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")  # a studio has only one of them
+ATTEMPTS = 40  # maximum number of plans that are tried
+_BINS = ("dish_bin", "laundry_hamper")  # bins in every home
+# Further bins, of which a studio has only one.
+_MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")
 
 
 def generate(seed: int, rooms: int) -> tuple[Recipe, Furnishing]:
-    """Generate the house of a seed. Plans that cannot be furnished are discarded.
+    """Generate the house of a seed. Plans that cannot be furnished are discarded and replaced.
 
     Raises:
         HouseError: No plan was found, or none of `ATTEMPTS` could be furnished.

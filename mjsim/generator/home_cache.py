@@ -1,4 +1,4 @@
-"""Generated homes as folders in the user's cache."""
+"""Cache of generated homes, with one folder per home."""
 
 import dataclasses
 import functools
@@ -54,7 +54,8 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
     key = hashlib.sha256(identity + _digest(models).encode()).hexdigest()[:24]
     folder = cache_base() / "houses" / key
     if not (folder / CATALOGUE).is_file():
-        from mjsim.generator.generated import furnish_plan, generate  # OR-Tools takes a while to load
+        # Imported late, because OR-Tools loads slowly.
+        from mjsim.generator.generated import furnish_plan, generate
 
         if isinstance(made_of, Recipe):
             recipe, furnishing = made_of, furnish_plan(made_of.seed, made_of.plan)
@@ -65,7 +66,7 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write all files atomically. If another process was quicker, its folder stays."""
+    """Write all files atomically. If another process has already written the folder, keep that one."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with work_folder(folder.parent) as work:
@@ -86,7 +87,7 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 @functools.cache
 def _digest(models: Path) -> str:
-    """Digest of everything besides its name that determines a home: code, styles and library versions."""
+    """Hash everything except the name that determines a home: code, styles and library versions."""
     random_streams = Path(__file__).parents[1] / "house" / "catalogue" / "generated_names.py"
     style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
     code = digest_of(Path(__file__).parent, random_streams, *style)

@@ -1,4 +1,4 @@
-"""Doors with their open leaves, and windows, for the rooms of a plan."""
+"""Placement of doors, door leaves and windows in a plan."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -21,18 +21,18 @@ from mjsim.generator.values import (
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
-# Lengths in m.
-CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear widths of doors and of the front door
-WIDE_CLEAR = (1.4, 1.6, 1.8)  # clear width of passages
+# Lengths are in metres.
+CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear widths of inner doors and of the front door
+WIDE_CLEAR = (1.4, 1.6, 1.8)  # possible clear widths of passages
 TOP, WIDE_TOP = 2.05, 2.2  # heights of doors and of passages
 JAMB = 0.12  # minimum length of wall between an opening and a corner
 LEAF_DEPTH = 0.06
 LEAST_GLASS = 1 / 10  # minimum ratio of window area to floor area in rooms that need daylight
 WINDOW_TOP = 2.2
-BESIDE_SHOWER = 1.85  # minimum length of a bathroom wall with a window next to a shower
+BESIDE_SHOWER = 1.85  # minimum length of a bathroom wall that has a window next to a shower
 NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1
-SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # probabilities
-EXTRA_WAYS = (  # pairs of rooms that an extra door may connect, which makes a loop
+SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # probabilities of an extra door and of a second window
+EXTRA_WAYS = (  # pairs of rooms that an extra door may connect, which creates a loop
     ("kitchen", "living_room"),
     ("dining_room", "living_room"),
     ("dining_room", "kitchen"),
@@ -62,7 +62,7 @@ def add_openings(seed: int, programme: Programme, rooms: Sequence[Room], attempt
 
 
 def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
-    """The side of `a` that faces `b`, and the start and end of their shared wall; None if they share none."""
+    """Return the side of `a` at the wall shared with `b`, and the wall's start and end. None if they share no wall."""
     for side in SIDES:
         across = a.floor.along(side, *a.floor.wall(side), -2 * WALL, 0.0)
         if b.floor.overlaps(across) and not b.floor.overlaps(a.floor):
@@ -73,9 +73,9 @@ def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
 
 
 def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[float, float, bool]]:
-    """Divide a wall of a room into stretches (start, end, is_outside), from corner to corner of the room's cell.
+    """Divide a room's wall into stretches (start, end, is_outside), from corner to corner of the room's cell.
 
-    A cell is a room's floor together with half of the inner walls around it. The cells of a home leave no gaps.
+    A cell is the room's floor together with the adjacent halves of its inner walls, so cells cover a home without gaps.
     """
     start, end = (value + sign * WALL / 2 for value, sign in zip(room.floor.wall(side), (-1, 1), strict=True))
     cuts = []
@@ -107,7 +107,7 @@ def _extra_ways(programme: Programme, rooms: Sequence[Room], rng: np.random.Gene
 
 
 def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Generator) -> Door | None:
-    """A door that overlaps no other door and, if possible, is not close to one. None if no door fits."""
+    """Place a door so that it overlaps no other door and, if possible, is not close to one. None if it does not fit."""
     wall = shared_wall(a, b)
     if wall is None:
         return None
@@ -116,7 +116,7 @@ def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Gene
     near, far = low + JAMB + width / 2, max(low, high) - JAMB - width / 2
     if far < near - 1e-6 or width < CLEAR - 1e-6:
         return None
-    # Doors near a corner leave more wall for furniture.
+    # A door near a corner leaves more wall for furniture.
     ends = [near, far] if rng.random() < 0.5 else [far, near]
     between = list(near + max(0.0, far - near) * rng.random(6))
     places = [*ends, *between] if rng.random() < 0.7 else [*between, *ends]
@@ -126,7 +126,6 @@ def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Gene
 
 
 def _front_door(room: Room, rooms: Sequence[Room], rng: np.random.Generator) -> Door:
-    """A front door in an outer wall of the hub."""
     reach = CLEAR_FRONT / 2 + JAMB + WALL / 2
     places = [
         (side, at)
@@ -159,7 +158,7 @@ def _before(room: Room, door: Door, depth: float) -> Rectangle:
 
 
 def _windows(plan: HomePlan, room: Room, rng: np.random.Generator) -> list[Window]:
-    """Windows in the outer walls of a room, if possible with enough glass for daylight where the room needs it."""
+    """Place windows in a room's outer walls. If the room needs daylight, try to make the windows large enough."""
     needs_light = NEEDS[room.key].daylight
     outer = [
         (side, low + WALL / 2, high - WALL / 2)
@@ -185,7 +184,7 @@ def _windows(plan: HomePlan, room: Room, rng: np.random.Generator) -> list[Windo
             if width < 0.55 or (not needs_light and free_high - free_low < BESIDE_SHOWER):
                 continue
             if not needs_light:
-                shift = round(shift)  # at one end, which leaves a corner for a shower
+                shift = round(shift)  # at one end, so that a shower fits into the other corner
             at = free_low + 0.2 + width / 2 + shift * (room_for - width)
             windows.append(Window(room.key, side, round(at, 3), round(width, 3), sill, WINDOW_TOP))
             break
@@ -204,7 +203,6 @@ def _sill(room: Room, rng: np.random.Generator) -> float:
 
 
 def _free(plan: HomePlan, room: Room, side: Side, low: float, high: float) -> Iterator[tuple[float, float]]:
-    """Stretches of a wall between its doors."""
     at = low
     doors = [door for door in plan.doors_of(room.key) if door.side_in(room.key) == side]
     for door in sorted(doors, key=lambda door: door.center):
@@ -215,7 +213,7 @@ def _free(plan: HomePlan, room: Room, side: Side, low: float, high: float) -> It
 
 
 def _with_leaves(plan: HomePlan, rng: np.random.Generator) -> Iterator[Door]:
-    """The doors, with a leaf if it can stand open against a wall, clear of doors and windows."""
+    """Yield the doors. A door gets a leaf if the open leaf fits against a wall without covering a door or window."""
     taken: list[Rectangle] = []
     for door in plan.doors:
         if door.is_front or door.height == WIDE_TOP:
@@ -232,7 +230,7 @@ def _with_leaves(plan: HomePlan, rng: np.random.Generator) -> Iterator[Door]:
 
 
 def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
-    """Possible leaves of a door in one room: on either side of the door, and along the next wall at a corner."""
+    """Yield the possible leaves of a door: on both sides of the door, and along the adjacent wall at a corner."""
     floor, side, half = room.floor, door.side_in(room.key), door.width / 2
     low, high = floor.wall(side)
     left, right = door.center - half, door.center + half
@@ -248,7 +246,6 @@ def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
 
 
 def _from_corner(floor: Rectangle, side: Side, corner: Side, width: float) -> Rectangle:
-    """The rectangle of a leaf that stands along `side` and begins at its corner with the wall `corner`."""
     low, high = floor.wall(side)
     start = low + 0.03 if corner in ("south", "west") else high - 0.03 - width
     end = low + 0.03 + width if corner in ("south", "west") else high - 0.03

@@ -1,4 +1,4 @@
-"""Room layouts by a constraint solver: rectangles on a grid that cover a rectangular or L-shaped outline.
+"""Floor plans computed by a constraint solver: rectangular rooms that fill a rectangular or L-shaped outline.
 
 There is no objective: any layout close to the target areas is accepted, and variety comes from the programme. Solving
 time is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
@@ -17,25 +17,23 @@ from mjsim.generator.values import WALL, Rectangle, Room
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
-GRID = 0.2  # m
-TRIES = 500  # programmes
-EFFORT = 0.025  # limit of the solver's deterministic time per programme, in seconds
-SLACK, LARGE_SLACK = 0.25, 0.45  # relative tolerance of room areas in small and large homes
-LARGE = 9  # number of rooms from which a home is large
+GRID = 0.2  # cell size in metres
+TRIES = 500  # maximum number of programmes that are tried
+EFFORT = 0.025  # solver time per programme, in deterministic seconds
+SLACK, LARGE_SLACK = 0.25, 0.45  # relative tolerance of room areas in small and in large homes
+LARGE = 9  # minimum number of rooms of a large home
 VOID = 1.2  # minimum side of the corner cut out of an L-shaped outline, in metres
 
 
 @dataclass(frozen=True)
 class _Box:
-    """The solver's variables of a rectangle, in cells of the grid."""
-
     low: tuple[Any, Any]
     high: tuple[Any, Any]
     size: tuple[Any, Any]
 
 
 def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tuple[Room, ...]]:
-    """Draw a programme from a seed, and lay out its rooms. Each `attempt` gives a different layout.
+    """Draw a programme from a seed, and lay out its rooms. Each value of `attempt` gives a different layout.
 
     Raises:
         HouseError: No layout was found, or the number of rooms is out of range.
@@ -112,7 +110,7 @@ def _add_room(
     w, h = box.size
     gross = model.new_int_var(0, outline[0] * outline[1], "")
     model.add_multiplication_equality(gross, (w, h))
-    # Area of the floor between the walls, in hundredths of a cell.
+    # Floor area between the walls, in hundredths of a cell.
     floor = 100 * gross - round(100 * WALL / GRID) * (w + h) + round(100 * (WALL / GRID) ** 2)
     cell = 100 / GRID**2
     model.add(floor >= math.ceil(cell * max(needs.area[0], area[0])))
@@ -129,7 +127,6 @@ def _add_room(
 
 
 def _add_void(model: Any, rng: np.random.Generator, outline: tuple[int, int]) -> _Box:
-    """Add the corner that is cut out of an L-shaped outline."""
     box = _add_box(model, round(VOID / GRID), outline)
     for axis, at_end in enumerate(rng.random(2) < 0.5):
         if at_end:

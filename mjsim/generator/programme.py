@@ -1,4 +1,4 @@
-"""The programme of a home: its rooms, their target areas, and the doors between them."""
+"""Programme of a home: its rooms, their target areas, and the doors between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from mjsim.values.errors import HouseError
 
 @dataclass(frozen=True)
 class RoomNeeds:
-    """Requirements of a kind of room. The sources are in docs/generated-houses.md."""
+    """Requirements of a room type. The sources are listed in docs/generated-houses.md."""
 
     label: str
-    area: tuple[float, float]  # minimum and maximum, in m^2
-    side: float  # shortest side, in metres
-    aspect: float  # maximum ratio of the sides
-    daylight: bool  # needs an outer wall with a window
+    area: tuple[float, float]  # minimum and maximum area, in square metres
+    side: float  # minimum length of the shorter side, in metres
+    aspect: float  # maximum ratio of the longer to the shorter side
+    daylight: bool  # True if the room needs an outer wall with a window
 
 
 NEEDS: Mapping[str, RoomNeeds] = {
@@ -68,21 +68,21 @@ _MORE = {
     "utility": 1.2,
 }
 _LIVELY = ("living_room", "studio", "hall")
-HALL_PER_DOOR = (1.2, 1.9)  # m^2
-DOOR, WIDE = 1.3, 2.0  # length of shared wall needed for a door and for an open passage, in metres
+HALL_PER_DOOR = (1.2, 1.9)  # minimum and maximum floor area of a hall per door, in square metres
+DOOR, WIDE = 1.3, 2.0  # minimum length of a shared wall with a door and with an open passage, in metres
 
 
 @dataclass(frozen=True)
 class Way:
-    """A door or passage that connects two rooms."""
+    """A door or open passage between two rooms."""
 
     a: str
     b: str
-    is_wide: bool = False  # a passage without a leaf
+    is_wide: bool = False  # True for an open passage, which has no door leaf
 
     @property
     def wall(self) -> float:
-        """Minimum length of the wall that the rooms share, in metres."""
+        """Minimum length of the shared wall, in metres."""
         return WIDE if self.is_wide else DOOR
 
 
@@ -90,13 +90,13 @@ class Way:
 class Programme:
     """Requirements of a floor plan."""
 
-    areas: Mapping[str, float]  # target area by room key, in m^2
-    ways: tuple[Way, ...]  # connect all rooms
+    areas: Mapping[str, float]  # target area of each room in square metres, by room key
+    ways: tuple[Way, ...]  # doors and passages that connect all rooms
     hub: str  # the room with the front door
 
 
 def use_of(key: str) -> str:
-    """The use of a room: its key without a number."""
+    """Return the use of a room, which is its key without the number."""
     return key.rstrip("0123456789").rstrip("_")
 
 
@@ -105,7 +105,7 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
     if not ROOMS[0] <= rooms <= ROOMS[1]:
         raise HouseError(f"a home of {rooms} rooms cannot be generated; ask for {ROOMS[0]} to {ROOMS[1]}")
     keys = _keys(rooms, rng)
-    # The rooms of a home tend to be large together, or small together.
+    # Large rooms tend to occur in the same home, and so do small ones.
     size = rng.uniform(0.1, 0.7) if rooms < 9 else rng.uniform(0.1, 0.4)
     areas = {}
     for key in keys:
@@ -132,7 +132,6 @@ def _keys(rooms: int, rng: np.random.Generator) -> tuple[str, ...]:
 
 
 def _ways(keys: Sequence[str], hub: str, rng: np.random.Generator) -> list[Way]:
-    """Connect all rooms in a tree with the hub as its root."""
     ways = []
     for key in keys:
         if key == hub:

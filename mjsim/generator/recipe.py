@@ -1,4 +1,4 @@
-"""Recipe of a generated house: its seed, its floor plan, and the version of the generator."""
+"""Recipe of a generated house: seed, floor plan and generator version."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ RECIPE = "recipe.json"
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stored house. It includes the floor plan, because another solver may find a different plan for the seed."""
+    """A stored house. It includes the floor plan, since another version of the solver may find a different one."""
 
     version: int
     seed: int
@@ -21,16 +21,16 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """Name under which the house is recorded."""
+        """Name of the house in recorded data."""
         return str(GeneratedName(self.seed, len(self.plan.rooms)))
 
     def encoded(self) -> bytes:
-        """The recipe as JSON, the same bytes for equal recipes."""
+        """Return the recipe as JSON. Equal recipes give the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Read a recipe. Raise `HouseError` if it is not valid or of another version."""
+    """Read a recipe. Raise `HouseError` if it is invalid or belongs to another generator version."""
     try:
         text = read_bytes(path)
         version = msgspec.json.decode(text, type=dict).get("version")
@@ -42,7 +42,7 @@ def read_recipe(path: Path) -> Recipe:
 
 
 def floor_plan_of(model: Path) -> HomePlan:
-    """Read the plan of a house from the recipe next to its MJCF file. Raise `HouseError` if there is none."""
+    """Read a house's plan from the recipe next to its MJCF file. Raise `HouseError` if there is no recipe."""
     path = model.parent / RECIPE
     if not path.is_file():
         raise HouseError(f"{model} has no {RECIPE} next to it; only generated houses ({PREFIX}7) have one")

@@ -1,4 +1,4 @@
-"""MJCF of floors, walls, ceilings, doors and windows of a plan, in the classes of the apartment.
+"""MJCF of the floors, walls, ceilings, doors and windows of a plan, based on the apartment's default classes.
 
 Each room has its own half of a shared wall, in its own colour. Outer walls are outside the rooms.
 """
@@ -23,7 +23,7 @@ from mjsim.generator.values import (
 )
 
 HALF = WALL / 2
-TILED = NARROW_SILL  # height of tiles on walls, in metres
+TILED = NARROW_SILL  # height of wall tiles, in metres
 _NORMAL = {"south": "y", "north": "y", "east": "x", "west": "x"}
 _SHADOW_TURN = {"south": 0.0, "north": math.pi, "west": -math.pi / 2, "east": math.pi / 2}
 
@@ -37,7 +37,7 @@ class _Hole:
 
 
 def shell(plan: HomePlan) -> Iterator[str]:
-    """Yield MJCF elements of the world body: a body and a site for each room, and the view outside."""
+    """Yield MJCF elements of the world body: a body and a site for each room, and panels with the view outside."""
     for room in plan.rooms:
         cell = room.floor.grown(HALF)
         (x, y), w, d = cell.center, cell.width / 2, cell.depth / 2
@@ -54,8 +54,6 @@ def shell(plan: HomePlan) -> Iterator[str]:
 
 
 class _RoomShell:
-    """The walls of one room with their doors and windows."""
-
     def __init__(self, plan: HomePlan, room: Room) -> None:
         self._plan, self._room = plan, room
         self._cells = [other.floor.grown(HALF) for other in plan.rooms]
@@ -65,7 +63,7 @@ class _RoomShell:
         for side in SIDES:
             holes = sorted(self._holes(side), key=lambda hole: hole.start)
             low, high = self._room.floor.wall(side)
-            for up, material in self._bands(holes):  # the inner half
+            for up, material in self._bands(holes):  # inner half of the wall
                 yield from self._wall(side, (low - HALF, high + HALF), up, (0.0, HALF), material, holes)
             for start, end, is_outside in wall_stretches(self._room, side, self._plan.rooms):
                 if is_outside:
@@ -90,9 +88,9 @@ class _RoomShell:
                 yield _Hole(w.center - w.width / 2, w.center + w.width / 2, w.sill, w.top)
 
     def _bands(self, holes: list[_Hole]) -> Iterator[tuple[tuple[float, float], str]]:
-        """Heights (from, to) and material of each band of the walls.
+        """Return the height range and material of each band of the walls.
 
-        A box's pattern begins in the middle of the box. To hide seams, tiles end below windows, and wallpaper is only
+        A texture starts in the middle of each box. To hide seams, tiles end below windows, and wallpaper is used only
         on walls without openings.
         """
         paper = f"wall_{self._room.key}"
@@ -103,7 +101,7 @@ class _RoomShell:
             yield (0.0, CEILING_HEIGHT), f"{paper}_plain" if holes else paper
 
     def _extension(self, side: Side, end: float, sign: int) -> float:
-        """Length in metres by which an outer wall is extended to close a corner of the house; 0 at other ends."""
+        """Return how far an outer wall extends to close a corner of the house, in metres. 0 if it does not."""
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]
@@ -116,7 +114,7 @@ class _RoomShell:
         self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
         material: str, kind: str = "wall",
     ) -> str:  # fmt: skip
-        """A box along a wall, from `out[0]` to `out[1]` outwards from the inner face."""
+        """Return a box along a wall. It extends from `out[0]` to `out[1]` outwards from the wall's inner face."""
         box = self._room.floor.along(side, *along, -out[1], -out[0])
         (x, y), z = box.center, sum(up) / 2
         length, depth = (box.width, box.depth) if _NORMAL[side] == "y" else (box.depth, box.width)
@@ -131,7 +129,7 @@ class _RoomShell:
         self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
         material: str, holes: list[_Hole],
     ) -> Iterator[str]:  # fmt: skip
-        """The parts of a slab around holes."""
+        """Yield the parts of a slab around holes."""
         at, end = along
         for hole in holes:
             if hole.end < at or hole.start > end or hole.bottom >= up[1] or hole.top <= up[0]:
@@ -148,7 +146,7 @@ class _RoomShell:
             yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
-        """Skirting board and soft shadow along the foot of the wall."""
+        """Yield the skirting board and the soft shadow at the bottom of the wall."""
         at, last = self._room.floor.wall(side)
         for hole in [*(hole for hole in holes if hole.bottom == 0), _Hole(last, last, 0, 0)]:
             start = at + 0.05 if at > self._room.floor.wall(side)[0] else at
@@ -176,12 +174,12 @@ class _RoomShell:
             bars.append(((window.center - 0.025, window.center + 0.025), (sill, top)))
         for along, up in bars:
             yield self._slab(side, along, up, (0.08, 0.15), "frame", "trim")
-        # The sill ends a little above the wall below, so that the two do not flicker.
+        # The sill ends slightly above the wall below it, so that they do not flicker.
         board = (left - 0.03, right + 0.03), (sill - 0.03, sill + 0.004)
         yield self._slab(side, *board, (-0.04, 0.15), "frame", "trim")
 
     def _frame(self, door: Door) -> Iterator[str]:
-        """The half of a door's frame on this room's side."""
+        """Yield the half of the door frame that belongs to this room."""
         side, half = door.side_in(self._room.key), door.width / 2
         left, right, top, out = door.center - half, door.center + half, door.height, (-0.018, HALF)
         yield self._slab(side, (left - 0.06, left + 0.012), (0.0, top + 0.06), out, "frame", "trim")
@@ -212,7 +210,7 @@ class _RoomShell:
 
 
 def _outside(plan: HomePlan) -> Iterator[str]:
-    """Four panels with the view outside, which meet at the corners."""
+    """Yield four panels with the view outside, which meet at the corners."""
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3
@@ -229,5 +227,4 @@ def _outside(plan: HomePlan) -> Iterator[str]:
 
 
 def _n(value: float) -> str:
-    """Format a number as short as possible, to a tenth of a millimetre."""
     return f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")

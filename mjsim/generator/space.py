@@ -1,4 +1,4 @@
-"""Search for poses of furniture in a room that keep doors, windows and walkways clear."""
+"""Search for furniture poses in a room that keep doors, windows and walkways clear."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,23 +12,24 @@ from numpy.typing import NDArray
 from mjsim.generator.furniture.piece import Piece, Spot, moved
 from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
-# Lengths in m.
-BODY = 0.36  # radius of the body for which walkways must be wide enough
-# Radii of people of different sizes plus the planner's clearance. Each can reach all floor on which it fits.
+# Lengths are in metres.
+BODY = 0.36  # body radius for which walkways must be wide enough
+# Body radii of people, including the planner's clearance. Each body must reach all floor on which it fits.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
-POCKET = 0.005  # largest area of unreachable floor that is ignored, in m^2
+POCKET = 0.005  # maximum area of unreachable floor that is ignored, in square metres
 STEP = 0.1  # distance between the poses tried along a wall
-BESIDE = 0.6  # width beside a door that bins avoid if possible
-DOORWAY = 1.0  # depth of the floor that stays free in front of a door
-SNUG, APART = 0.09, 0.62  # gaps of a width in between, in which people get stuck, are avoided
-BEFORE_LEAF = 0.45  # depth of the floor that stays free in front of an open leaf, as if it could close
-WALL_GAP = 0.01  # gap behind furniture
-BEFORE_WINDOW = 0.6  # depth of the zone at a window in which nothing is higher than the sill
-CURTAIN = 0.3  # width of this zone on both sides of a window with curtains
-LEAVES = 0.1  # the same at a window with a blind, because leaves of plants reach beyond their parts
-BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # rooms with blinds instead of curtains
+BESIDE = 0.6  # width of the floor next to a door that bins avoid if possible
+DOORWAY = 1.0  # depth of the free floor in front of a door
+SNUG, APART = 0.09, 0.62  # gaps between these two widths are avoided, because people would get stuck
+BEFORE_LEAF = 0.45  # depth of the free floor in front of an open door leaf
+WALL_GAP = 0.01  # gap between furniture and the wall behind it
+BEFORE_WINDOW = 0.6  # depth of the zone in front of a window in which no furniture is higher than the sill
+CURTAIN = 0.3  # extra width of that zone on each side of a window with curtains
+# Extra width on each side of a window with a blind, because leaves extend beyond a plant's obstacle.
+LEAVES = 0.1
+BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # room uses with blinds instead of curtains
 AROUND = 0.76  # width of the free floor around a free-standing piece
-NEAR = BODY + 0.15  # largest distance between the centre of a body and a piece in use
+NEAR = BODY + 0.15  # maximum distance from the centre of a person's body to a piece that the person uses
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 TRIES = 14  # number of poses of a piece for which walkways are checked
 _CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids for walkways and for unreachable floor
@@ -40,11 +41,11 @@ Floats = NDArray[np.float64]
 class PiecePose:
     """Pose of a piece in the house."""
 
-    x: float  # of the piece's origin, in metres
+    x: float  # x coordinate of the piece's origin, in metres
     y: float
-    turns: int  # quarter turns
-    side: Side | None  # the wall behind it
-    along: float = 0.0  # position of its middle along this wall, in metres
+    turns: int  # number of counter-clockwise quarter turns
+    side: Side | None  # wall behind the piece, or None
+    along: float = 0.0  # position of the piece's middle along this wall, in metres
 
     @property
     def yaw(self) -> float:
@@ -55,26 +56,28 @@ class PiecePose:
 class Space:
     """A room with the pieces placed so far.
 
-    Rectangles are x0, y0, x1, y1, followed by a height in `solids` and `windows`. All are in metres.
+    Rectangles are x0, y0, x1, y1 in metres. Those in `solids` and `windows` are followed by a height in metres.
     """
 
     room: Room
     rng: np.random.Generator
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    hit: list[Spot] = field(default_factory=list)  # what people bump into: solids without overhanging leaves
-    keep: list[Spot] = field(default_factory=list)  # floor that stays free
+    # Obstacles that people bump into, without overhanging leaves.
+    hit: list[Spot] = field(default_factory=list)
+    keep: list[Spot] = field(default_factory=list)  # floor that must stay free
     use: list[Spot] = field(default_factory=list)  # floor that must stay free and reachable
-    near: list[Spot] = field(default_factory=list)  # solids that people must be able to approach
-    corners: list[Spot] = field(default_factory=list)  # floor beside doors, which bins avoid if possible
+    near: list[Spot] = field(default_factory=list)  # obstacles that people must be able to approach
+    corners: list[Spot] = field(default_factory=list)  # floor next to doors, which bins avoid if possible
     doors: list[tuple[float, float]] = field(default_factory=list)  # a point in front of each door
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    hung: list[tuple[Side, float, float, float]] = field(default_factory=list)  # side, start, end, bottom
+    # Wall decoration: side, start, end and bottom.
+    hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
-    area: float = 0.0  # floor covered by furniture, in m^2
+    area: float = 0.0  # floor area covered by furniture, in square metres
 
     @classmethod
     def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
-        """The empty room."""
+        """Return a room without furniture."""
         space, floor = cls(room, rng), room.floor
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
@@ -106,13 +109,13 @@ class Space:
         return self.area / self.room.floor.area
 
     def depth(self, side: Side) -> float:
-        """Distance from a wall to the one opposite, m."""
+        """Distance in metres between a wall and the opposite wall."""
         return self.room.floor.depth if side in ("south", "north") else self.room.floor.width
 
     def put(
         self, piece: Piece, sides: Sequence[Side] = SIDES, avoid: Sequence[Spot] = ()
     ) -> PiecePose | None:
-        """Put a piece at the best pose along one of some sides that keeps off `avoid`. Return None if there is none."""
+        """Place a piece at the best pose along some walls, outside `avoid`. Return it, or None if nothing fits."""
         free = piece.stands == "free"
         places = self._free_poses() if free else self._wall_poses(piece, sides)
         if not len(places):
@@ -154,7 +157,7 @@ class Space:
         self.stood.append((piece, place))
 
     def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
-        """All poses along walls, shape (n, 4): x, y, m, quarter turns, and the position along the wall, m."""
+        """Return all poses along walls, shape (n, 4): x, y, quarter turns, and position along the wall, in metres."""
         floor, half = self.room.floor, piece.size[0] / 2
         found = [np.empty((0, 4))]
         for side in sides:
@@ -175,14 +178,14 @@ class Space:
         return np.concatenate(found)
 
     def _free_poses(self) -> Floats:
-        """All poses on a grid, in two directions, as from `_wall_poses`."""
+        """Return poses on a grid in two orientations, in the format of `_wall_poses`."""
         floor = self.room.floor
         xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
         grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
         return grid.reshape(-1, 4)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
-        """Mask (n,) of the poses that are free, from boxes (n, k, 4) of the parts and places of use (n, u, 4)."""
+        """Return a mask (n,) of the free poses. `boxes` (n, k, 4) are parts, and `uses` (n, u, 4) is floor for use."""
         floor = self.room.floor
         slack = AROUND if free else -1e-6
         low, high = np.array([floor.x0, floor.y0]) + slack, np.array([floor.x1, floor.y1]) - slack
@@ -197,7 +200,7 @@ class Space:
         return ok
 
     def _scores(self, boxes: Floats, free: bool) -> Floats:
-        """Score n poses: prefer snug or wide gaps, and the middle of the room for free-standing pieces. Add noise."""
+        """Score poses. Snug or wide gaps score high, and so does the middle of the room for free-standing pieces."""
         floor = self.room.floor
         score = 1.2 * self.rng.random(len(boxes))
         if len(boxes) == 0:
@@ -216,7 +219,7 @@ class Space:
         return np.asarray(score)
 
     def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
-        """True if a body can get from every door to all places of use, used pieces and free floor.
+        """Return True if a person can get from every door to all pieces and to all free floor.
 
         Args:
             spots: Rectangles of an additional piece.
@@ -227,7 +230,7 @@ class Space:
         _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
-        # Grow spots along one axis at a time, because a point off a corner would be farther away than NEAR.
+        # Grow rectangles along one axis at a time. Growing along both would include corners farther away than NEAR.
         targets += [(_grown(spot, NEAR, 0), _grown(spot, 0, NEAR)) for spot in (*self.near, *near)]
         common: set[int] | None = None
         for boxes in targets:
@@ -247,7 +250,7 @@ class Space:
         return True
 
     def _distance(self, spots: Iterable[Spot], cell: float) -> Any:
-        """Distance, m, of each cell to the walls and to `spots`."""
+        """Return the distance in metres from each cell to the nearest wall or rectangle of `spots`."""
         floor = self.room.floor
         nx, ny = math.ceil(floor.width / cell), math.ceil(floor.depth / cell)
         free = np.zeros((nx + 2, ny + 2), np.uint8)
@@ -264,7 +267,6 @@ def _islands(distance: Floats, radius: float) -> Any:
 
 
 def _moved(spots: Sequence[Spot], places: Floats) -> Floats:
-    """Rectangles of a piece at each of n poses, shape (n, k, 4)."""
     turned = np.array([[moved(spot, 0.0, 0.0, turns * math.pi / 2) for spot in spots] for turns in range(4)])
     return np.asarray(turned.reshape(4, -1, 4)[places[:, 2].astype(int)] + places[:, None, [0, 1, 0, 1]])
 
@@ -279,7 +281,6 @@ def _spot(box: Sequence[float]) -> Spot:
 
 
 def _overlap(boxes: Floats, others: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Mask (n,) of the poses with a box (n, k, 4) within `margin` of one of the others (m, 4)."""
     if boxes.shape[1] == 0 or len(others) == 0:
         return np.zeros(len(boxes), bool)
     slack = 1e-6 - margin

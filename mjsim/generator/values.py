@@ -1,4 +1,4 @@
-"""Values that the parts of the generator exchange, in metres.
+"""Values exchanged by the parts of the generator. All lengths are in metres.
 
 The plan lies in x (east) and y (north). A `Room` is the free floor between its walls, and neighbouring rooms are `WALL`
 apart. Furniture is written in its own frame: the origin on the floor in the middle of the back edge, +x along the wall,
@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-WALL = 0.12  # thickness of the wall between two rooms
-OUTER_WALL = 0.21  # distance from the floor's edge to the outside of an outer wall
+WALL = 0.12
+OUTER_WALL = 0.21  # distance from the edge of the floor to the outside of an outer wall
 CEILING_HEIGHT = 2.6
 
 Side = Literal["south", "east", "north", "west"]
 SIDES: tuple[Side, ...] = ("south", "east", "north", "west")
-# Quarter turns of a piece that stands with its back to the wall.
+# Number of quarter turns of a piece whose back is to the wall.
 BACK: Mapping[Side, int] = {"south": 0, "east": 1, "north": 2, "west": 3}
 Rgb = tuple[float, float, float]
 
@@ -46,11 +46,11 @@ class Rectangle:
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     def grown(self, by: float) -> "Rectangle":
-        """The rectangle with every side moved outwards, or inwards if `by` is negative."""
+        """Return the rectangle with every side moved outwards by a distance, or inwards if it is negative."""
         return Rectangle(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
 
     def overlaps(self, other: "Rectangle", slack: float = 1e-6) -> bool:
-        """True if the rectangles share an area, not just an edge."""
+        """Return True if the rectangles share an area, not just an edge."""
         return (
             self.x0 < other.x1 - slack
             and other.x0 < self.x1 - slack
@@ -59,15 +59,15 @@ class Rectangle:
         )
 
     def contains(self, x: float, y: float) -> bool:
-        """True if a point is inside or on the border."""
+        """Return True if a point is inside or on the border."""
         return self.x0 <= x <= self.x1 and self.y0 <= y <= self.y1
 
     def wall(self, side: Side) -> tuple[float, float]:
-        """Start and end of the wall of a side, in x (south, north) or y (east, west)."""
+        """Return the start and end of the wall on a side. They are x coordinates for south and north, otherwise y."""
         return (self.x0, self.x1) if side in ("south", "north") else (self.y0, self.y1)
 
     def along(self, side: Side, start: float, end: float, near: float, far: float) -> "Rectangle":
-        """The rectangle from `start` to `end` along a wall (see `wall`), and from `near` to `far` away from it."""
+        """Return the rectangle from `start` to `end` along a wall, and from `near` to `far` away from it."""
         if side == "south":
             return Rectangle(start, self.y0 + near, end, self.y0 + far)
         if side == "north":
@@ -79,7 +79,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Room:
-    """A room, whose floor is one rectangle.
+    """A room with a rectangular floor.
 
     Keys are `hall`, `living_room`, `kitchen`, `dining_room`, `bedroom`, `bedroom_2`, `bedroom_3`, `bathroom`,
     `shower_room`, `office`, `utility` and `studio`. Uses are the keys without numbers.
@@ -87,13 +87,13 @@ class Room:
 
     key: str
     use: str
-    label: str  # shown to participants
+    label: str  # name shown to participants
     floor: Rectangle
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """An open door leaf, flat against a wall of `room`. No furniture may stand on `floor`."""
+    """An open door leaf, flat against a wall of `room`. Furniture must not cover `floor`."""
 
     room: str
     side: Side
@@ -102,15 +102,16 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Door:
-    """A doorway between two rooms, or the front door, which is closed and has one room.
+    """A doorway between two rooms, or the closed front door, which belongs to one room.
 
-    The door is in the wall `side` of the first room. `center` is x (south, north) or y (east, west).
+    The door is in the wall `side` of the first room. Its `center` is an x coordinate for south and north walls,
+    otherwise a y coordinate.
     """
 
     rooms: tuple[str, ...]
     side: Side
     center: float
-    width: float  # clear width
+    width: float
     height: float
     leaf: Leaf | None = None
 
@@ -124,7 +125,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Window:
-    """A window in an outer wall, with `center` as in `Door`. Furniture in front of it is lower than the sill."""
+    """A window in an outer wall. Furniture in front of it is lower than the sill. For `center`, see `Door`."""
 
     room: str
     side: Side
@@ -136,7 +137,7 @@ class Window:
 
 @dataclass(frozen=True)
 class HomePlan:
-    """Rooms with the doors and windows in their walls."""
+    """Rooms with their doors and windows."""
 
     rooms: tuple[Room, ...]
     doors: tuple[Door, ...]
@@ -146,7 +147,7 @@ class HomePlan:
         return next(room for room in self.rooms if room.key == key)
 
     def doors_of(self, room: str) -> tuple[Door, ...]:
-        """The doors of a room, including the front door."""
+        """Return the doors of a room, including the front door."""
         return tuple(door for door in self.doors if room in door.rooms)
 
     def windows_of(self, room: str) -> tuple[Window, ...]:
@@ -159,7 +160,7 @@ class HomePlan:
 
 @dataclass(frozen=True)
 class Asset:
-    """A material or texture of a piece.
+    """A material or texture of a piece of furniture.
 
     Those of `models/houses/apartment/materials.xml` need no asset. Assets of the same name must have the same content,
     so names should begin with the kind's name, such as `rug_stripes_3f2a`.
@@ -176,46 +177,46 @@ class Asset:
 
 @dataclass(frozen=True)
 class Palette:
-    """The colours of a house, chosen once so that its pieces match."""
+    """Colours of a house, chosen once so that its furniture matches."""
 
-    woods: tuple[Rgb, ...]  # the main one first
-    fronts: tuple[Rgb, ...]  # painted doors and drawers
-    fabrics: tuple[Rgb, ...]  # upholstery, bedding, curtains
-    accents: tuple[Rgb, ...]  # small bright objects
-    metal: Rgb  # legs, handles and taps
+    woods: tuple[Rgb, ...]  # wood colours, the main one first
+    fronts: tuple[Rgb, ...]  # colours of painted doors and drawers
+    fabrics: tuple[Rgb, ...]  # colours of upholstery, bedding and curtains
+    accents: tuple[Rgb, ...]  # colours of small bright objects
+    metal: Rgb  # colour of legs, handles and taps
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A piece in a room: its pose, and the MJCF of its geoms in its own frame."""
+    """A piece of furniture placed in a room. Its geoms are MJCF in the piece's own frame."""
 
-    name: str  # the kind, such as "sofa"; bodies are named by room, kind and number
+    name: str  # type of furniture, such as "sofa"; bodies are named by room, type and number
     room: str
     geoms: str
     position: tuple[float, float, float]
     quarter_turns: int
-    footprint: Rectangle | None  # in the house's frame; None for pieces that hang or lie flat
+    footprint: Rectangle | None  # rectangle in the house's frame, or None for pieces that hang or lie flat
     assets: tuple[Asset, ...] = ()
-    turn: float = 0.0  # additional yaw, rad, such as of a chair beside a desk
+    turn: float = 0.0  # additional yaw in radians, such as that of a chair next to a desk
 
 
 @dataclass(frozen=True)
 class BinPlacement:
-    """Pose of a bin. Its origin is the middle of its base, and people use it from its local -y side.
+    """Pose of a bin. Its origin is in the middle of its base, and people use it from its local -y side.
 
-    The shell turns it by `quarter_turns` + 2, so that at 0 its back is to the south wall, as for pieces.
+    The bin is rotated by `quarter_turns` + 2, so that its back is to the south wall at 0, as for furniture.
     """
 
-    receptacle: str  # key in the catalogue
+    receptacle: str  # catalogue key of the receptacle
     room: str
-    place: str  # description shown to participants: "on the counter, beside the sink"
+    place: str  # description shown to participants, such as "on the counter, beside the sink"
     position: tuple[float, float, float]
     quarter_turns: int
 
 
 @dataclass(frozen=True)
 class Furnishing:
-    """All pieces and bins of a furnished plan."""
+    """All furniture and bins in a plan."""
 
     placements: tuple[Placement, ...]
     mounts: tuple[BinPlacement, ...]

@@ -1,1 +1,1 @@
-"""Parametric furniture: kinds, and the pieces that a generator draws of them."""
+"""Parametric furniture: functions that draw a random piece of each type."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import DrawnTexture
 
-Image = NDArray[np.float64]  # RGB from 0 to 1, (height, width, 3)
-Plane = NDArray[np.float64]  # (height, width)
+Image = NDArray[np.float64]  # RGB from 0 to 1, shape (height, width, 3)
+Plane = NDArray[np.float64]  # shape (height, width)
 Style = Callable[[np.random.Generator, Image, Plane, Plane, Image], None]
 
 
@@ -117,7 +117,7 @@ _STYLES: tuple[Style, ...] = (_hills, _hills, _discs, _fields, _branch, _town, _
 
 
 def _palette(rng: np.random.Generator, look: Appearance, count: int) -> Image:
-    """Colours (count, 3) of a picture: some of the home's, lighter or darker."""
+    """Draw the colours of a picture, shape (count, 3), from lighter or darker versions of the home's colours."""
     chosen = np.array(look.colours)[rng.permutation(len(look.colours))[: min(count, 5)]]
     while len(chosen) < count:
         chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])
@@ -125,7 +125,6 @@ def _palette(rng: np.random.Generator, look: Appearance, count: int) -> Image:
 
 
 def _file(name: str, image: Image) -> DrawnTexture:
-    """An image as a texture that is named by a hash of its content."""
     pixels = np.clip(255 * image[..., ::-1], 0, 255).astype(np.uint8)
     png = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 2])[1].tobytes()
     return DrawnTexture(f"{name}_{hashlib.sha256(pixels.tobytes()).hexdigest()[:10]}", png)

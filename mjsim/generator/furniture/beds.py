@@ -3,7 +3,7 @@
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece, Spot, group
 
-SIDE = 0.62  # width of free floor beside a bed for getting in, in metres
+SIDE = 0.62  # width of the free floor beside a bed, in metres
 
 
 def _headboard(b: Builder, w: float) -> float:
@@ -28,11 +28,11 @@ def _headboard(b: Builder, w: float) -> float:
 
 
 def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: int) -> None:
-    """Add a mattress, a quilt, pillows and sometimes a throw to a frame whose top is at `z`."""
+    """Add a mattress, a quilt, pillows and sometimes a throw on top of a frame of height `z`."""
     quilt = b.pick(*b.look.quilts)
     b.box("linen", w - 0.04, (y[0] + 0.02, y[1] - 0.02), (z, z + 0.18))
     start = y[0] + b.pick(0.45, 0.55, 0.62)
-    # The pattern of quilt_c would be stretched along the narrow sides.
+    # The texture of quilt_c would look stretched on the narrow sides.
     side = "quilt_a" if quilt == "quilt_c" else quilt
     b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
     b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)

@@ -1,4 +1,4 @@
-"""`Builder`, which writes the MJCF geoms of one piece of furniture."""
+"""`Builder`, a class that writes the MJCF geoms of a piece of furniture."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ T = TypeVar("T")
 PANEL = 0.016  # thickness of doors and drawers, in metres
 GAP = 0.008  # gap between doors or drawers, in metres
 _THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
-FACING = 'xyaxes="-1 0 0 0 0 1"'  # turns an image to be seen from +y
+FACING = 'xyaxes="-1 0 0 0 0 1"'  # makes an image face +y
 
 
 def numbers(*values: float) -> str:
@@ -55,7 +55,7 @@ class Builder:
         return options[int(self.rng.integers(len(options)))]
 
     def size(self, low: float, high: float, step: float = 0.05) -> float:
-        """Draw a length in metres from `low` to `high` in steps. A smaller piece has a lower maximum."""
+        """Draw a length from `low` to `high` in steps, in metres. Smaller versions of a piece have a lower maximum."""
         count = round((high - low) / step)
         drawn = int(self.rng.integers(count + 1))
         return round(low + step * max(0, min(drawn, round(count * (1 - 0.5 * self.smaller)))), 4)
@@ -86,18 +86,18 @@ class Builder:
         self.add("ellipsoid", material, True, f'pos="{numbers(*at)}" size="{numbers(*half)}"{euler}')
 
     def disc(self, material: str, x: float, y: float, z: float, radius: float, thick: float = 0.012) -> None:
-        """Add a disc that faces the room, centred at depth `y`."""
+        """Add a disc that faces the room, with its centre at depth `y`."""
         size = numbers(radius, thick / 2)
         self.add("cylinder", material, True, f'pos="{numbers(x, y, z)}" size="{size}" euler="1.5708 0 0"')
 
     def image(self, material: str, w: float, z: Span, y: float, x: float = 0.0, thick: float = 0.008) -> None:
-        """Add a panel that shows an image to the room. Its front is at depth `y`."""
+        """Add a panel with an image that faces the room, with its front at depth `y`."""
         middle = numbers(x, y - thick / 2, sum(z) / 2)
         half = numbers(w / 2, (z[1] - z[0]) / 2, thick / 2)
         self.add("box", material, True, f'pos="{middle}" size="{half}" {FACING}')
 
     def shadow(self, w: float, y: Span, x: float = 0.0, *, round_one: bool = False) -> None:
-        """Add a contact shadow around a footprint. Its height varies so that overlapping shadows do not flicker."""
+        """Add a contact shadow around a footprint, at a varying height so that overlapping shadows do not flicker."""
         height = 0.0038 + 0.0001 * int(self.rng.integers(12))
         material = ' material="shadow_round"' if round_one else ""
         half = numbers(w / 2 + 0.1, (y[1] - y[0]) / 2 + 0.09, 0.1)
@@ -135,7 +135,7 @@ class Builder:
         x: float = 0.0,
         doors: bool = False,
     ) -> None:
-        """Add drawers or doors with handles in front of `y`."""
+        """Add rows and columns of drawers or doors with handles, in front of depth `y`."""
         wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
         for i in range(columns):
             for j in range(rows):
@@ -162,7 +162,7 @@ class Builder:
     def clutter(
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
-        """Add small objects on a surface at height `z`. With `low`, none is taller than 0.13 m."""
+        """Add small objects on a surface of height `z`. If `low`, all are at most 0.13 m tall."""
         things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
@@ -208,19 +208,19 @@ class Builder:
         self.post("shade", x, y, (z + 0.2, z + 0.37), self.pick(0.1, 0.12))
 
     def pillow(self, material: str, at: Point, half: Point, tilt: float = 0.0) -> None:
-        """Add a cushion: an ellipsoid around a box, which makes it look square."""
+        """Add a cushion. It is an ellipsoid around a box, so that it looks square."""
         self.soft(material, at, half, (tilt, 0.0, 0.0))
         euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
         core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
         self.add("box", material, True, f'pos="{numbers(*at)}" size="{core}"{euler}')
 
     def own(self, picture: DrawnTexture) -> str:
-        """Register a texture that was drawn for this piece. Return the name of its material."""
+        """Register a texture drawn for this piece, and return the name of its material."""
         self.pictures.append(picture)
         return picture.name
 
     def on_ceiling(self) -> None:
-        """Mark the geoms added so far as hanging from the ceiling. Top-down views omit them."""
+        """Mark the geoms added so far as hanging from the ceiling. Top-down views omit such geoms."""
         self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
 
     def piece(
@@ -232,7 +232,7 @@ class Builder:
         stem: float = 0.0,
         **more: Any,
     ) -> Piece:
-        """The piece with the geoms added so far.
+        """Return the piece with all geoms added so far.
 
         Args:
             size: Width along the wall, depth into the room, and height, in metres.
@@ -260,7 +260,7 @@ class Builder:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of furniture. Each random generator makes a different piece of it."""
+    """A type of furniture. Each random generator gives a different piece."""
 
     name: str
     draw: Callable[[Builder], Piece]

@@ -1,4 +1,4 @@
-"""All kinds of furniture: each public function of the modules below draws one kind."""
+"""Registry of all furniture types. Each public function of the imported modules draws one type."""
 
 from inspect import isfunction
 

@@ -1,4 +1,4 @@
-"""Objects on walls, ceilings and floors: pictures, mirrors, rugs, curtains, radiators, lamps."""
+"""Decoration of walls, ceilings and floors: pictures, mirrors, rugs, curtains, radiators and lamps."""
 
 import math
 
@@ -75,7 +75,7 @@ def wall_lamp(b: Builder) -> Piece:
 
 
 def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = False) -> Piece:
-    """A flat piece on the floor, 3.5 mm high, which is less than the bottom of a plate."""
+    """Make a flat piece on the floor. It is 3.5 mm high, which is lower than the underside of a plate."""
     if round_one:
         b.post(material, 0, d / 2, (0.0005, 0.0035), d / 2)
     else:
@@ -113,7 +113,7 @@ def _window(b: Builder) -> tuple[float, float, float]:
 
 
 def curtains(b: Builder) -> Piece:
-    """Curtains on both sides of a window, down to the floor, or to just below the sill if `smaller`."""
+    """Draw curtains on both sides of a window. They end at the floor, or just below the sill in the smaller version."""
     w, low, high = _window(b)
     long = b.smaller == 0
     side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING_HEIGHT - 0.05)
@@ -168,7 +168,7 @@ def radiator(b: Builder) -> Piece:
 
 
 def ceiling_lamp(b: Builder) -> Piece:
-    """A flat lamp, above the light that casts shadows."""
+    """Draw a flat ceiling lamp. It is above the light source, so that it casts no shadow on the room."""
     form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING_HEIGHT
     if form == "disc":
         b.post("bulb", 0, 0, (z - 0.05, z), b.pick(0.18, 0.24))

@@ -1,25 +1,25 @@
-"""Kitchens of 0.6 m wide modules, straight or around a corner, and single pieces of kitchen furniture."""
+"""Kitchens made of modules 0.6 m wide, along one wall or around a corner, and single pieces of kitchen furniture."""
 
 import math
 
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Mount, Piece, group
 
-# Lengths in m; heights from the floor, depths from the wall.
+# Lengths are in metres. Heights are measured from the floor, and depths from the wall.
 WIDE = 0.6  # width of a module
 SIZES = 4  # number of kitchen sizes
-DEEP = 0.62  # depth of the worktop
-TOP = 0.9  # height of the worktop
-ON_TOP = 1.09  # highest point of objects on the worktop, a little below kitchen window sills
+DEEP = 0.62
+TOP = 0.9
+ON_TOP = 1.09  # maximum height of objects on the worktop, a little below the sills of kitchen windows
 TALL = 2.05  # height of fridges and tall ovens
-LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets, with 0.3 m of air above the bin in the dish rack
+LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets, with 0.3 m of space above the bin in the dish rack
 HOOD = 2.5  # top of a cooker hood's duct
-FRONT = 0.57  # distance of cabinet fronts from the wall
+FRONT = 0.57  # distance from the wall to the cabinet fronts
 GAP = 0.012  # gap between the doors of a fridge
 
 
 class KitchenRun:
-    """Kitchen modules side by side along a wall. Each `_NAME(x)` adds the module NAME and returns its height."""
+    """Kitchen modules side by side along a wall. Each method `_NAME(x)` adds the module NAME and returns its height."""
 
     def __init__(self, b: Builder, modules: tuple[str, ...], hanging: bool) -> None:
         self.b, self.modules, self.hanging = b, modules, hanging
@@ -34,7 +34,7 @@ class KitchenRun:
             top = getattr(self, f"_{name}")(x)
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
-            if name not in ("fridge", "tall_oven"):  # tiles stay low where a window may be above
+            if name not in ("fridge", "tall_oven"):  # tiles stay low enough to fit below a window
                 self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > LOW else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
@@ -67,7 +67,7 @@ class KitchenRun:
         self._base(x)
         if not self.b.chance(0.5):
             return TOP
-        paint = self.b.pick("steel", "white", "accent_a", "black")  # for a kettle or a toaster
+        paint = self.b.pick("steel", "white", "accent_a", "black")  # colour of a kettle or toaster
         if self.b.chance(0.5):
             self.b.post(paint, x, 0.3, (TOP, ON_TOP), 0.075)
             self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
@@ -147,7 +147,7 @@ class KitchenRun:
         b = self.b
         b.box("front_dark", WIDE, (0, FRONT), (0, TALL), x)
         b.fronts(b.front, WIDE, (0.1, 0.75), FRONT, 1, 2, x)
-        for low, high in ((0.76, 1.3), (1.31, 1.66)):  # oven, microwave
+        for low, high in ((0.76, 1.3), (1.31, 1.66)):  # oven and microwave
             b.box("steel", WIDE - 0.01, (FRONT, FRONT + 0.018), (low, high), x, seen=True)
             pane, handle = (low + 0.06, high - 0.12), (high - 0.08, high - 0.06)
             b.box("black", 0.44, (FRONT + 0.018, FRONT + 0.022), pane, x - 0.03, seen=True)
@@ -156,7 +156,7 @@ class KitchenRun:
         return TALL
 
 
-_STRAIGHT = (  # alternative runs of modules for each kitchen size, the largest size first
+_STRAIGHT = (  # alternative rows of modules for each kitchen size, from the largest size to the smallest
     (
         "fridge drawers sink rack cooker doors dishwasher",
         "tall_oven doors cooker drawers rack sink fridge",
@@ -180,7 +180,7 @@ def straight_kitchen(b: Builder) -> Piece:
 
 
 def _size(b: Builder) -> int:
-    """The size number of a kitchen, 0 for the largest.
+    """Return the size number of a kitchen, 0 for the largest.
 
     If no size fits with wall cabinets, the two smallest sizes are tried without them, the larger one first.
     """
@@ -202,7 +202,7 @@ def corner_kitchen(b: Builder) -> Piece:
     other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if size < 2 else ("cooker",)
     if size == 3:
         other = ("rack", "cooker")
-    # The two runs meet at a closed module in the corner.
+    # Both runs end at a closed module in the corner.
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
     run = KitchenRun(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
     leg = KitchenRun(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)

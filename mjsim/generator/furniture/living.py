@@ -1,4 +1,4 @@
-"""Furniture of living rooms and halls: television with seats, piano, stove, aquarium, coat rack, umbrella stand."""
+"""Furniture of living rooms and halls: TV area, piano, stove, aquarium, coat rack and umbrella stand."""
 
 import math
 
@@ -36,9 +36,9 @@ def lounge(b: Builder) -> Piece:
         table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
         y = front - 0.64 - table.size[1] if not corner else front - 0.66 - table.size[1]
         x = 0.0
-        if corner:  # beside the long seat
+        if corner:  # next to the long seat
             long = sofa.parts[1].spot
-            side = 1 if long[0] + long[2] < 0 else -1  # the sofa is turned
+            side = 1 if long[0] + long[2] < 0 else -1  # the sofa is rotated, which swaps left and right
             x = -side * 0.46
         if y - deep > 0.7:
             members.append((table, x, y, 0.0))

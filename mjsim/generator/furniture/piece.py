@@ -9,20 +9,20 @@ from dataclasses import dataclass
 
 from mjsim.generator.values import Asset
 
-Spot = tuple[float, float, float, float]  # a rectangle on the floor: x0, y0, x1, y1, in metres
+Spot = tuple[float, float, float, float]  # rectangle on the floor: x0, y0, x1 and y1 in metres
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A rectangle of floor that a piece covers or overhangs, and the height of the piece there."""
+    """A rectangle of floor that a piece covers or overhangs, with the height of the piece there."""
 
     spot: Spot
-    top: float  # m
-    # Half the width, in metres, of the pot or stand below leaves or a lampshade; 0 if people bump into the whole spot.
+    top: float  # height in metres
+    # Half width, in metres, of the pot or stand below leaves or a lampshade. 0 if the whole rectangle is an obstacle.
     stem: float = 0.0
 
     @property
-    def hit(self) -> Spot:  # the rectangle that people bump into
+    def hit(self) -> Spot:  # rectangle that people can bump into
         x0, y0, x1, y1 = self.spot
         x, y, r = (x0 + x1) / 2, (y0 + y1) / 2, self.stem
         return (x - r, y - r, x + r, y + r) if r else self.spot
@@ -30,16 +30,16 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Mount:
-    """A place for a bin on a piece."""
+    """A position on a piece of furniture where a bin is placed."""
 
     receptacle: str  # catalogue key of the bin, such as "dish_bin"
     position: tuple[float, float, float]  # middle of the bin's base, in metres
-    yaw: float = math.pi  # of the bin, in radians; its front is its local -y side
+    yaw: float = math.pi  # yaw of the bin in radians; the bin's front is its local -y side
 
 
 @dataclass(frozen=True)
 class DrawnTexture:
-    """A texture that was drawn for one piece, and the material of the same name."""
+    """A texture drawn for one piece. Its material has the same name."""
 
     name: str
     png: bytes
@@ -54,26 +54,27 @@ class DrawnTexture:
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of furniture, or a group that belongs together."""
+    """A piece of furniture, or a group of pieces that belong together."""
 
     kind: str
-    size: tuple[float, float, float]  # width along the wall, depth into the room, height, in metres
-    geoms: str  # MJCF elements in the frame of the piece
+    size: tuple[float, float, float]  # width along the wall, depth into the room and height, in metres
+    geoms: str  # MJCF elements in the piece's frame
     parts: tuple[Obstacle, ...]
-    use: tuple[Spot, ...] = ()  # floor on which people stand to use it; it stays free and reachable
-    # "wall", "left" or "right" (a wall, with this end in a corner), "free", "hangs", "flat", "recess" or "ceiling"
+    use: tuple[Spot, ...] = ()  # floor where people stand to use the piece, which stays free and reachable
+    # "wall", "left" or "right" (at a wall, with that end in a corner), "free", "hangs", "flat", "recess" or "ceiling"
     stands: str = "wall"
     seats: int = 0
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
-    members: tuple["Member", ...] = ()  # for a group, which has no geoms of its own
+    members: tuple["Member", ...] = ()  # members of a group, which has no geoms of its own
 
 
-Member = tuple[Piece, float, float, float]  # a piece and its pose in the group: x, y, m, and yaw
+# A piece with its pose in the group: x and y in metres, and yaw in radians.
+Member = tuple[Piece, float, float, float]
 
 
 def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
-    """The bounding rectangle, m, of a rectangle that is turned by `yaw` and then moved."""
+    """Rotate a rectangle by `yaw`, move it, and return its bounding rectangle in metres."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     corners = [(u, v) for u in (spot[0], spot[2]) for v in (spot[1], spot[3])]
     xs = [round(x + cos * u - sin * v, 4) for u, v in corners]

@@ -1,4 +1,4 @@
-"""Potted plants on the floor."""
+"""Potted plants that stand on the floor."""
 
 import math
 
@@ -9,7 +9,7 @@ _GREENS = ("leaves", "leaves_dark", "leaves_pale")
 
 
 def _pot(b: Builder, r: float, h: float, y: float) -> str:
-    """Add a pot around `y`, sometimes on legs. Return the leaves' material."""
+    """Add a pot centred at depth `y`, sometimes on legs. Return the material of the leaves."""
     b.shadow(2 * r, (y - r, y + r), round_one=True)
     paint, form = b.pick("pot_a", "pot_b", "wicker"), b.pick("round", "round", "square", "raised")
     if form == "square":
@@ -24,8 +24,8 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
 
 
 def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
-    """A plant whose leaves reach `wide` from its pot, which is centred at y = wide. People bump only into the pot."""
-    reach = max(r, 0.8 * wide)  # keeps neighbouring pieces out of the leaves
+    """Draw a plant with its pot at depth `wide`, the radius of its leaves. Only the pot is an obstacle."""
+    reach = max(r, 0.8 * wide)  # keeps neighbouring furniture out of the leaves
     return b.piece(
         (2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),), stem=r
     )

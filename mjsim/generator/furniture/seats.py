@@ -1,4 +1,4 @@
-"""Sofas, armchairs, chairs, stools and benches, each with its back at y = 0."""
+"""Sofas, armchairs, chairs, stools and benches. The back of each seat is at y = 0."""
 
 import math
 
@@ -7,7 +7,7 @@ from mjsim.generator.furniture.piece import Piece
 
 
 def _arms(b: Builder, w: float, d: float, form: str, cloth: str) -> float:
-    """Add two armrests. Return the width of one."""
+    """Add two armrests, and return the width of each."""
     wide = {"box": 0.17, "round": 0.2, "thin": 0.1, "none": 0.0}[form]
     for side in (-1, 1) if wide else ():
         x = side * (w - wide) / 2
@@ -86,7 +86,7 @@ def armchair(b: Builder) -> Piece:
     form = b.pick("box", "round", "thin", "shell", "none")
     back = b.pick(0.78, 0.88, 1.0)
     b.shadow(w, (0, d), round_one=form == "shell")
-    if form == "shell":  # a round seat with a back made of upright rolls
+    if form == "shell":  # a round seat with a back of upright rolls
         r = min(w, d) / 2 - 0.02
         b.post(b.cloth, 0, d / 2, (0.14, 0.3), r, seen=False)
         for i in range(11):

@@ -1,4 +1,4 @@
-"""Tables and desks, single or grouped with seats."""
+"""Tables and desks, some with seats."""
 
 import math
 
@@ -74,12 +74,12 @@ def pendant_lamp(b: Builder) -> Piece:
 
 
 def dining(b: Builder) -> Piece:
-    against = b.smaller >= 1  # one long side at the wall
+    against = b.smaller >= 1  # a long side is at the wall
     name = "table" if against or b.chance(0.7) else "round_table"
     made = Builder(name, b.rng, b.look, b.smaller)
     base = table(made) if name == "table" else round_table(made)
     w, d, _ = base.size
-    state = int(b.rng.integers(2**31))  # the same for all chairs, so that they look alike
+    state = int(b.rng.integers(2**31))  # shared by all chairs, so that they look alike
 
     def chair() -> Piece:
         return seats.dining_chair(
@@ -156,7 +156,7 @@ def console(b: Builder) -> Piece:
 
 
 def _screen(b: Builder, x: float) -> None:
-    """Add a monitor or laptop with a keyboard to a desk of height 0.75 m, for a person at +y."""
+    """Add a monitor or laptop with a keyboard to a desk 0.75 m high, for a person who sits at +y."""
     if b.chance(0.65):
         b.box("black", 0.22, (0.1, 0.25), (0.75, 0.762), x, seen=True)
         b.box("black", 0.05, (0.13, 0.16), (0.762, 0.88), x, seen=True)
@@ -170,12 +170,12 @@ def _screen(b: Builder, x: float) -> None:
 
 
 def _desk(b: Builder) -> Piece:
-    """A desk with a place for the office supplies box to the right of a person who sits at it."""
+    """Draw a desk with space for the office supplies box to the right of the person sitting at it."""
     w, d, h = (b.pick(1.4, 1.5, 1.6), b.pick(1.2, 1.3), 1.0)[min(b.smaller, 2)], b.pick(0.6, 0.66), 0.75
     form, side = b.pick("panels", "pedestal", "legs"), -1
     b.shadow(w, (0, d))
     b.box(b.wood, w, (0, d), (h - 0.03, h))
-    x = side * (w / 2 - 0.26)  # of the box
+    x = side * (w / 2 - 0.26)  # x coordinate of the box
     if form == "pedestal":
         b.box(b.front, 0.4, (0.03, d - 0.05), (0.04, h - 0.03), x)
         b.fronts(b.front, 0.4, (0.05, h - 0.05), d - 0.05, 1, 3, x)
@@ -204,7 +204,7 @@ def desk(b: Builder) -> Piece:
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
     away = d - 0.06 + 0.56
-    use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)  # before the box
+    use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)  # floor in front of the box
     return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=use)
 
 
