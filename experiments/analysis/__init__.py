@@ -1,1 +1,1 @@
-"""Statistics, figures and pages made from records."""
+"""Statistics, figures and reports computed from recorded trials."""

@@ -1,8 +1,8 @@
-"""Compares the assistance conditions of a batch on pairs of trials that differ only in the assistance.
+"""Compare the assistance conditions of a batch on pairs of trials that are otherwise identical.
 
-The effect size of a pair of conditions is d_z, the mean difference over the standard deviation of the differences. Its
-confidence interval inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002). The
-mean difference has Student's interval.
+The effect size d_z is the mean of the paired differences divided by their standard deviation. Its confidence interval
+inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002). The interval of the mean
+difference is Student's.
 """
 
 import itertools
@@ -37,7 +37,7 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
-HUGE = 1e12  # larger than any valid metric
+HUGE = 1e12  # limit of valid metrics, far above any realistic value
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None
@@ -45,7 +45,7 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Block:
-    """Trials that share all circumstances. `rows` has them by condition, then by seeds and person parameters."""
+    """Trials with the same settings. `rows` holds them by condition, then by seeds and person parameters."""
 
     label: str
     rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
@@ -53,14 +53,14 @@ class Block:
 
 @dataclass(frozen=True)
 class Difference:
-    """Two conditions compared in one metric.
+    """A comparison of two conditions in one metric.
 
     Attributes:
-        means: Mean over the pairs in each condition.
+        means: Mean of the metric in each condition, over all pairs.
         difference: Mean of the second condition minus mean of the first.
         interval: 95 % confidence interval of the difference, or None for fewer than two pairs.
-        effect: Effect size d_z; None, like its interval and p, if the differences do not vary.
-        p: Two-sided p value of the paired t test.
+        effect: Effect size d_z. It is None if all differences are equal, and so are its interval and p-value.
+        p: Two-sided p-value of the paired t test.
     """
 
     block: str
@@ -76,7 +76,7 @@ class Difference:
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """Read a batch with two or more conditions. Return its trials grouped by circumstances, in table order."""
+    """Read a batch with at least two conditions. Return its trials grouped by settings, in table order."""
     path = folder / f"{NAME}.parquet"
     rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
@@ -86,12 +86,12 @@ def read_blocks(folder: Path) -> list[Block]:
         raise RecordError(f"{path}: assistance is not a name in every row; correct it")
     if len({row["assistance"] for row in rows}) < 2:
         raise ConfigError(f"{folder} has fewer than two assistance conditions; there is nothing to compare")
-    # Trials of two people with the same seed are not a pair.
+    # Trials with the same seed but different persons do not form a pair.
     identity = (*SEEDS, *(name for name in rows[0] if name.startswith("person_") and name not in SEEDS))
     varying = [name for name in CIRCUMSTANCES if len({row[name] for row in rows}) > 1]
     blocks: dict[str, dict[str, dict[tuple[Any, ...], Row]]] = defaultdict(lambda: defaultdict(dict))
     for row in rows:
-        # The default time limit follows from the number of objects.
+        # Leave out the time limit if the number of objects varies, because the default limit depends on that number.
         label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
         person = tuple(row[name] for name in identity)
         if blocks[label][row["assistance"]].setdefault(person, row) is not row:
@@ -108,7 +108,7 @@ def batch_origin(blocks: Sequence[Block]) -> str:
 
 
 def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
-    """Yield a message for each pair of conditions whose trials do not match."""
+    """Yield a message for each pair of conditions whose trials cannot all be paired."""
     conditions = list(dict.fromkeys(name for block in blocks for name in block.rows))
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
@@ -127,7 +127,7 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """Yield a message for each metric that is unknown in some pairs of trials, or in all of them."""
+    """Yield a message for each metric that is missing in some or all pairs of trials."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
     for d in differences:
         block = next(block for block in blocks if block.label == d.block)
@@ -144,7 +144,7 @@ def unknown_metrics(
 
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
-    """Compare each pair of conditions in every metric. Pairs of trials with an unknown value are left out."""
+    """Compare every pair of conditions in every metric. Pairs of trials with a missing value are left out."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:
@@ -175,7 +175,7 @@ def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Differen
     values = np.array(
         [(one[key][metric], other[key][metric]) for key in _common(block, conditions)], float
     ).reshape(-1, 2)
-    values = values[np.isfinite(values).all(axis=1)]  # unknown metrics are null, which is NaN here
+    values = values[np.isfinite(values).all(axis=1)]  # missing metrics are null in the file and NaN here
     if not len(values):
         return None
     gaps = values[:, 1] - values[:, 0]
@@ -198,7 +198,7 @@ def _common(block: Block, conditions: tuple[str, str]) -> list[tuple[Any, ...]]:
 
 
 def mean_interval(values: NDArray[np.float64]) -> Interval:
-    """Return Student's 95 % confidence interval of the mean of values (n,), or None for fewer than two."""
+    """Return Student's 95 % confidence interval of the mean of values, shape (n,), or None for fewer than two."""
     if len(values) < 2:
         return None
     half = float(t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
@@ -206,7 +206,6 @@ def mean_interval(values: NDArray[np.float64]) -> Interval:
 
 
 def _effect(gaps: NDArray[np.float64]) -> tuple[float | None, Interval, float | None]:
-    """Return d_z, its confidence interval, and the p value of the paired t test of these differences (n,)."""
     count = len(gaps)
     spread = float(gaps.std(ddof=1)) if count > 1 else 0.0
     if spread <= 1e-12 * max(1.0, float(np.abs(gaps).max())):

@@ -1,4 +1,4 @@
-"""Draws a comparison: each pair as a line, and the mean of each condition with its confidence interval."""
+"""Plot the paired trials of a comparison as lines, and the mean of each condition with its confidence interval."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,7 +33,7 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
     figure.supxlabel(CAPTION, fontsize=7)
     mark_origin(figure, batch_origin(blocks))
     with replacing(path) as temporary:
-        # Without dates, equal batches give equal files.
+        # Leave out the dates so that equal batches give identical files.
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
         figure.savefig(temporary, dpi=150, metadata=metadata)
 
@@ -74,5 +74,5 @@ def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
 
 
 def mark_origin(figure: Figure, origin: str) -> None:
-    """Print the origin of the data, such as simulated people, above a figure."""
+    """Print the origin of the data above a figure, for example "Simulated"."""
     figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")

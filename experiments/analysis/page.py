@@ -1,4 +1,4 @@
-"""Self-contained HTML pages (`page.html.j2`) of text, tables and inline figures, without scripts."""
+"""Self-contained HTML pages with text, tables and inline figures, but no scripts. The template is `page.html.j2`."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,21 +12,21 @@ from experiments.analysis.statistics.mixed import WaldTest
 
 
 class Paragraph(NamedTuple):
-    """Plain text with an HTML class."""
+    """A paragraph of plain text with a CSS class."""
 
     text: str
     kind: str = ""
 
 
 class TableBlock(NamedTuple):
-    """A table whose numbers are rounded to three digits."""
+    """A table. Its numbers are rounded to three significant digits."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[object]]
 
 
 class FigureBlock(NamedTuple):
-    """A figure, which is numbered, and its caption."""
+    """A figure with its caption. The page numbers the figures."""
 
     drawing: Markup
     caption: str
@@ -36,9 +36,9 @@ Block = Paragraph | TableBlock | FigureBlock
 
 
 def page(title: str, origin: str, sections: Iterable[tuple[str, Iterable[Block]]]) -> str:
-    """Return an HTML page. Tables without rows and sections without content are left out.
+    """Return an HTML page, without empty tables and empty sections.
 
-    `origin`, which says whether people were simulated, appears in the title and under every heading.
+    `origin` states whether the participants were simulated. It appears in the title and under every heading.
     """
     shown_blocks = (
         (heading, [block for block in blocks if not isinstance(block, TableBlock) or block.rows])
@@ -70,10 +70,9 @@ def shown(value: object) -> str:
 
 
 def p_value(p: float | None) -> str:
-    """Format a p value with three decimals, or as below .001."""
+    """Format a p-value with three decimals, or as '< .001'."""
     return "-" if p is None else "< .001" if p < 0.001 else f"{p:.3f}".lstrip("0")
 
 
 def freedom(test: FTest | WaldTest) -> str:
-    """Format the degrees of freedom of an F test."""
     return f"{test.df1}, {test.df2:.4g}"

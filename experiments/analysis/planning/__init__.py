@@ -1,1 +1,1 @@
-"""Planning of studies: power, cost and preregistration."""
+"""Power, cost and preregistration of studies."""

@@ -1,9 +1,9 @@
-"""Power of a study in several homes, as a function of the numbers of homes, people and trials.
+"""Power of a study in several homes, as a function of the numbers of homes, participants and trials.
 
-The variances come from a mixed model of simulated participants. The design is balanced: conditions have equal numbers
-of people, people have equal numbers of trials, and all conditions share the homes. Effects of a home that all
-conditions share cancel. The mean of a condition then varies with the people, with its own effects in the homes, and
-with the trials.
+The variances come from a mixed model of simulated participants. The design is balanced: every condition has the same
+number of participants, every participant the same number of trials, and all conditions use the same homes. A home's
+effect on all conditions cancels in their differences. The mean of a condition therefore varies with its participants,
+with the interaction of condition and home, and with the trials.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,13 +27,13 @@ SLOPE = "house x assistance"
 
 @dataclass(frozen=True)
 class HomesPower:
-    """Power to detect a difference between conditions, by numbers of homes and of people per condition.
+    """Power to detect a difference between conditions, by number of homes and participants per condition.
 
     Attributes:
-        trials: Number of trials per person.
-        means: Mean by condition.
-        variances: Variances of people, of conditions within houses, and of the residual.
-        power: Power with a row per number of homes and a column per number of people.
+        trials: Number of trials per participant.
+        means: Mean of the measure in each condition.
+        variances: Variances between participants, of the interaction of condition and home, and of the residual.
+        power: Matrix of power, with one row per number of homes and one column per number of participants.
     """
 
     origin: str
@@ -56,13 +56,13 @@ def homes_power(
     difference: float | None = None,
     alpha: float = 0.05,
 ) -> HomesPower:
-    """Compute the power for each combination of `homes` and `people` from a pool with trials in several homes.
+    """Compute the power for each combination of `homes` and `people` from a pool of trials in several homes.
 
-    The condition means are those of the pool. With `difference`, the first and the last condition differ by it, and the
-    means of the others are halfway between.
+    The condition means are taken from the pool. If `difference` is given, it is the difference between the first and
+    the last condition, and the means of the others are halfway between them.
 
     Raises:
-        ConfigError: A design is impossible.
+        ConfigError: A combination does not form a valid design.
         StatisticsError: The variances cannot be estimated from the pool.
     """
     if measure not in table.columns:
@@ -107,18 +107,19 @@ def power_of_design(
     trials: int,
     alpha: float = 0.05,
 ) -> float:
-    """Compute the power of the F test of the conditions, with Satterthwaite's degrees of freedom.
+    """Compute the power of an F test of the conditions with Satterthwaite's degrees of freedom.
 
-    `people` is the number per condition. A condition with fewer trials than homes uses one home per trial.
+    `people` is the number per condition. If a condition has fewer trials than there are homes, it uses one home per
+    trial.
     """
     count, each = len(means), people * trials
     used = min(homes, each)
     left = variances["residual"]
-    of_people = left + trials * variances["person"]  # expected mean squares, here and in the next line
+    of_people = left + trials * variances["person"]  # expected mean square of participants
     of_homes = left + each / used * variances[SLOPE]
     freedom = count * (people - 1), (count - 1) * (used - 1)
-    rest = max(count * each - sum(freedom) - used, freedom[0])  # residual df; minimum if no home is shared
-    variance = (of_people + of_homes - left) / each  # variance of a condition mean; shared effects cancel
+    rest = max(count * each - sum(freedom) - used, freedom[0])  # residual; at least the minimum
+    variance = (of_people + of_homes - left) / each  # without effects that all conditions share
     parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
     df2 = variance**2 * each**2 / float(parts.sum())
     effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance
@@ -126,7 +127,7 @@ def power_of_design(
 
 
 def draw(path: Path, found: HomesPower, measure: str) -> None:
-    """Plot the power against the number of homes, with a line per number of people."""
+    """Plot power against the number of homes, with one line per number of participants."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()

@@ -1,7 +1,8 @@
-"""Sample size and cost of the next study, from the variance of simulated participants.
+"""Sample size and cost of a planned study, estimated from simulated participants.
 
-The noncentral F distribution gives the sample size, and a bootstrap of the pool its interval. Studies drawn from the
-pool show whether the power holds for data that are not normal or have unequal variances.
+The sample size is computed from the noncentral F distribution, and its interval by bootstrapping the pool of simulated
+participants. Studies drawn at random from the pool show whether the power also holds for data that are not normal or
+have unequal variances.
 """
 
 import math
@@ -16,10 +17,10 @@ from experiments.analysis.study.table import StudyTable
 from experiments.errors import ConfigError, StatisticsError
 from experiments.trials.exclusions import LeftOut
 
-RESAMPLES = 200  # bootstrap resamples of the pool, for the interval of the sample size
-STUDIES = 400  # number of studies drawn from the pool to check the power
-COVERAGE = 0.9  # coverage of the interval of the sample size
-MIN_POOL = 10  # minimum number of people in each cell of the pool
+RESAMPLES = 200  # number of bootstrap resamples for the interval of the sample size
+STUDIES = 400  # number of simulated studies to check the power
+COVERAGE = 0.9  # coverage of the sample size's interval
+MIN_POOL = 10  # minimum number of participants in each cell of the pool
 
 Cell = tuple[str, int]
 Pool = Mapping[Cell, Values]
@@ -27,11 +28,11 @@ Pool = Mapping[Cell, Values]
 
 @dataclass(frozen=True)
 class StudyCost:
-    """Pay, fees and time of participants.
+    """Payment, platform fees and time of participants.
 
     Attributes:
-        fee: Fee of the platform as a share of the pay.
-        dropout: Share of people who start but do not finish.
+        fee: Platform fee as a fraction of the pay.
+        dropout: Fraction of participants who start but do not finish.
     """
 
     pay: float = 7.5  # PAPER section 7
@@ -48,28 +49,28 @@ class StudyCost:
                 )
 
     def total(self, people: int) -> float:
-        """Return the total cost if this number of people finish."""
+        """Return the total cost if `people` participants finish."""
         return people * self.pay * (1 + self.fee)
 
     def hours(self, people: int) -> float:
-        """Return the total hours of all participants, including dropouts, if this number of people finish."""
+        """Return the total hours of all participants, including dropouts, if `people` of them finish."""
         return self.to_recruit(people) * self.minutes / 60
 
     def to_recruit(self, people: int) -> int:
-        """Return the number of people to recruit so that this number finish."""
+        """Return the number of participants to recruit so that `people` of them finish."""
         return math.ceil(people / (1 - self.dropout) - 1e-9)
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """The effect that a study should detect. Without `difference` and `eta_squared`, it is the effect in the pool.
+    """The effect that a study should detect: by default, the effect in the pool.
 
     Attributes:
-        measure: Short name of the measure.
+        measure: Short name of the measured variable.
         effect: `assistance`, `objects` or `interaction`.
-        difference: Largest difference between means of a factor's levels, in units of the measure, or None. The other
-            means are in the middle, which is the hardest case.
-        eta_squared: Partial eta squared, or None.
+        difference: Largest difference between the means of a factor's levels, in units of the measure, or None. The
+            other means are assumed to be halfway between, where the effect is hardest to detect.
+        eta_squared: Partial eta squared of the effect, or None.
         power: Probability of detecting the effect.
         alpha: Significance level.
     """
@@ -100,14 +101,14 @@ class Wanted:
 
 @dataclass(frozen=True)
 class PowerPlan:
-    """Sample size and cost of a study.
+    """Sample size and cost of a planned study.
 
     Attributes:
-        interval: 90 % interval of `per_cell` by resampling the pool; None if it does not depend on the pool.
-        power: Share of studies of this size, drawn from the pool, that detect the effect.
+        interval: 90 % bootstrap interval of `per_cell`, or None if the sample size does not depend on the pool.
+        power: Fraction of simulated studies of this size that detect the effect.
         power_error: Standard error of `power`.
-        people: Number of people who must finish, in all cells.
-        to_recruit: Number of people to recruit, including dropouts.
+        people: Total number of participants who must finish.
+        to_recruit: Number of participants to recruit, including expected dropouts.
     """
 
     origin: str
@@ -129,13 +130,13 @@ class PowerPlan:
 def plan_power(
     cells: Sequence[Cell], table: StudyTable, wanted: Wanted, cost: StudyCost, *, seed: int = 0
 ) -> PowerPlan:
-    """Compute the number of people that each cell (condition, number of objects) of a study needs.
+    """Compute the number of participants that a study needs in each cell (condition, number of objects).
 
-    `table` is a pool of people in the same cells.
+    `table` is a pool of participants in the same cells.
 
     Raises:
-        ConfigError: The design cannot show the effect.
-        StatisticsError: The pool has too few people or no variance, or too many people would be needed.
+        ConfigError: The design cannot test the effect.
+        StatisticsError: The pool has too few participants or no variance, or the study would need too many.
     """
     pool, rng = _pool(cells, table, wanted), np.random.default_rng(seed)
     eta_squared = _eta_squared(pool, wanted)
@@ -201,10 +202,6 @@ def _variance(pool: Pool) -> float:
 
 
 def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
-    """Return partial eta squared of the wanted effect, in cells of equal size.
-
-    The effect in the pool is corrected for chance: once for the pool itself, twice (`draws`) for people drawn from it.
-    """
     if wanted.eta_squared is not None:
         return wanted.eta_squared
     if wanted.difference is not None:
@@ -221,7 +218,6 @@ def _eta_squared(pool: Pool, wanted: Wanted, draws: int = 1) -> float:
 
 
 def _squares(means: Mapping[Cell, float], effect: str) -> float:
-    """Return the sum of squares of an effect on cell means, as if each cell had one person."""
     values = np.array(list(means.values()))
     first, second = (np.array([cell[k] for cell in means]) for k in (0, 1))
     if len(set(second.tolist())) == 1 or len(set(first.tolist())) == 1:
@@ -235,7 +231,7 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
     for k in range(RESAMPLES):
         try:
             sizes.append(_eta_squared({cell: v[k] for cell, v in drawn.items()}, wanted, draws=2))
-        except StatisticsError:  # this resample shows no effect
+        except StatisticsError:  # the effect vanished in this resample
             sizes.append(0.0)
     small, large = np.quantile(sizes, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2], method="nearest").tolist()
     cells, freedom = len(pool), _freedom(pool, wanted.effect)
@@ -250,7 +246,6 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
 
 
 def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
-    """Return the pool with its cells shifted so that the wanted effect is the only one."""
     own = wanted.difference is None and wanted.eta_squared is None
     pattern = _own_pattern(pool, wanted.effect) if own else _pattern(pool, wanted.effect)
     ratio = eta_squared / (1 - eta_squared) * len(pool) * _variance(pool)
@@ -259,7 +254,7 @@ def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
 
 
 def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return unscaled cell means: -1 and 1 at a factor's extreme levels, else 0. An interaction is their product."""
+    """Return a pattern of cell means: -1 and 1 at a factor's extreme levels, otherwise 0. Interactions are products."""
 
     def step(cell: Cell, name: str) -> float:
         levels = _levels(pool, name)
@@ -270,7 +265,7 @@ def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
 
 def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return what the effect adds to each cell mean of the pool. Only the pattern is used: chance inflates its size."""
+    """Return the effect's part of each cell mean. Only its pattern is used, because chance inflates its size."""
     means = {cell: float(v.mean()) for cell, v in pool.items()}
     grand = float(np.mean(list(means.values())))
 

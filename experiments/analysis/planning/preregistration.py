@@ -1,6 +1,6 @@
-"""Preregistrations: ZIP files that freeze design, measures, exclusions, analysis and code before data are collected.
+"""Preregistrations: ZIP files that freeze a study's design, measures, exclusions, analysis and code.
 
-Equal studies give equal bytes, so the SHA-256 of the file identifies the study.
+Equal studies give identical files, so a file's SHA-256 identifies the study.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ from mjsim.support.files import ROOT, read_bytes, replacing, source_digest
 STUDY, DESIGN, MEASURES, EXCLUSIONS = "study.toml", "design.json", "measures.toml", "exclusions.json"
 VERSIONS, MANIFEST, CODE = "versions.json", "manifest.json", "code/"
 LIBRARIES = ("mjsim", "numpy", "scipy", "statsmodels")
-# Code that affects the results of an analysis
+# Source files that affect the results of an analysis
 ANALYSIS = (
     "experiments/study",
     "experiments/analysis",
@@ -39,14 +39,14 @@ ANALYSIS = (
     "experiments/trials/exclusions.py",
 )
 CELL = ("assistance", "objects")
-_DATE = (1980, 1, 1, 0, 0, 0)  # fixed date of every ZIP entry, so that equal studies give equal bytes
+_DATE = (1980, 1, 1, 0, 0, 0)  # date of every ZIP entry, fixed so that equal studies give identical files
 
 Files = dict[str, bytes]
 
 
 @dataclass(frozen=True)
 class Preregistration:
-    """A frozen study. `sha256` is the hash of the ZIP file, and `design` has the settings of each trial."""
+    """A frozen study. `sha256` is the hash of the ZIP file, and `design` holds the settings of each trial."""
 
     files: Mapping[str, bytes]
     sha256: str
@@ -57,7 +57,7 @@ class Preregistration:
 
 
 def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
-    """Freeze a study file and a file of measures as a ZIP. Return its SHA-256."""
+    """Write a study file and a file of measures to a ZIP. Return the ZIP's SHA-256."""
     design = read_design(study)
     check_names(design.trials)
     read_measures(measures)
@@ -109,7 +109,7 @@ def _json(value: Any) -> bytes:
 
 
 def read_preregistration(path: Path) -> Preregistration:
-    """Read a preregistration. Raises a `ConfigError` if the file is not a preregistration, or was changed."""
+    """Read a preregistration. Raises `ConfigError` if the file is not a valid preregistration or has been modified."""
     try:
         data = read_bytes(path)
         files = _unpacked(data)
@@ -128,7 +128,7 @@ def read_preregistration(path: Path) -> Preregistration:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from error
     except KeyError as error:
         raise ConfigError(f"{path} is not a preregistration: it has no {error}") from error
-    except Exception as error:  # zipfile raises a dozen types on damaged files
+    except Exception as error:  # zipfile raises many different exceptions for damaged files
         raise ConfigError(f"{path} is not a valid preregistration: {error}") from error
     return Preregistration(files, hashlib.sha256(data).hexdigest(), exclusions, measures, versions, design)
 
@@ -153,7 +153,7 @@ def departures(
     folder: Path,
     measures: Measures,
 ) -> list[str]:
-    """List the differences between a study and its preregistration, one sentence each."""
+    """Describe each difference between a study and its preregistration in one sentence."""
     now = _frozen(exclusions, b"")
     found = [*_of_exclusions(frozen.exclusions, exclusions)]
     if frozen.measures != measures:
@@ -225,7 +225,6 @@ def _settings_of_runs(folder: Path) -> list[dict[str, Any]]:
 
 
 def _comparable(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a row, with hashes of files in place of their paths."""
     found = {name: row[name] for name in SETTINGS if name in row}
     for name in PATHS:
         path = found.get(name)

@@ -1,1 +1,1 @@
-"""Reports of a study: page, figures, and checks of assumptions."""
+"""Reports on studies: the page, its figures, and checks of assumptions."""

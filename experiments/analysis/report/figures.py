@@ -1,4 +1,4 @@
-"""Figures of a study as inline SVG without links or scripts. Equal data give equal bytes."""
+"""Figures of a study as inline SVG. Equal data give identical figures."""
 
 import io
 import json
@@ -32,20 +32,20 @@ from experiments.record.run_directory import TRIALS, is_run
 from experiments.trials.floor_plan import PLANNED, WALKED, planned_path
 from mjsim.values.episode import Episode
 
-# Okabe-Ito colours, distinct for all common kinds of colour vision
+# Okabe-Ito palette, which remains distinguishable with common forms of colour blindness
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
 RASTER_DPI = 200  # resolution of rasterized dots
 PANEL = (3.0, 2.6)  # size of a panel, in inches
-JITTER = 0.12  # relative to the width of a category
-MAX_DOTS = 2000  # number of dots above which they are rasterized to keep the file small
-WIDTH = 4.0  # width of a panel with paths, in inches
+JITTER = 0.12  # maximum horizontal shift of a dot, as a fraction of a category's width
+MAX_DOTS = 2000  # number of dots above which they are rasterized to limit the file size
+WIDTH = 4.0  # width of a panel that shows paths, in inches
 DISTANCE = "distance"
 
 
 def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
-    """Draw each person as a dot, and means with 95 % confidence intervals, with a row of panels per measure."""
+    """Plot each participant as a dot, and means with 95 % confidence intervals, in one row of panels per measure."""
     levels = table.levels()
     figure = Figure(figsize=(PANEL[0] * len(levels), PANEL[1] * len(labels)), layout="constrained")
     for panels, name in zip(grid(figure, len(labels), len(levels)), labels, strict=True):
@@ -62,7 +62,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
 def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
     groups = table.groups(name, objects)
     for place, (condition, values) in enumerate(groups.items()):
-        # The jitter is not random, so that equal data give equal figures.
+        # Use a deterministic jitter so that equal data give identical figures.
         shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
         dots = axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
         dots[0].set_rasterized(len(values) > MAX_DOTS)
@@ -73,7 +73,7 @@ def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None
 
 
 def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
-    """Draw means by number of objects and condition with 95 % confidence intervals, with a panel per measure."""
+    """Plot condition means against the number of objects, with 95 % confidence intervals, in a panel per measure."""
     figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
     for axes, name in zip(grid(figure, 1, len(labels))[0], labels, strict=True):
         for k, condition in enumerate(table.conditions()):
@@ -91,7 +91,7 @@ def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
 
 
 def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
-    """Draw a histogram of a measure for each cell, with a row per condition."""
+    """Draw a histogram of a measure for each cell, with one row per condition."""
     levels, conditions = table.levels(), table.conditions()
     figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
     panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True, sharey=True)
@@ -112,7 +112,7 @@ def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
 
 
 def answers(analysis: Analysis) -> FigureBlock:
-    """Draw the distribution of answers to each survey item by condition, over all numbers of objects."""
+    """Draw the distribution of answers to each survey item by condition, pooled over all numbers of objects."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
@@ -147,7 +147,7 @@ def svg(figure: Figure, title: str, caption: str) -> FigureBlock:
 
 
 def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> FigureBlock:
-    """Convert a figure to inline SVG, marked with the origin of its people."""
+    """Convert a figure to inline SVG, labelled with the origin of the data."""
     mark_origin(figure, table.origin)
     return svg(figure, f"{title}. {table.origin}.", caption)
 
@@ -192,10 +192,10 @@ def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: 
 
 
 def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
-    """Draw the planned and walked paths of one person per condition, from the run directories in `folder`.
+    """Draw the planned and walked paths of one participant per condition. `folder` holds the run directories.
 
     Raises:
-        RecordError: `folder` has no run directories of these people.
+        RecordError: `folder` does not contain run directories of these participants.
     """
     shown = [(row, found) for row in median_people(table) if (found := _run_of(row, folder)) is not None]
     if not shown:
@@ -214,7 +214,7 @@ def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
 
 
 def median_people(table: StudyTable) -> Iterator[Any]:
-    """Yield one row per condition: the person with the median distance at the smallest number of objects."""
+    """Yield one row per condition: the participant with the median distance, at the smallest number of objects."""
     if DISTANCE not in table.columns:
         return
     walked, least = table.columns[DISTANCE], table.levels()[0]
@@ -225,7 +225,7 @@ def median_people(table: StudyTable) -> Iterator[Any]:
 
 
 def _run_of(row: Any, folder: Path) -> Path | None:
-    """Find a row's run directory, first by participant, because people with the same trial share a fingerprint."""
+    """Find a row's run directory. Look for the participant first, because equal trials have equal fingerprints."""
     visit = folder / str(row.get("participant")) / TASK
     if is_run(visit):
         return visit

@@ -1,4 +1,4 @@
-"""The report of a study: one HTML file with all figures, tests and models."""
+"""The report on a study: one HTML file with all figures, tests and models."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -44,7 +44,7 @@ PAIR_HEAD = (
 
 
 def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
-    """Return the page. Paths are drawn if `folder` has run directories."""
+    """Return the report as HTML. Paths are drawn if `folder` contains run directories."""
     parts = (
         ("Summary", _summary(analysis)),
         ("People", _people(analysis)),

@@ -1,1 +1,1 @@
-"""Statistics of between-subjects studies on plain arrays. Some need statsmodels, from the extra `study`."""
+"""Statistics of between-subjects studies, computed from plain arrays. Some require statsmodels (extra `study`)."""

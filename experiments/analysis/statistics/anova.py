@@ -12,11 +12,11 @@ from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
 OWN_VARIANCE = "variance, each group in units of its own"
-EFFECTS = ("assistance", "objects", "interaction")  # effects of a two-way analysis of variance
+EFFECTS = ("assistance", "objects", "interaction")  # effects in a two-way analysis of variance
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Check that there are two or more groups of at least `least` values, and that values vary within a group."""
+    """Raise a `StatisticsError` unless two or more groups have at least `least` values each and some group varies."""
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
@@ -29,7 +29,7 @@ def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
 
 
 def varies(values: Values) -> bool:
-    """Return True if values (n,) differ by more than rounding."""
+    """Return True if the values differ by more than rounding errors."""
     return bool(len(values) > 1 and np.ptp(values) > 1e-12 * max(1.0, float(np.abs(values).max())))
 
 
@@ -43,10 +43,10 @@ def one_way(groups: Mapping[str, Values]) -> FTest:
 
 
 def welch(groups: Mapping[str, Values]) -> FTest:
-    """Compute Welch's analysis of variance, which does not assume equal variances. Every group must vary.
+    """Compute Welch's analysis of variance, which does not assume equal variances.
 
-    F df1 estimates the sum of n (mean - weighted mean)^2 / variance over groups, independently of df2. The effect size
-    and its interval are based on this sum and the number of people, as if every group had variance 1.
+    Every group must vary. F * df1 estimates the sum of n (mean - weighted mean)^2 / variance over the groups, whatever
+    df2 is. The effect size and its interval are computed from this sum and the number of values.
 
     Source: Welch 1951, doi:10.1093/biomet/38.3-4.330.
     """
@@ -69,11 +69,11 @@ def welch(groups: Mapping[str, Values]) -> FTest:
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
-    """Test for equal variances by an analysis of variance of the distances from the group medians.
+    """Compute a modified Brown-Forsythe test of equal variances, based on the distances from the group medians.
 
-    The median fixes one distance in each group: of d1 <= d2 <= ... <= dn, d1 is 0 if n is odd, and equal to d2 if n is
-    even. So d2, ..., dn are compared, with (d1 + d2) / sqrt(2) in place of d2 if n is even. With d1, the test would
-    have a false positive rate of 3.5 % at the published sizes.
+    Of a group's sorted distances d1 <= d2 <= ... <= dn, d1 carries no information: it is 0 if n is odd, and equal to d2
+    if n is even. It is therefore left out, and d2 is replaced by (d1 + d2) / sqrt(2) if n is even. With d1, the false
+    positive rate would be only 3.5 % at the sample sizes of the paper.
 
     Sources: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955; Hines and Hines 2000,
     doi:10.1111/j.0006-341X.2000.00451.x.
@@ -99,7 +99,7 @@ def _distances(values: Values) -> Values:
 
 
 def _fisher(groups: Mapping[str, Values]) -> FTest:
-    """Compute the test without statsmodels, which fails for a group of one person."""
+    """Compute Fisher's analysis of variance directly, because statsmodels fails if a group has a single value."""
     members, people = list(groups.values()), people_in(groups)
     grand = np.concatenate(members).mean()
     between = sum(len(v) * float(v.mean() - grand) ** 2 for v in members)
@@ -110,12 +110,13 @@ def _fisher(groups: Mapping[str, Values]) -> FTest:
 
 @dataclass(frozen=True)
 class Cells:
-    """Values by cell of a design with one or two factors, for c cells and n people.
+    """Cell statistics of a design with one or two factors, c cells and n participants.
 
     Attributes:
-        columns: Columns of a linear model by effect, (c, columns): sum coded, 1 at a level, -1 at the last one, else 0.
-        member: Cell of each person, (n,).
-        squares: Sums of squares around the means, (c,), like `people` and `means`.
+        columns: Sum-coded columns of the linear model by effect, shape (c, columns): 1 at a level, -1 at the last
+            level, otherwise 0.
+        member: Index of each participant's cell, shape (n,).
+        squares: Sum of squares around the mean of each cell, shape (c,). `people` and `means` have the same shape.
     """
 
     columns: Mapping[str, Values]
@@ -125,7 +126,7 @@ class Cells:
     squares: Values
 
     def residual(self, names: Iterable[str]) -> float:
-        """Return the residual sum of squares of the cell means in a linear model with these effects."""
+        """Return the residual sum of squares if a linear model with these effects is fitted to the cell means."""
         weights = np.sqrt(self.people)[:, None]
         design = np.hstack([self.columns[name] for name in names]) * weights
         wanted = self.means * weights[:, 0]
@@ -133,7 +134,7 @@ class Cells:
 
 
 def cells_of(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
-    """Group values and factors, (n,) each, into cells. If the second factor has one level, it is ignored."""
+    """Group values by two factors. All arrays have shape (n,). A second factor with only one level is ignored."""
     names, others = np.unique(first), np.unique(second)
     if len(names) < 2:
         raise StatisticsError(f"there is only one level ({', '.join(map(str, names))})")
@@ -159,12 +160,12 @@ def _sum_coded(levels: int) -> Values:
 
 
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
-    """Compute a two-way analysis of variance with unequal numbers of people per cell. Keys are those in `EFFECTS`.
+    """Compute a two-way analysis of variance with unequal cell sizes. The keys are those in `EFFECTS`.
 
     Values and factors have shape (n,). `kind` is the type of the sums of squares, 2 or 3.
 
     Raises:
-        StatisticsError: A cell is empty, each cell has only one person, or nothing varies within cells.
+        StatisticsError: A cell is empty, every cell has a single value, or no cell varies.
 
     Source: Langsrud 2003, doi:10.1023/A:1023260610025.
     """
@@ -186,7 +187,7 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
 def two_way_squares(
     values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
 ) -> dict[str, float]:
-    """Return the sums of squares of the effects of a two-way analysis. Arguments are as in `two_way`."""
+    """Return the sum of squares of each effect in a two-way analysis of variance. For the arguments, see `two_way`."""
     return _squares(_crossed(values, first, second), kind)
 
 
@@ -200,8 +201,7 @@ def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells
 def _squares(cells: Cells, kind: int) -> dict[str, float]:
     """Return the reduction of the residual sum of squares by each effect.
 
-    In Type II, it is relative to the model without the effect and its interaction, in Type III to the full model
-    without it.
+    Type II adds the effect to a model without its interaction. Type III adds it to the model with all other effects.
     """
     sums = {}
     for effect in EFFECTS:
@@ -212,7 +212,7 @@ def _squares(cells: Cells, kind: int) -> dict[str, float]:
 
 
 def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """Compute Welch's test of each effect, with Johansen's approximate degrees of freedom.
+    """Compute Welch-James tests of both factors and their interaction, with Johansen's approximate degrees of freedom.
 
     All arrays have shape (n,). Source: Johansen 1980, doi:10.1093/biomet/67.1.85.
     """
@@ -220,10 +220,10 @@ def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any])
 
 
 def hc3(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """Compute F tests with the heteroscedasticity-consistent covariance HC3 of the linear model with all effects.
+    """Compute F tests of a linear model with the heteroscedasticity-consistent covariance HC3.
 
-    In a model with a mean per cell, the covariance is each cell's variance divided by its number of people minus 1.
-    Arguments are as in `welch_james`. Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
+    The model has one mean per cell. HC3 estimates a mean's variance as the cell's variance divided by its size minus 1.
+    All arrays have shape (n,). Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
     """
     return _tests(values, assistance, objects, 1, lambda statistic, q, _: (statistic / q, None))
 
@@ -240,7 +240,7 @@ def _tests(
     fewer: int,
     scaled: Callable[[float, int, Values], tuple[float, float | None]],
 ) -> dict[str, FTest]:
-    """Compute a Wald test of each effect. A cell mean has the variance of its cell divided by (people - `fewer`)."""
+    """Compute a Wald test of each effect. A mean's variance is the cell's variance over its size minus `fewer`."""
     cells = cells_of(values, assistance, objects)
     if cells.people.min() < 2:
         raise StatisticsError("a cell has only one person; its variance is unknown")
@@ -258,7 +258,6 @@ def _tests(
 
 
 def _contrasts(cells: Cells) -> dict[str, Values]:
-    """Return a matrix (q, cells) per effect that maps the cell means to the effect's q parameters."""
     rows = np.asarray(np.linalg.inv(np.hstack(list(cells.columns.values()))), float)
     found, start = {}, 0
     for effect, block in cells.columns.items():

@@ -1,4 +1,4 @@
-"""Linear models with crossed random factors, such as person and house, and a bootstrap over houses."""
+"""Linear models with crossed random factors, such as participant and house, and a bootstrap over houses."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -13,14 +13,14 @@ from experiments.analysis.statistics.anova import Values, cells_of, varies
 from experiments.analysis.statistics.variance_components import VarianceComponents
 from experiments.errors import StatisticsError
 
-MIN_LEVELS = 5  # fewer levels say little about the variance between them
+MIN_LEVELS = 5  # minimum number of levels to estimate a variance between them
 RESAMPLES = 2000
-BATCH = 100  # resamples in memory at a time
+BATCH = 100  # number of resamples processed at a time, which limits memory
 
 
 @dataclass(frozen=True)
 class WaldTest:
-    """A Wald F test of a model's term, with Satterthwaite's degrees of freedom for the error."""
+    """A Wald F test of an effect, with Satterthwaite's degrees of freedom for the error."""
 
     statistic: float
     df1: int
@@ -30,12 +30,12 @@ class WaldTest:
 
 @dataclass(frozen=True)
 class RandomFactor:
-    """A random factor of a model.
+    """A random factor of a mixed model.
 
     Attributes:
-        variance: Variance between levels, in squared units of the measure.
-        share: Share of the variance within conditions, from 0 to 1.
-        interval: 95 % profile likelihood interval of the share, or None in models with a covariate.
+        variance: Variance between the factor's levels, in squared units of the measure.
+        share: Fraction of the variance within conditions that is due to this factor.
+        interval: 95 % profile likelihood interval of `share`, or None if the model has a covariate.
     """
 
     levels: int
@@ -46,7 +46,7 @@ class RandomFactor:
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A linear model with crossed random factors. `tests` has a test per effect, with those of a covariate last."""
+    """A linear model with crossed random factors. `tests` has one test per effect; those of a covariate come last."""
 
     tests: Mapping[str, WaldTest]
     random: Mapping[str, RandomFactor]
@@ -60,13 +60,13 @@ def mixed_model(
     random: Mapping[str, NDArray[Any]],
     covariate: tuple[str, Values] | None = None,
 ) -> MixedModel:
-    """Fit fixed effects of assistance, number of objects and their interaction, and random intercepts of the factors.
+    """Fit fixed effects of assistance, number of objects and their interaction, and a random intercept for each factor.
 
-    All arrays have one entry per trial, (n,). A named covariate has linear effects on the values and on the differences
-    between conditions.
+    All arrays have one entry per trial, shape (n,). A covariate is given with its name. It has a linear effect on the
+    values, and interacts linearly with the condition.
 
     Raises:
-        StatisticsError: There are too few levels, a cell is empty, or the variances cannot be distinguished.
+        StatisticsError: A random factor has too few levels, a cell is empty, or two variances cannot be told apart.
     """
     members = {name: np.unique(levels, return_inverse=True)[1] for name, levels in random.items()}
     for name, member in members.items():
@@ -112,7 +112,7 @@ def _with_covariate(name: str, values: Values, conditions: Values) -> dict[str, 
 
 @dataclass(frozen=True)
 class HouseDifference:
-    """Difference of means, second minus first, with a 95 % interval by resampling houses with all their trials."""
+    """Difference of two means, second minus first, with a 95 % interval from resampling whole houses."""
 
     first: str
     second: str
@@ -128,7 +128,7 @@ def differences_by_house(
     conditions: Sequence[str],
     seed: int = 0,
 ) -> list[HouseDifference]:
-    """Compare all pairs of `conditions` by a percentile bootstrap over houses. Arrays have shape (n,)."""
+    """Compare all pairs of `conditions` by a percentile bootstrap over houses. All arrays have shape (n,)."""
     names, house = np.unique(houses, return_inverse=True)
     if len(names) < MIN_LEVELS:
         raise StatisticsError(f"resampling needs at least {MIN_LEVELS} houses; there are {len(names)}")
@@ -145,7 +145,7 @@ def differences_by_house(
     even, resampled = np.full(len(names), 1 / len(names)), []
     for _ in range(0, RESAMPLES, BATCH):
         drawn = rng.multinomial(len(names), even, BATCH)
-        with np.errstate(invalid="ignore"):  # a resample may leave a cell empty
+        with np.errstate(invalid="ignore"):  # a cell may be empty in a resample
             resampled.append(np.tensordot(drawn, sums, 1) / np.tensordot(drawn, counts, 1))
     means, own = np.concatenate(resampled).mean(axis=2), (sums.sum(axis=0) / counts.sum(axis=0)).mean(axis=1)
     found = []

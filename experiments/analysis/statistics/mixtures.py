@@ -1,7 +1,7 @@
-"""Kinds of people by their acceptance of suggestions, from a mixture of beta-binomial distributions.
+"""Types of participants by their acceptance of suggestions, modelled as a mixture of beta-binomial distributions.
 
-Each person of a kind has an acceptance rate from a Beta distribution and accepts each visit with that probability. The
-number of kinds is chosen by Schwarz's criterion (BIC).
+Each participant has an acceptance rate, drawn from the Beta distribution of their type, and accepts each suggested
+visit with that probability. The Bayesian information criterion (BIC) selects the number of types.
 """
 
 import math
@@ -17,19 +17,20 @@ from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, people of the same kind hardly differ
-STARTS = 10  # random starting points, in addition to those from the data and from the fit of fewer kinds
+PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, participants of one type hardly differ
+STARTS = 10  # number of random starting points, in addition to those from the data and from the fit with one type fewer
 
 Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """A fitted mixture of k kinds, in descending order of mean acceptance rate.
+    """A fitted mixture of k types, in descending order of mean acceptance rate.
 
     Attributes:
-        precisions: a + b of each Beta distribution, (k,). The higher it is, the more similar people of the kind are.
-        bic: Schwarz's criterion. Smaller is better.
+        precisions: Sum a + b of each Beta distribution's parameters, shape (k,). Participants of a type with a higher
+            precision are more similar.
+        bic: Bayesian information criterion. Smaller is better.
     """
 
     shares: tuple[float, ...]
@@ -40,18 +41,18 @@ class Mixture:
 
 
 def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
-    """Fit mixtures of one to three kinds by maximum likelihood. The best mixture by BIC comes first.
+    """Fit mixtures of one to three types by maximum likelihood, and return them in ascending order of BIC.
 
-    `accepted` and `visits`, (n,), are each person's numbers of accepted visits and of all visits.
+    `accepted` counts the accepted visits of each participant, and `visits` all visits. Both have shape (n,).
 
     Raises:
-        StatisticsError: There are too few people, or the numbers are invalid.
+        StatisticsError: There are too few participants, or the counts are invalid.
     """
     if len(accepted) < MIN_PEOPLE:
         raise StatisticsError(f"a mixture needs at least {MIN_PEOPLE} people; there are {len(accepted)}")
     if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
         raise StatisticsError("a number of accepted visits is below 0 or above the number of visits")
-    # People with equal numbers are one case, whose likelihood is computed once.
+    # Participants with equal counts have the same likelihood, which is computed once.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
     found: list[Mixture] = []
     for kinds in range(1, MAX_KINDS + 1):
@@ -60,7 +61,6 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
 
 
 def _fit(cases: Counts, people: Counts, kinds: int, fewer: Mixture | None) -> Mixture:
-    """Return the best fit. `cases` (m, 2) has distinct pairs (accepted, visits), `people` (m,) their frequencies."""
     bounds = [(-8.0, 8.0)] * (2 * kinds - 1) + [PRECISIONS] * kinds
     climbs = [
         minimize(_loss, first, (cases, people, kinds), jac=True, method="L-BFGS-B", bounds=bounds)
@@ -109,7 +109,6 @@ def _start(
 def _parts(
     parameters: NDArray[np.float64], kinds: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return log shares, means and precisions, (k,) each."""
     weights = np.append(parameters[: kinds - 1], 0.0)
     means = expit(parameters[kinds - 1 : 2 * kinds - 1])
     return weights - np.logaddexp.reduce(weights), means, np.exp(parameters[2 * kinds - 1 :])
@@ -121,7 +120,7 @@ def _loss(
     weights, means, precisions = _parts(parameters, kinds)
     accepted, others = cases[:, :1], cases[:, 1:] - cases[:, :1]
     a, b = means * precisions, (1 - means) * precisions
-    # The binomial coefficient is left out because it is the same for all mixtures.
+    # Leave out the binomial coefficient, which does not depend on the mixture.
     each = betaln(accepted + a, others + b) - betaln(a, b) + weights
     everyone = np.logaddexp.reduce(each, axis=1)
     belonging = np.exp(each - everyone[:, None]) * people[:, None]

@@ -1,6 +1,7 @@
-"""Proportional odds of ordinal answers, by Newton's method, and diagnostics of residuals.
+"""Proportional odds models of ordinal answers, and diagnostics of residuals.
 
-The likelihood has one maximum. statsmodels finds it only to 1e-4 and takes a hundred times as long.
+The likelihood has a single maximum, found by Newton's method. statsmodels reaches it only to 1e-4 and is a hundred
+times slower.
 """
 
 from collections.abc import Mapping
@@ -16,12 +17,12 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 MAX_STEPS = 60
-FARTHEST = 25.0  # limit of cuts and shifts, in logits; larger ones diverge
+FARTHEST = 25.0  # maximum size of cuts and shifts, in logits; the fit has diverged beyond it
 
 
 @dataclass(frozen=True)
 class Chi2Test:
-    """A chi squared test of a model's term."""
+    """A chi-squared test of a term in a model."""
 
     statistic: float
     df: int
@@ -30,7 +31,7 @@ class Chi2Test:
 
 @dataclass(frozen=True)
 class OrdinalModel:
-    """Proportional odds of answers by condition, relative to the first condition, with a likelihood ratio test."""
+    """Odds of higher answers by condition, relative to the first condition, with a likelihood ratio test."""
 
     test: Chi2Test
     odds_ratios: Mapping[str, float]
@@ -38,7 +39,7 @@ class OrdinalModel:
 
 
 def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
-    """Fit proportional odds to whole-number answers by condition.
+    """Fit a proportional odds model to integer answers, grouped by condition.
 
     Source: McCullagh 1980, doi:10.1111/j.2517-6161.1980.tb01109.x.
     """
@@ -51,7 +52,7 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
     counts = np.array([(values[:, None] == given).sum(axis=0) for values in groups.values()], float)
     likelihood, shifts = _climb(counts)
     total = counts.sum(axis=0)
-    alone = float((total * np.log(total / total.sum())).sum())  # likelihood without conditions
+    alone = float((total * np.log(total / total.sum())).sum())  # log likelihood of the null model
     gain, df = max(2 * (likelihood - alone), 0.0), len(groups) - 1
     return OrdinalModel(
         Chi2Test(gain, df, float(chi2.sf(gain, df))),
@@ -64,7 +65,7 @@ def _climb(counts: Values) -> tuple[float, Values]:
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     share = counts.sum(axis=0).cumsum()[:-1] / counts.sum()
     point = np.concatenate([logit(share), np.zeros(groups - 1)])
-    # Logit of "at most this answer" by cut and group: the cut minus the group's shift
+    # Design matrix of the logits of "at most this answer": the cut minus the group's shift
     member = np.repeat(np.eye(groups)[:, 1:], cuts, axis=0)
     design = np.hstack([np.tile(np.eye(cuts), (groups, 1)), -member])
     value, gradient, curvature = _likelihood(counts, design, point)
@@ -85,7 +86,6 @@ def _climb(counts: Values) -> tuple[float, Values]:
 
 
 def _likelihood(counts: Values, design: Values, point: Values) -> tuple[float, Values, Values]:
-    """Return the log likelihood, its gradient, and minus its Hessian. It is minus infinity if cuts are not in order."""
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     below = expit(design @ point).reshape(groups, cuts)
     chance = np.diff(below, prepend=0.0, append=1.0, axis=1)
@@ -104,19 +104,19 @@ def _likelihood(counts: Values, design: Values, point: Values) -> tuple[float, V
     return float((counts * np.log(chance)).sum()), design.T @ by_logit.ravel(), curvature
 
 
-MAX_SHAPIRO = 5000  # largest sample for which the p of Shapiro and Wilk's test is known
+MAX_SHAPIRO = 5000  # largest sample for which scipy's p-value of the Shapiro-Wilk test is accurate
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Residuals of a measure around the means of its cells.
+    """Diagnostics of a measure's residuals, its deviations from the cell means.
 
     Attributes:
-        shapiro_wilk: W of the residuals; 1 for perfectly normal residuals.
-        shapiro_wilk_p: Its p; None for samples above `MAX_SHAPIRO`.
-        kurtosis: Excess kurtosis, 0 for normal residuals.
-        equal_variances: Brown and Forsythe's test over all cells.
-        largest_deviation: Cell with the largest standard deviation, and this deviation.
+        shapiro_wilk: Statistic W of the Shapiro-Wilk test, which is 1 for perfectly normal residuals.
+        shapiro_wilk_p: p-value of the Shapiro-Wilk test, or None for samples larger than `MAX_SHAPIRO`.
+        kurtosis: Excess kurtosis, which is 0 for normal residuals.
+        equal_variances: Brown-Forsythe test over all cells.
+        largest_deviation: Name of the cell with the largest standard deviation, and that deviation.
     """
 
     shapiro_wilk: float
@@ -129,9 +129,9 @@ class Diagnostics:
 
 
 def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
-    """Compute diagnostics of values by cell, at least two in each.
+    """Compute diagnostics of values by cell. Each cell needs at least two values.
 
-    Sources: Shapiro and Wilk 1965, doi:10.1093/biomet/52.3-4.591; p by Royston 1995, AS R94.
+    Sources: Shapiro and Wilk 1965, doi:10.1093/biomet/52.3-4.591; p-value by Royston 1995, AS R94.
     """
     check_groups(cells, least=2)
     residuals = residuals_of(cells)
@@ -150,5 +150,5 @@ def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
 
 
 def residuals_of(cells: Mapping[str, Values]) -> Values:
-    """Return the values minus the mean of their cell, (n,), in the order of cells."""
+    """Return the residuals of all cells in one array: each value minus the mean of its cell."""
     return np.concatenate([values - values.mean() for values in cells.values()])

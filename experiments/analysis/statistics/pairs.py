@@ -1,4 +1,4 @@
-"""Comparisons of all pairs of groups: differences, their sizes, and equivalence."""
+"""Pairwise comparisons of groups: differences, effect sizes and equivalence tests."""
 
 import itertools
 import math
@@ -18,21 +18,21 @@ from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
-TAIL = 1e-18  # probability cut off at each end of the distribution of the sample standard deviation
-WIDEST = 1e4  # upper limit of quantiles of the studentized range
+TAIL = 1e-18  # probability cut off at each end when integrating over the sample standard deviation
+WIDEST = 1e4  # upper limit when searching quantiles of the studentized range
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two groups compared. p values are two-sided, and None if they cannot be computed.
+    """A comparison of two groups. p-values are two-sided, or None if they cannot be computed.
 
     Attributes:
-        difference: Mean of the second minus mean of the first.
-        interval: 95 % confidence interval of the difference, simultaneous over all pairs (Tukey).
-        holm_p: p value of Welch's t test, corrected over all pairs by Holm's method.
-        equivalence_bound: Largest difference that counts as equivalent, in units of the values.
-        equivalence_p: p value of two one-sided Welch tests. Below .05, the difference is smaller than the bound.
-        verdict: `different` (Tukey), else `equivalent`, else `undecided`.
+        difference: Mean of the second group minus mean of the first.
+        interval: Tukey's simultaneous 95 % confidence interval of the difference.
+        holm_p: p-value of Welch's t test, corrected for all pairs by Holm's method.
+        equivalence_bound: Largest difference considered equivalent, in units of the values.
+        equivalence_p: p-value of two one-sided Welch tests of equivalence.
+        verdict: `different` by Tukey's test, `equivalent` by the equivalence test, or `undecided`.
     """
 
     first: str
@@ -50,7 +50,7 @@ class Pair:
 
 
 def compare_pairs(groups: Mapping[str, Values], bound: float) -> list[Pair]:
-    """Compare all pairs of groups. `bound` is the largest equivalent difference, in pooled SDs within groups."""
+    """Compare all pairs of groups. `bound` is the largest equivalent difference, in pooled standard deviations."""
     check_groups(groups)
     pairs = list(itertools.combinations(groups, 2))
     welch = {
@@ -92,7 +92,7 @@ def _compare(
 
 
 def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool:
-    """Return True if two of the groups differ by Tukey's test at .05. This is faster than computing its p value."""
+    """Return True if Tukey's test at .05 separates two of the groups. This is faster than computing its p-value."""
     check_groups(groups)
     if missing := [name for name in (first, second) if name not in groups]:
         raise StatisticsError(f"no people in {missing[0]}")
@@ -101,16 +101,15 @@ def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool
 
 
 def _difference(groups: Mapping[str, Values], first: str, second: str) -> tuple[float, float, int]:
-    """Return the difference of two means, second minus first, its pooled standard error, and degrees of freedom."""
     one, other = groups[first], groups[second]
     error = pooled_deviation(groups) * math.sqrt(1 / len(one) + 1 / len(other))
     return float(other.mean() - one.mean()), error, people_in(groups) - len(groups)
 
 
 def tukey_p(statistic: float, groups: int, freedom: float) -> float:
-    """Return the p value of Tukey's test for a difference between two of several groups, in standard errors.
+    """Return the p-value of Tukey's test for a difference between two of several groups, in standard errors.
 
-    Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal numbers of people.
+    Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal group sizes.
     """
     return range_sf(statistic * math.sqrt(2), groups, freedom)
 
@@ -126,7 +125,7 @@ def pooled_deviation(groups: Mapping[str, Values]) -> float:
 
 
 def holm(p: Values) -> Values:
-    """Correct p values (n,) for multiple comparisons.
+    """Correct p-values for multiple comparisons by Holm's method.
 
     Source: Holm 1979, Scandinavian Journal of Statistics 6.
     """
@@ -160,9 +159,9 @@ def range_quantile(share: float, groups: int, freedom: float) -> float:
 
 
 def _deviations(freedom: float) -> tuple[Values, Values]:
-    """Return nodes and weights for integrals over the sample standard deviation, relative to the true one.
+    """Return nodes and weights to integrate over the ratio of the sample standard deviation to the true one.
 
-    The nodes are placed on the scale of its root, where the density is smooth at 0 for any degrees of freedom.
+    The nodes are spaced on the square root of this ratio, where the density is smooth at 0 for all degrees of freedom.
     """
     low, high = (
         2 * end / freedom for end in (gammaincinv(freedom / 2, TAIL), gammainccinv(freedom / 2, TAIL))

@@ -1,7 +1,7 @@
-"""Variances of crossed random factors by restricted maximum likelihood.
+"""Variance components of crossed random factors, estimated by restricted maximum likelihood.
 
-statsmodels has a precision of 1e-4, no degrees of freedom of the error, and needs minutes for crossed factors. Here,
-the deviance at given ratios of variances takes one Cholesky decomposition, and Newton's method finds its minimum.
+statsmodels reaches a precision of only 1e-4, gives no error degrees of freedom, and takes minutes for crossed factors.
+Here, the deviance for given variance ratios takes one Cholesky decomposition, and Newton's method minimizes it.
 """
 
 from functools import cache
@@ -16,20 +16,21 @@ from scipy.special import chdtri
 from experiments.analysis.statistics.anova import Values
 from experiments.errors import StatisticsError
 
-STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # starting ratios of variances
+STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # starting values of the variance ratios
 MAX_RATIO = 1e6
 NEWTON_STEPS = 30
-DENSE = 400  # number of levels above which crossproducts are sparse
-PRECISION = 1e-4  # precision of interval ends
+DENSE = 400  # number of levels above which crossproducts are stored as sparse matrices
+PRECISION = 1e-4  # absolute precision of confidence limits
 
 
 class VarianceComponents:
-    """A linear model with random factors, at given ratios of their variances to the residual variance.
+    """A linear model with random factors, evaluated at given ratios of their variances to the residual variance.
 
-    V is the covariance over the residual variance, and P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1. Everything is computed
-    from the crossproducts of the indicators Z, the design X and the values y, so the cost depends on the levels of the
-    factors, not on the number of trials. The factor with the most levels, and the factors that it is nested in, are
-    eliminated one by one, because their crossproducts are diagonal. Crossproducts of many levels are sparse.
+    V is the covariance divided by the residual variance, and P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1. Everything is
+    computed from the crossproducts of the indicators Z, the design X and the values y, so the cost depends on the
+    levels of the factors, not on the number of trials. The factor with the most levels, and the factors that it is
+    nested in, are eliminated one by one, because their crossproducts are diagonal. Large crossproducts are sparse
+    matrices.
     """
 
     def __init__(self, design: Values, values: Values, members: list[NDArray[np.int64]]) -> None:
@@ -42,7 +43,7 @@ class VarianceComponents:
         ends = np.cumsum(self.sizes[order]).tolist()
         self.slices = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
         self.levels = ends[-1]
-        self.start = ends[len(self.nested) - 1]  # index of the first crossed level; effects follow the levels
+        self.start = ends[len(self.nested) - 1]  # first level that is not nested
         ones, rows = np.ones(len(values)), np.arange(len(values))
         parts = [csr_array((ones, (rows, members[k]))) for k in order]
         columns = hstack([*parts, csr_array(np.column_stack([design, values]))], "csr")
@@ -54,7 +55,7 @@ class VarianceComponents:
         self._check_variances()
 
     def _check(self, columns: Any, member: NDArray[np.int64]) -> None:
-        """Raise a `StatisticsError` if the trials leave nothing for the residual or for the factors."""
+        """Raise a `StatisticsError` if the residual variance or a factor's variance cannot be estimated."""
         trials, count = columns.shape[0], self.levels - self.start + self.effect_count
         within, _ = _swept(self.products, self.slices[self.nested[0]], np.inf)
         products = _dense(within[-count - 1 :, -count - 1 :])
@@ -76,12 +77,12 @@ class VarianceComponents:
     def _check_variances(self) -> None:
         traces = self._traces()[0]
         sizes = traces.diagonal()
-        aliased = sizes.min() <= 1e-13 * self.freedom**2  # a factor is aliased with the effects
+        aliased = sizes.min() <= 1e-13 * self.freedom**2  # a factor is aliased with the fixed effects
         if aliased or np.linalg.cond(traces / np.sqrt(np.outer(sizes, sizes))) > 1e8:
             raise StatisticsError("the design cannot distinguish the variances of the random factors")
 
     def at(self, ratios: Values) -> None:
-        """Compute generalized least squares at ratios (k,)."""
+        """Solve generalized least squares for these variance ratios, shape (k,)."""
         self.ratios = ratios
         self.active = np.flatnonzero(ratios > 0.0)
         products = self.products
@@ -90,7 +91,7 @@ class VarianceComponents:
         levels, effects = self.levels, slice(-self.effect_count, None)
         self.between = products[:levels, :levels]
         wide = _dense(products[:, self.start :])
-        # Solve for crossed levels and effects by Henderson's equations.
+        # Solve Henderson's equations for the remaining levels and the fixed effects.
         root, one = self._roots(ratios)
         inner = root[:, None] * wide[self.start : -1, :-1] * root
         inner[np.diag_indices(len(root))] += one
@@ -104,13 +105,12 @@ class VarianceComponents:
         self.residual = self.squares / self.freedom
 
     def _roots(self, ratios: Values) -> tuple[Values, Values]:
-        """Return the scales of crossed levels and effects in Henderson's equations, and the diagonal to add next."""
         levels = np.repeat(np.sqrt(ratios[self.crossed]), self.sizes[self.crossed])
         ones = np.ones(self.effect_count)
         return np.append(levels, ones), np.append(np.ones(len(levels)), 0.0 * ones)
 
     def deviance(self, ratios: Values) -> float:
-        """Return minus twice the restricted log likelihood at ratios (k,), up to a constant."""
+        """Return minus twice the restricted log likelihood at these variance ratios, shape (k,), up to a constant."""
         products, fixed = self.products, 0.0
         for k in self.nested:
             products, more = _swept(products, slice(0, self.sizes[k]), ratios[k])
@@ -139,7 +139,7 @@ class VarianceComponents:
 
     @staticmethod
     def _lowest(function: Any, start: Values, precision: float = 1e-6) -> tuple[Values, float]:
-        """Minimize a function of ratios to a relative precision. Return the minimizer and the minimum."""
+        """Minimize a function of variance ratios to a relative precision. Return the minimizer and the minimum."""
         if not len(start):
             return start, float(function(start))
         found = minimize(
@@ -155,13 +155,13 @@ class VarianceComponents:
         return float(self.ratios[k] / (1.0 + self.ratios.sum()))
 
     def interval(self, k: int) -> tuple[float, float]:
-        """Return the interval of a factor's share of the variance that a likelihood ratio test accepts at 5 %."""
+        """Return the 95 % profile likelihood interval of factor k's fraction of the variance."""
         lowest, limit = self.deviance(self.ratios), float(np.sqrt(chdtri(1, 0.05)))
         others, best, last = np.delete(self.ratios, k), self.share(k), MAX_RATIO / (1.0 + MAX_RATIO)
 
-        @cache  # a second evaluation would start elsewhere and might differ in sign
+        @cache
         def above(share: float) -> float:
-            nonlocal others  # start from the ratios found for the previous share
+            nonlocal others  # start from the variance ratios found in the previous call
             if share == best:
                 return -limit
             odds = share / (1.0 - share)
@@ -170,27 +170,26 @@ class VarianceComponents:
                 return self.deviance(np.insert(ratios, k, odds * (1.0 + ratios.sum())))
 
             others, height = self._lowest(of_others, others)
-            return float(np.sqrt(max(height - lowest, 0.0))) - limit  # the root makes it nearly linear
+            return float(np.sqrt(max(height - lowest, 0.0))) - limit
 
         low = float(brentq(above, 0.0, best, xtol=PRECISION)) if best > 0.0 and above(0.0) > 0.0 else 0.0
         return low, float(brentq(above, best, last, xtol=PRECISION)) if above(last) > 0.0 else 1.0
 
     def test(self, indices: NDArray[np.int64]) -> tuple[float, int, float]:
-        """Test the effects with these indices. Return F, and the degrees of freedom of numerator and denominator.
+        """Test the fixed effects with these indices. Return F with its numerator and denominator degrees of freedom.
 
-        Source of the degrees of freedom: Fai and Cornelius 1996, doi:10.1080/00949659608811740.
+        The degrees of freedom follow Fai and Cornelius 1996, doi:10.1080/00949659608811740.
         """
         block = self.covariance[np.ix_(indices, indices)] * self.residual
         sizes, turn = np.linalg.eigh(block)
         squares = (turn.T @ self.effects[indices]) ** 2 / sizes
         slopes = [(turn.T @ d[np.ix_(indices, indices)] @ turn).diagonal() for d in self._slopes()]
-        gradient = np.array(slopes)  # derivatives of the eigenvalues by the variances, (k, q)
+        gradient = np.array(slopes)  # derivatives of eigenvalues with respect to variances, shape (k, q)
         freedom = 2.0 * sizes**2 / np.einsum("iq,ij,jq->q", gradient, self._variances(), gradient)
         q, statistic = len(indices), float(squares.mean())
         return statistic, q, _joint_freedom(freedom)
 
     def _slopes(self) -> list[Values]:
-        """Return derivatives of the effects' covariance by the variances of nonzero factors and the residual."""
         effects = self.bent[:, -self.effect_count :].T
         moved = [effects[:, self.slices[k]] for k in self.active.tolist()]
         slopes = [one @ one.T for one in moved]
@@ -200,7 +199,7 @@ class VarianceComponents:
         return [*slopes, self.covariance - factors]
 
     def _traces(self) -> tuple[Values, Values]:
-        """Return traces of P V_k P V_l for all factors and the residual, (k + 1, k + 1), and of P V_k, (k,)."""
+        """Return the traces of P V_k P V_l, shape (k + 1, k + 1), and of P V_k, shape (k,), residual last."""
         diagonal = self.between.diagonal() - (self.bent * self.through).sum(axis=1)
         places = [self.slices[k] for k in range(len(self.sizes))]
         single = np.array([diagonal[place].sum() for place in places])
@@ -208,19 +207,18 @@ class VarianceComponents:
         traces = np.zeros((len(places), len(places)))
         for k, m in np.ndindex(traces.shape):
             block = self.between[places[k], places[m]]
-            # Sum the squares of a sparse matrix minus a product of narrow matrices without forming the product.
+            # Sum the squares of a sparse matrix minus a low-rank product without computing the difference.
             crossing = float((self.bent[places[k]] * (block @ self.through[places[m]])).sum())
             traces[k, m] = (block**2).sum() - 2.0 * crossing + float((halves[k] * halves[m].T).sum())
         return self._with_residual(traces, single, float(self.freedom)), single
 
     def _with_residual(self, of_factors: Values, single: Values, total: float) -> Values:
-        """Extend traces or quadratic forms of P V_k P V_l, (k, k), by the residual, with V = 1 + sum of ratio_k V_k."""
         mixed = single - of_factors @ self.ratios
         last = total - self.ratios @ single - self.ratios @ mixed
         return np.block([[of_factors, mixed[:, None]], [mixed[None], np.array([[last]])]])
 
     def _quadratic_forms(self) -> tuple[Values, Values]:
-        """Return y' P V_k P V_l P y for all factors and the residual, (k + 1, k + 1), and y' P V_k P y, (k,)."""
+        """Return y' P V_k P V_l P y, shape (k + 1, k + 1), and y' P V_k P y, shape (k,), residual last."""
         parts = np.zeros((self.levels, len(self.sizes)))
         for k, place in self.slices.items():
             parts[place, k] = self.left[place]
@@ -229,7 +227,7 @@ class VarianceComponents:
         return self._with_residual(crossed, single, self.squares), single
 
     def _slopes_of_deviance(self) -> tuple[Values, Values]:
-        """Return first and second derivatives of the deviance by the ratios, (k,) and (k, k)."""
+        """Return the gradient of the deviance with respect to the variance ratios, and its Hessian."""
         traces, single = self._traces()
         moved, squares = self._quadratic_forms()
         squares = squares / self.residual
@@ -237,14 +235,13 @@ class VarianceComponents:
         return single - squares, curve - np.outer(squares, squares) / self.freedom
 
     def _variances(self) -> Values:
-        """Return the covariance of the nonzero estimated variances, from second derivatives of the likelihood."""
         kept = np.append(self.active, len(self.sizes))
         observed = self._quadratic_forms()[0] / self.residual - self._traces()[0] / 2.0
         return np.asarray(np.linalg.inv(observed[np.ix_(kept, kept)]) * self.residual**2)
 
 
 def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[int]:
-    """Return the factor with the most levels, and each factor that the previous one is nested in."""
+    """Return the indices of the factor with the most levels and of the chain of factors in which it is nested."""
     first, *rest = np.argsort(-sizes, kind="stable").tolist()
     chain = [first]
     for k in rest:
@@ -255,7 +252,7 @@ def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[
 
 
 def _swept(products: Any, place: slice, ratio: float, *, keep: bool = False) -> tuple[Any, float]:
-    """Eliminate the factor at `place`, dropping its rows unless `keep`. Return crossproducts and log determinant."""
+    """Eliminate the factor at `place` and drop its rows unless `keep`. Return crossproducts and log determinant."""
     block = products[place]
     counts = block[:, place].diagonal()
     shrink = np.zeros(len(counts)) if ratio == 0.0 else 1.0 / (1.0 / ratio + counts)
@@ -272,7 +269,6 @@ def _dense(matrix: Any) -> Values:
 
 
 def _joint_freedom(freedom: Values) -> float:
-    """Return the denominator degrees of freedom of an F statistic from those of its q components."""
     if np.ptp(freedom) < 1e-8 * freedom.max():
         return float(freedom.mean())
     expected = float((freedom / (freedom - 2.0))[freedom > 2.0].sum())

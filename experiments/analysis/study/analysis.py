@@ -1,4 +1,4 @@
-"""The analysis of a study: descriptions, tests and models, or the reasons why they cannot be computed."""
+"""The analysis of a study: descriptive statistics, tests and models, or the reasons why they could not be computed."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -38,7 +38,7 @@ from experiments.errors import StatisticsError
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
 OUT_OF_MEMORY = "not enough memory; analyse fewer trials, or trials with fewer people, houses or conditions"
-STRICT = "nd_strict_2n"  # measure with a known denominator, which gives the number of deviations
+STRICT = "nd_strict_2n"  # measure with a known denominator, from which the number of deviations follows
 
 
 Test = FTest | WaldTest | Chi2Test
@@ -46,7 +46,7 @@ Test = FTest | WaldTest | Chi2Test
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """A test or model of a measure, or the reason for its absence. If `objects` is None, it covers all numbers."""
+    """A test or model of a measure, or the reason why it is missing. If `objects` is None, all trials are included."""
 
     measure: str
     kind: str
@@ -57,7 +57,7 @@ class AnalysisResult:
 
 @dataclass(frozen=True)
 class Description:
-    """Statistics of a measure in a cell. Interval (Student's, 95 %) and deviation are None for one person."""
+    """Descriptive statistics of a measure in a cell. `interval` and `deviation` are None for a single value."""
 
     measure: str
     assistance: str
@@ -71,7 +71,7 @@ class Description:
 
 @dataclass(frozen=True)
 class Analysis:
-    """Descriptions, tests and models of a study's people and measures."""
+    """The results of an analysis: descriptive statistics, tests and models."""
 
     table: StudyTable
     measures: Measures
@@ -110,7 +110,7 @@ def plain(value: Any) -> Any:
 
 
 def analyse(table: StudyTable, measures: Measures) -> Analysis:
-    """Compute all descriptions, tests and models that the data allow."""
+    """Compute all descriptive statistics, tests and models that the data allow."""
     results = test_results(table, measures)
     for name in table.columns:
         if name in measures.objective or name.startswith(LIKERT_PREFIX):
@@ -126,7 +126,7 @@ def analyse(table: StudyTable, measures: Measures) -> Analysis:
 
 
 def test_results(table: StudyTable, measures: Measures) -> list[AnalysisResult]:
-    """Compute all F tests, mixed models and ordinal models. Pass a result to `tests_of` for its tests."""
+    """Compute all F tests, mixed models and ordinal models of a study."""
     results = []
     for name in table.columns:
         answers = name.startswith(LIKERT_PREFIX)
@@ -143,7 +143,7 @@ def test_results(table: StudyTable, measures: Measures) -> list[AnalysisResult]:
 
 
 def tests_of(result: AnalysisResult) -> Iterator[tuple[str, Test]]:
-    """Yield the tests of a result with the names of their effects."""
+    """Yield each test of a result with the name of its effect."""
     if isinstance(result.value, FTest):
         yield EFFECTS[0], result.value
     elif isinstance(result.value, OrdinalModel):
@@ -175,7 +175,6 @@ def _sensitivity(result: AnalysisResult, measures: Measures) -> Iterator[Analysi
 
 
 def one_way_tests(table: StudyTable, name: str, objects: int) -> list[AnalysisResult]:
-    """Return F tests of a measure at a number of objects."""
     groups = table.groups(name, objects)
     members = [c for c, values in groups.items() for _ in values]
     pooled = np.concatenate([np.empty(0), *groups.values()]), np.array(members), np.zeros(len(members))
@@ -188,7 +187,6 @@ def one_way_tests(table: StudyTable, name: str, objects: int) -> list[AnalysisRe
 
 
 def two_way_tests(table: StudyTable, name: str) -> list[AnalysisResult]:
-    """Return F tests of a measure over all numbers of objects."""
     known = ~np.isnan(table.columns[name])
     factors = table.columns[name][known], table.assistance[known], table.objects[known]
     return [
@@ -200,7 +198,7 @@ def two_way_tests(table: StudyTable, name: str) -> list[AnalysisResult]:
 
 
 def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
-    """Return the known values of a column by cell."""
+    """Return the known values of a measure, grouped by cell."""
     return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
 
 
@@ -216,13 +214,13 @@ def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
 
 
 def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
-    """Return the random factors of a mixed model: house, and if repeated, person, trial number, house x condition."""
+    """Return the random factors of a mixed model: houses, and those of repeated trials if participants have several."""
     rows, houses = len(table.rows), len(set(table.houses.tolist()))
     found: dict[str, NDArray[Any]] = {}
     if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
         found["person"] = table.people
         trials = table.numbers("trial_number")
-        # Two levels are too few to estimate a variance.
+        # A factor with only two levels does not allow a variance to be estimated.
         if len(set(trials.tolist())) > 2 and not np.isnan(trials).any():
             found["trial_number"] = trials
     if houses >= MIN_LEVELS or not found:
@@ -250,7 +248,7 @@ def _acceptance(table: StudyTable) -> list[AnalysisResult]:
         here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
         visits = made[here]
         deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
-        # Without a column `visits`, dropped objects count as deviations.
+        # If the column `visits` is missing, dropped objects count as deviations.
         accepted = np.clip(visits - deviations, 0, visits)
         kind = f"acceptance, {condition}"
         results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))

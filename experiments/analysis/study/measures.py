@@ -1,4 +1,4 @@
-"""The measures of an analysis and their columns, read from experiments/trials/designs/metrics.toml or another file."""
+"""Measures of an analysis and their columns, read from experiments/trials/designs/metrics.toml or another file."""
 
 import difflib
 import re
@@ -18,23 +18,23 @@ from experiments.trials.trial_config import SETTINGS
 from mjsim.support.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
-MAX_COLUMNS_SHOWN = 20  # maximum number of columns named in a message
+MAX_COLUMNS_SHOWN = 20  # maximum number of columns listed in a message
 _OF_A_TRIAL = re.compile(
     r"(person|behaviour|max|mean|p99)_\w+|simulated(_s)?|fingerprint|participant|releases_settled|ejections|"
     "tunnellings|grips_lost"
 )
-LIKERT_PREFIX = "likert_"  # columns of answers
-ANSWERS = (1, 5)  # smallest and largest answer of Likert items
+LIKERT_PREFIX = "likert_"  # prefix of columns with survey answers
+ANSWERS = (1, 5)  # smallest and largest answer to a Likert item
 
 
 class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A measure of the paper, and the column that is analysed for it.
+    """A measure of the paper, and the column from which it is computed.
 
     Attributes:
-        why: Reason for choosing this column.
-        range: Valid values of its columns.
-        without: Column used instead if `column` has no values.
-        others: Columns with alternative readings of the measure, which are reported too.
+        why: Reason for the choice of this column.
+        range: Smallest and largest valid value.
+        without: Fallback column if `column` has no values.
+        others: Columns with alternative definitions of the measure, which are also reported.
     """
 
     label: str
@@ -54,26 +54,26 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Largest equivalent effects: difference of a pair in standard deviations within groups, partial eta squared."""
+    """Largest effects considered equivalent: a difference in pooled standard deviations, and partial eta squared."""
 
     pair: float
     eta_squared: float
 
 
 class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The measures of an analysis by short name, and labels of survey items by name (columns `likert_NAME`)."""
+    """Measures of an analysis by short name, and labels of survey items. Answers are in columns `likert_NAME`."""
 
     objective: dict[str, Measure] = msgspec.field(name="measures")
     likert: dict[str, str]
     equivalence: Equivalence
 
     def answers(self) -> dict[str, str]:
-        """Return the labels of answers by column."""
+        """Return the labels of survey items by column."""
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
 
 
 def read_measures(path: Path = FILE) -> Measures:
-    """Read a file of measures, by default that of the paper. Raises a `ConfigError` if the file is not valid."""
+    """Read a file of measures, by default the paper's. Raises `ConfigError` if the file is not valid."""
     try:
         return decoded_measures(read_bytes(path))
     except OSError as error:
@@ -83,7 +83,7 @@ def read_measures(path: Path = FILE) -> Measures:
 
 
 def decoded_measures(content: bytes) -> Measures:
-    """Decode the content of a file of measures. Raises errors of msgspec."""
+    """Decode the content of a file of measures. Raises msgspec's errors."""
     return msgspec.toml.decode(content, type=Measures)
 
 
@@ -92,7 +92,7 @@ def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
-    """Return a list with a note that names unrecognized columns, or an empty list."""
+    """Return a list with one note that names all unrecognized columns, or an empty list."""
     read = {c for m in measures.objective.values() for c in m.columns}
     recorded = (field.name for kind in (Metrics, Displays) for field in fields(kind))
     known = {*read, *SETTINGS, *CIRCUMSTANCES, *recorded}
@@ -105,12 +105,12 @@ def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:
-    """Return the column of a measure among those with values, or None."""
+    """Return the first column of a measure that has values, or None."""
     return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)
 
 
 def check_answer_columns(columns: Sequence[str], measures: Measures, path: Path) -> None:
-    """Raise a `RecordError` if a column of answers is not a survey item."""
+    """Raise a `RecordError` if a column of answers does not belong to a survey item."""
     known = measures.answers()
     for name in columns:
         if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
@@ -127,7 +127,7 @@ def check_ranges(
     measures: Measures,
     path: Path,
 ) -> None:
-    """Raise a `RecordError` if a column has a value outside the range of its measure."""
+    """Raise a `RecordError` if a value is outside the range of its measure."""
     for measure in measures.objective.values():
         low, high = measure.range
         for name in measure.columns:
@@ -141,7 +141,6 @@ def check_ranges(
 
 
 def check_answers(values: NDArray[np.float64], name: str, path: Path) -> None:
-    """Raise a `RecordError` if a column of answers has an invalid value."""
     given = values[~np.isnan(values)]
     bad = given[(given != np.round(given)) | (given < ANSWERS[0]) | (given > ANSWERS[1])]
     if len(bad):

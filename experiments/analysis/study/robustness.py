@@ -1,4 +1,4 @@
-"""Exclusions of a study, the effect of each rule on the results, and departures from the preregistration."""
+"""Exclusion rules of a study, their effects on the results, and departures from the preregistration."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -21,12 +21,12 @@ CHANGE_HEAD = (
     *("measure", "test", "effect", "objects", "F or χ²", "without", "p", "without"),
     *("partial η²", "without", "decision"),
 )
-Key = tuple[str, str, str, int | None]  # measure, test, effect, and number of objects or None for all
+Key = tuple[str, str, str, int | None]  # measure, test, effect, and number of objects, or None for all
 
 
 @dataclass(frozen=True)
 class Change:
-    """A test with all rules and without one of them. Either is None if it cannot be computed."""
+    """A test with and without an exclusion rule. Either is None if it cannot be computed."""
 
     measure: str
     test: str
@@ -39,12 +39,12 @@ class Change:
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """The effect of a rule.
+    """The effect of one exclusion rule on the results.
 
     Attributes:
-        alone: Number of people whom only this rule excludes.
-        changes: Change of every test without the rule. Empty if the rule alone excludes no one.
-        refused: Reason why there are no results without the rule, or None.
+        alone: Number of participants excluded by this rule but by no other.
+        changes: Every test with and without the rule, or empty if `alone` is 0.
+        refused: Reason why the results without the rule cannot be computed, or None.
     """
 
     rule: str
@@ -58,7 +58,7 @@ class LeaveOneOut:
 def leave_one_out(
     people: Sequence[Mapping[str, Any]], measures: Measures, path: Path, exclusions: Exclusions
 ) -> list[LeaveOneOut]:
-    """Compare the tests with and without each rule, and with and without the people excluded by id."""
+    """Compare the test results with and without each exclusion rule. Participants excluded by id count as one rule."""
     found = []
     whole = study_table(people, measures, path, exclusions)
     tests = _tests(whole, measures)
@@ -72,7 +72,7 @@ def leave_one_out(
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
-        except RecordError as error:  # the rule excludes a row with an invalid value
+        except RecordError as error:  # the rule excludes a row whose values are not valid
             refused = str(error)
         found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
     return found
@@ -104,7 +104,7 @@ def _change(key: Key, one: Test | None, other: Test | None) -> Change:
 
 @dataclass(frozen=True)
 class Selection:
-    """Exclusions of a study, and departures from its preregistration, which is named by its SHA-256."""
+    """Exclusions of a study, and its departures from the preregistration with this SHA-256."""
 
     rules: Sequence[LeaveOneOut]
     preregistration: str | None = None

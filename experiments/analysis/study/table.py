@@ -1,4 +1,4 @@
-"""The people of a study as plain columns, from the rows of trials.parquet or from visits."""
+"""Table of a study's participants, read from trials.parquet or from visits of `mjsim play`."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,17 +29,17 @@ from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
-ANALYSIS = "analysis"  # default folder
+ANALYSIS = "analysis"  # default output folder
 REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
-FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # files of an analysis
+FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # output files of an analysis
 REQUIRED = ("assistance", "objects", "user")
-CONDITIONS = ("none", "highlight", "optimal")  # conditions of the paper
-MAX_PEOPLE_SHOWN = 20  # maximum number of people named in a message
+CONDITIONS = ("none", "highlight", "optimal")  # conditions of the paper, in its order
+MAX_PEOPLE_SHOWN = 20  # maximum number of participants listed in a message
 
 
 @dataclass(frozen=True)
 class Gap:
-    """People left out of the tests of a measure because their value is `missing` or `infinite`."""
+    """Participants left out of a measure's tests because their values are missing or infinite."""
 
     measure: str
     value: str
@@ -48,16 +48,16 @@ class Gap:
 
 @dataclass(frozen=True)
 class StudyTable:
-    """People of a study, in the order of its table. Arrays have one entry per row, (n,).
+    """Participants of a study, in the order of its table. Every array has one entry per row, shape (n,).
 
     Attributes:
-        houses: Name of the disorganized house.
-        people: Identity of the person, the same for all trials of a person.
-        columns: Measures and answers by short name; NaN if unknown.
-        sources: Column of the file by short name.
+        houses: Name of the house in each trial.
+        people: Identity of the participant, which is the same in all their trials.
+        columns: Values of measures and answers by short name, with NaN for unknown values.
+        sources: Name of each column in the file, by short name.
         origin: `Simulated`, `Partly simulated` or `Recorded from people`.
         notes: Remarks about the table, one sentence each.
-        left_out: Excluded people of the file.
+        left_out: Participants excluded from the table.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -73,16 +73,14 @@ class StudyTable:
     gaps: tuple[Gap, ...]
 
     def conditions(self) -> list[str]:
-        """Return the assistance conditions, those of the paper first and in its order."""
         present = dict.fromkeys(self.assistance.tolist())
         return [c for c in CONDITIONS if c in present] + [c for c in present if c not in CONDITIONS]
 
     def levels(self) -> list[int]:
-        """Return the numbers of objects, ascending."""
         return sorted(set(self.objects.tolist()))
 
     def take(self, people: NDArray[np.int64]) -> "StudyTable":
-        """Return the rows with these indices (m,), which may repeat."""
+        """Return the rows with these indices, shape (m,). Indices may repeat."""
         return replace(
             self,
             rows=[self.rows[k] for k in people],
@@ -94,14 +92,14 @@ class StudyTable:
         )
 
     def groups(self, name: str, objects: int | None = None) -> dict[str, NDArray[np.float64]]:
-        """Return the known values of a column by condition, for one number of objects or all. Omit empty groups."""
+        """Return the known values of a measure by condition, for one number of objects or all, without empty groups."""
         values, known = self.columns[name], ~np.isnan(self.columns[name])
         here = known if objects is None else known & (self.objects == objects)
         found = {c: values[here & (self.assistance == c)] for c in self.conditions()}
         return {c: v for c, v in found.items() if len(v)}
 
     def visits(self) -> NDArray[np.int64]:
-        """Return the number of visits, (n,). Without a column `visits`, it is two per object if all were delivered."""
+        """Return the numbers of visits. Without a column `visits`, assume two per object if all were delivered."""
         found = []
         for row, usual in zip(self.rows, (2 * self.objects).tolist(), strict=True):
             made, finished = row.get("visits"), row.get("ended", ALL_DELIVERED) == ALL_DELIVERED
@@ -109,16 +107,16 @@ class StudyTable:
         return np.array(found)
 
     def numbers(self, name: str) -> NDArray[np.float64]:
-        """Return another numeric column, (n,), with NaN for unknown values."""
+        """Return any numeric column, with NaN for unknown values."""
         values = (row.get(name) for row in self.rows)
         return np.array([np.nan if value is None else value for value in values], float)
 
     def densities(self) -> NDArray[np.float64]:
-        """Return objects per square metre of the floor, (n,), with NaN for unknown areas."""
+        """Return the numbers of objects per square metre of floor, with NaN for unknown areas."""
         return np.asarray(self.objects / self.numbers("area_m2"))
 
     def absent(self) -> list[str]:
-        """Return a line that names excluded people, or an empty list."""
+        """Return a list with one line that names the excluded participants, or an empty list."""
         names = [person.person for person in self.left_out]
         more = f" and {len(names) - MAX_PEOPLE_SHOWN} more" if len(names) > MAX_PEOPLE_SHOWN else ""
         if not names:
@@ -126,23 +124,23 @@ class StudyTable:
         return [f"left out, as not everything was delivered: {', '.join(names[:MAX_PEOPLE_SHOWN])}{more}"]
 
     def sizes(self) -> dict[tuple[str, int], int]:
-        """Return the number of people by condition and number of objects, including empty cells."""
+        """Return the number of participants in each combination of condition and number of objects, even if it is 0."""
         count = Counter(zip(self.assistance.tolist(), self.objects.tolist(), strict=True))
         return {(c, n): count[(c, n)] for c in self.conditions() for n in self.levels()}
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the people who finished a study, a batch or `mjsim play`."""
+    """Read the participants who finished a study, a batch or visits of `mjsim play`."""
     return study_table(read_people(folder), measures, people_path(folder))
 
 
 def people_path(folder: Path) -> Path:
-    """Return the path of the table of a study or batch, or `folder` itself if it has visits of `mjsim play`."""
+    """Return the path of the table of a study or batch, or `folder` itself if it contains visits of `mjsim play`."""
     return folder if visit_folders(folder) else folder / f"{NAME}.parquet"
 
 
 def read_people(folder: Path) -> Sequence[Mapping[str, Any]]:
-    """Read the rows of a study, a batch or `mjsim play`. Raises a `RecordError` if a column is missing."""
+    """Read all rows of a study, a batch or visits of `mjsim play`. Raises `RecordError` if a column is missing."""
     if visits := visit_folders(folder):
         return [{"participant": str(visit.relative_to(folder)), **_visitor(visit)} for visit in visits]
     path = people_path(folder)
@@ -171,7 +169,7 @@ def study_table(
     path: Path,
     exclusions: Exclusions = Exclusions(),  # noqa: B008 - frozen
 ) -> StudyTable:
-    """Build the table of all people who are not excluded. `path` only appears in messages."""
+    """Build the table of all participants who are not excluded. `path` appears only in messages."""
     _check_design(people, path)
     check_answer_columns(present_columns(people), measures, path)
     absent = left_out(exclusions, people, path)
@@ -241,7 +239,6 @@ def _numbers(rows: Mapping[int, Mapping[str, Any]], column: str, path: Path) -> 
 def _gaps(
     rows: Mapping[int, Mapping[str, Any]], read: Mapping[str, NDArray[np.float64]], sources: Mapping[str, str]
 ) -> Iterator[Gap]:
-    """Yield the gaps of all analysed columns, and of other columns with infinite values."""
     names = {column: name for name, column in sources.items()}
     everyone = [person_name(row, k) for k, row in rows.items()]
     for column, values in read.items():
@@ -277,7 +274,7 @@ def _notes(rows: Sequence[Mapping[str, Any]], measures: Measures) -> list[str]:
 
 
 def _person(row: Mapping[str, Any], number: int) -> str:
-    """Return the identity of a row's person. A row without one counts as a separate person."""
+    """Return the identity of a row's participant. Rows without one count as separate participants."""
     names = row.get("participant"), row.get("person_seed")
     return f"{row['user']}/{next((name for name in names if name is not None), f'row {number}')}"
 
