@@ -1,1 +1,1 @@
-"""Houses as data and as compiled models: catalogue, scene, sampling, sight, validation."""
+"""Houses: catalogues, compiled models, episode scenes, visibility and validation."""

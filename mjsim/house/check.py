@@ -1,4 +1,4 @@
-"""The report of `mjsim check` about a house, a receptacle, an object or an episode."""
+"""Checks behind the command `mjsim check`, for a house, a receptacle, an object or an episode."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -25,13 +25,13 @@ from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, Sampling
 
 @dataclass(frozen=True, eq=False)
 class CheckReport:
-    """Result of a check."""
+    """Report on a checked house, receptacle, object or episode."""
 
     kind: str  # `house`, `receptacle`, `object` or `episode`
     path: str  # the checked name or path
-    findings: tuple[Finding, ...]  # errors first
-    facts: Mapping[str, str] = field(default_factory=dict)  # name -> text
-    views: tuple[Drawing, ...] = ()  # drawings for the report's picture, empty if nothing could be compiled
+    findings: tuple[Finding, ...]  # errors before warnings
+    facts: Mapping[str, str] = field(default_factory=dict)  # further information: name -> text
+    views: tuple[Drawing, ...] = ()  # drawings for the report's picture, or none if nothing compiled
 
     def __post_init__(self) -> None:
         ordered = sorted(self.findings, key=lambda f: f.severity != "error")
@@ -42,11 +42,11 @@ class CheckReport:
         return not errors(self.findings)
 
 
-Load = Callable[[str], Catalogue]  # loads a house by name
+Load = Callable[[str], Catalogue]
 
 
 def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
-    """Check a catalogue, its folder, a house by name, an MJCF file, or an episode.
+    """Check a house (by name, catalogue or folder), an MJCF file, or an episode.
 
     Args:
         name: Name or path to check.
@@ -64,7 +64,7 @@ def check_path(name: str, house: str | None = None, load: Load = Catalogue.load)
 
 
 def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
-    """Check a house, its receptacles and objects, and whether episodes can be sampled in it."""
+    """Check a house with its receptacles and objects, and try to sample episodes in it."""
     try:
         catalogue = load(name)
     except AssetError as error:
@@ -118,7 +118,7 @@ def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
 
 
 def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
-    """Check an episode against its own house, or another one."""
+    """Check an episode against its own house, or against the house `house`."""
     try:
         episode = Episode.load(path)
     except EpisodeError as error:

@@ -1,1 +1,1 @@
-"""Houses as files: names, catalogues and model files."""
+"""Catalogue files, house names and MJCF model files."""

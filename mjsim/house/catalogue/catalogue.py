@@ -1,4 +1,4 @@
-"""Catalogues of houses: rooms, categories, receptacles and object models, read from `catalogue.toml`."""
+"""Catalogues, which define the rooms, categories, receptacles and object models of a house."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,39 +19,39 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """A kind of object that can be misplaced."""
+    """An object model that episodes can misplace."""
 
-    key: str  # catalogue key (`mug`)
-    label: str  # name shown to the person (`Blue mug`)
-    category: str  # category key it belongs to
-    path: Path  # its MJCF file
+    key: str  # key in the catalogue, such as `mug`
+    label: str  # name shown to participants, such as `Blue mug`
+    category: str
+    path: Path
 
 
 @dataclass(frozen=True)
 class Receptacle:
-    """A container that takes the objects of one category."""
+    """A receptacle, such as a bin or shelf, for the objects of one category."""
 
-    key: str  # catalogue key (`dish_bin`); the house has a site `mount:<key>`
-    label: str  # name shown to the person (`Dish bin`)
-    place: str  # location within the room (`on the counter, beside the sink`)
-    room: str  # room key
-    category: str  # category key it takes
-    path: Path  # its MJCF file
+    key: str  # key in the catalogue, such as `dish_bin`; the house's MJCF file has a site `mount:<key>`
+    label: str  # name shown to participants, such as `Dish bin`
+    place: str  # location within the room, such as `on the counter, beside the sink`
+    room: str
+    category: str
+    path: Path
 
 
 @dataclass(frozen=True)
 class Category:
     """A category of objects that belong in the same receptacle (PAPER section 4)."""
 
-    key: str  # catalogue key (`dishes`)
-    label: str  # name shown to the person (`Dishes`)
-    receptacle: str  # receptacle key
-    objects: tuple[str, ...]  # object model keys, in the catalogue's order
+    key: str  # key in the catalogue, such as `dishes`
+    label: str  # name shown to participants, such as `Dishes`
+    receptacle: str
+    objects: tuple[str, ...]  # keys of object models, in the catalogue's order
 
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """The contents of a house's catalogue. Mappings keep the order of the file.
+    """The contents of a house's catalogue. Mappings preserve the order of the file.
 
     Two catalogues are equal if the contents of all their files are equal.
 
@@ -90,7 +90,7 @@ class Catalogue:
         return self.ref.name
 
     def in_language(self, language: str) -> "Catalogue":
-        """Translate labels and places. Those without a translation stay in English.
+        """Return a copy with translated labels and locations. Text without a translation stays in English.
 
         Raises:
             AssetError: A file of labels cannot be read.
@@ -132,7 +132,7 @@ class Catalogue:
 
     @classmethod
     def read(cls, house: HouseRef) -> "Catalogue":
-        """Read and check a catalogue, without generating a home.
+        """Read and check a catalogue. A home that has not been generated yet is not generated.
 
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or
@@ -142,7 +142,7 @@ class Catalogue:
         return _CatalogueReader(catalogue_file(house), tables).catalogue(house, text)
 
 
-_Text = Annotated[str, msgspec.Meta(pattern=r"\S")]  # not blank
+_Text = Annotated[str, msgspec.Meta(pattern=r"\S")]
 _Table = Annotated[dict[str, Any], msgspec.Meta(min_length=1)]
 
 
@@ -164,7 +164,7 @@ class _HouseEntry(_ModelEntry):
 
 
 class _ObjectEntry(_ModelEntry):
-    category: _Text | None = None  # given here, or by the object list of the category
+    category: _Text | None = None  # may be omitted if the category lists the object
 
 
 class _ReceptacleEntry(_ModelEntry):

@@ -1,4 +1,4 @@
-"""Finding and reading files of catalogues and of labels."""
+"""Readers of catalogue and label files."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -11,25 +11,24 @@ from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, pa
 from mjsim.support.files import is_file, read_text
 from mjsim.values.errors import AssetError, brief
 
-MAX_EXTENDS = 20  # longest chain of catalogues that extend each other
+MAX_EXTENDS = 20  # maximum length of a chain of catalogues in which each extends the next
 _SHOWN = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]*"
-# One line of text that is not blank
 Label = Annotated[str, msgspec.Meta(pattern=rf"^{_SHOWN}\S{_SHOWN}\Z", max_length=80)]
 
 
 def base_of(house: HouseRef) -> HouseRef | None:
-    """Return the house that a catalogue extends. None if it extends none, or if it cannot be read."""
+    """Return the house that a catalogue extends, or None if it extends none or cannot be read."""
     if house.file is None:
         return None
     try:
         name = tomllib.loads(read_text(house.file)).get("extends")
         return parse_house(name, house.file.parent) if isinstance(name, str) else None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
-        return None  # reading the catalogue later reports the error
+        return None  # the error is reported when the catalogue itself is read
 
 
 def catalogue_file(house: HouseRef) -> Path:
-    """Return the absolute path of a catalogue.
+    """Return the absolute path of a house's catalogue file.
 
     Raises:
         AssetError: There is no such catalogue, or the home has not been generated yet.
@@ -48,7 +47,7 @@ def catalogue_file(house: HouseRef) -> Path:
 
 
 def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
-    """Read a catalogue's tables and text, including those of the catalogues that it extends.
+    """Return a catalogue's tables and text, merged with those of the catalogues that it extends.
 
     An entry replaces the entry of the same key in an extended catalogue.
     """
@@ -85,7 +84,7 @@ def _name_models(tables: dict[str, Any], folder: Path) -> None:
 
 
 def read_labels(language: str, folders: Iterable[Path]) -> Mapping[str, str]:
-    """Read the files `labels.LANGUAGE.toml`, which map English labels to translations.
+    """Read translations of English labels from the files `labels.LANGUAGE.toml` in several folders.
 
     Later folders take precedence. A folder may have no such file.
 

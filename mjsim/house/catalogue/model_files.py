@@ -1,4 +1,4 @@
-"""Reading of MJCF files, and hashing of all files of a house."""
+"""MJCF file reader, and content hashes of houses."""
 
 import hashlib
 import shutil
@@ -16,14 +16,14 @@ from mjsim.values.errors import AssetError
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """An MJCF file that was read with all files that it includes or refers to."""
+    """The contents of an MJCF file and of all files that it includes or refers to."""
 
     path: Path
-    elements: tuple[ET.Element, ...]  # XML elements of this file and of all included XML files
+    elements: tuple[ET.Element, ...]  # XML elements of this file and of all included files
 
     @classmethod
     def read(cls, path: Path) -> "ModelFile":
-        """Read a file, and check that all files that it refers to can be read.
+        """Read an MJCF file, and check that every file that it refers to can be read.
 
         Raises:
             OSError: The file cannot be read.
@@ -38,14 +38,14 @@ class ModelFile:
         return cls(path, elements)
 
     def spec(self) -> mujoco.MjSpec:
-        """Return an editable model whose asset files have absolute paths, or raise MuJoCo's ValueError."""
+        """Return an editable model with absolute asset paths, or raise MuJoCo's ValueError for an invalid file."""
         spec = mujoco.MjSpec.from_file(str(self.path))
         _name_files(spec, self.path.parent)
         return spec
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
-    """Read an MJCF file as an editable model whose asset files have absolute paths, so that it can be attached.
+    """Read an MJCF file as an editable model that can be attached to another, with absolute paths of asset files.
 
     Raises:
         AssetError: The file is invalid, or has no top-level body of the name `body`.
@@ -70,7 +70,7 @@ def _name_files(spec: mujoco.MjSpec, folder: Path) -> None:
 
 
 def copy_house(path: Path, folder: Path) -> None:
-    """Copy the folder of a house, and the package's textures that it uses, so that stock MuJoCo can load it."""
+    """Copy a house's folder and the packaged textures that it uses, so that MuJoCo can load it without this package."""
     shutil.copytree(path.parent, folder, dirs_exist_ok=True)
     found = list(elements(path))
     directory = next((e.get("texturedir", "") for e in found if e.tag == "compiler"), "")
@@ -82,19 +82,19 @@ def copy_house(path: Path, folder: Path) -> None:
 
 
 def elements(path: Path) -> Iterator[ET.Element]:
-    """Yield all XML elements of an MJCF file and of files that it includes. Files that are not XML yield none."""
+    """Yield all XML elements of an MJCF file and of the files that it includes. Skip files that are not XML."""
     yield from _elements(str(path), str(path.parent), {})
 
 
 def content_hash(text: str, models: Iterable[Path]) -> str:
-    """Hash a text and MJCF files with all files that they include or refer to. Return 64 hex digits.
+    """Return a hash, 64 hex digits, of a text and of MJCF files with all files that they include or refer to.
 
     Files that are missing or cannot be parsed raise no error, because reading the model reports them.
     """
     files: dict[str, bytes] = {}
     for model in models:
         _read_assets(model.parent, list(_elements(str(model), str(model.parent), files)), files)
-    # In the order of references, so that swapping the contents of two files changes the hash.
+    # Hash the files in the order of references, so that swapping the contents of two files changes the hash.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 

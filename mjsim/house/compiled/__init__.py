@@ -1,1 +1,1 @@
-"""Compiled houses, without objects or a person: rooms, receptacles, floor and ray casts."""
+"""Compiled houses without objects or a person: rooms, receptacles, walkable floor and ray casts."""

@@ -1,4 +1,4 @@
-"""Tighter bounding volume hierarchies for houses, which halve the box tests of collision detection and ray casts.
+"""Tighter bounding volume hierarchies, which halve the box tests of collision detection and ray casts in houses.
 
 MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house this groups table legs with
 walls and floors, so boxes overlap. This module rebuilds the tree over the same leaves with the surface area heuristic
@@ -17,7 +17,7 @@ _MIN_LEAVES = 16
 
 
 def tighten(model: mujoco.MjModel) -> None:
-    """Rebuild the bounding volume hierarchies of static bodies, in place."""
+    """Rebuild the bounding volume hierarchies of a model's static bodies in place."""
     for body in np.flatnonzero(model.body_weldid == 0).tolist():
         first, count = int(model.body_bvhadr[body]), int(model.body_bvhnum[body])
         if count < 2 * _MIN_LEAVES:
@@ -42,7 +42,7 @@ def tighten(model: mujoco.MjModel) -> None:
 def surface_area_tree(
     low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Build a binary tree over boxes with corners (n, 3), split by the surface area heuristic.
+    """Build a binary tree over boxes with corners (n, 3), using the surface area heuristic.
 
     Returns arrays over the 2n - 1 nodes, of which node 0 is the root: the box as centre and half size, the two children
     or -1, the index of a leaf's box or -1, and the depth.

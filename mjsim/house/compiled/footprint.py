@@ -1,4 +1,4 @@
-"""Footprints of static geoms: floor plans, an obstacle grid for the person's trunk, and a distance field."""
+"""Outlines of static geoms seen from above, an obstacle grid for the person's trunk, and a distance field."""
 
 import math
 from dataclasses import dataclass
@@ -15,28 +15,30 @@ from mjsim.house.compiled.sites import RoomMap
 from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
-CIRCLE_SIDES = 32  # the circumscribed polygon is up to 0.5 % wider than the circle, never narrower
+CIRCLE_SIDES = 32  # The polygon is drawn around the circle: up to 0.5 % wider, never narrower.
 _GEOM = mujoco.mjtGeom
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
-# Polygon whose sides touch the unit circle at their middles, (k, 2)
+# Polygon around the unit circle, shape (CIRCLE_SIDES, 2).
 _CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-_TRUNK_BAND = (0.04, 1.72)  # lower and upper end of the trunk, m
-CELL = 0.25  # cell size of the grid of a `Floor`, m
-MARGIN = 0.12  # distance beyond the trunk up to which a cell lists obstacles, m
-BORDER = 0.4  # default width of the grid around the rooms, m
+_TRUNK_BAND = (0.04, 1.72)  # heights of the lower and upper end of the trunk, in metres
+CELL = 0.25  # cell size of a `Floor` grid, in metres
+MARGIN = 0.12  # A cell lists the obstacles that come this close to a trunk in it, in metres.
+BORDER = 0.4  # default width of the border around the rooms, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Obstacles of a floor, seen from above."""
+    """Obstacles and rooms of a floor, seen from above."""
 
-    obstacles: tuple[NDArray[np.float64], ...]  # convex polygons, counter-clockwise, m, each of shape (k, 2)
-    bounds: tuple[float, float, float, float]  # extent of the rooms: (xmin, ymin, xmax, ymax), m
+    obstacles: tuple[
+        NDArray[np.float64], ...
+    ]  # convex counter-clockwise polygons in metres, each of shape (k, 2)
+    bounds: tuple[float, float, float, float]  # extent of the rooms in metres: (xmin, ymin, xmax, ymax)
 
 
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
-    """Project the static colliding geoms that reach into the band of heights from `low` to `high`, m, onto the floor.
+    """Project onto the floor the static colliding geoms that overlap the heights from `low` to `high`, in metres.
 
     Floors and rugs end below the default band, while lintels, lamps and wall cupboards begin above it. A geom in the
     band counts with its whole outline. Objects and the person are left out because they move.
@@ -61,7 +63,7 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points (k, 3), m, around a geom. Their outline from above contains the geom's, and their z range is equal.
+    """Return points (k, 3), in metres, whose outline from above contains a geom and whose z range equals the geom's.
 
     Raises:
         AssetError: The geom is a plane or a height field.
@@ -91,7 +93,7 @@ def outline_points(
 
 
 def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    # A linear map to the plane turns a ball into an ellipse, whose axes are given by the SVD of the map.
+    # A linear map onto the plane turns a ball into an ellipse. The SVD of the map gives the axes of the ellipse.
     directions, lengths, _ = np.linalg.svd(axes[:2])
     outline = np.zeros((CIRCLE_SIDES, 3))
     outline[:, :2] = _CIRCLE @ (directions * lengths).T
@@ -114,29 +116,29 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Floor(NamedTuple):
-    """Outlines of obstacles to the person's trunk, in arrays for kernels, with a grid to look up the nearby ones."""
+    """Obstacles to the person's trunk, in arrays for kernels, with a grid to look up nearby obstacles."""
 
-    # edges of all convex polygons, counter-clockwise: start x, y, direction x, y, and length, m, (e, 5)
+    # Edges of all convex polygons, counter-clockwise. Each row is start x, start y, direction x, direction y, length.
     edges: NDArray[np.float64]
-    first: NDArray[np.int64]  # polygon p has the edges `first[p]` to `first[p + 1]`, (p + 1,)
-    boxes: NDArray[np.float64]  # smallest and largest x, smallest and largest y of each polygon, m, (p, 4)
+    first: NDArray[np.int64]  # start of each polygon in `edges`, shape (p + 1,)
+    boxes: NDArray[np.float64]  # bounding box of each polygon: xmin, xmax, ymin, ymax, shape (p, 4)
     near: NDArray[np.int64]  # polygons that the trunk may touch, cell by cell
-    # index into `near` of the first polygon of each cell, row by row, (cells + 1,)
+    # Start of each cell in `near`, row by row, shape (cells + 1,).
     near_first: NDArray[np.int64]
-    origin_x: float  # corner of cell (0, 0), m
+    origin_x: float  # position of the corner of cell (0, 0), in metres
     origin_y: float
     rows: int  # number of cells along x
     columns: int  # number of cells along y
 
     @classmethod
     def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
-        """Build the grid for the static geoms at trunk height and a trunk with the given radius, m."""
+        """Build the grid for a compiled house and a trunk with the given radius in metres."""
         low, high = _TRUNK_BAND
         return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
 
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
-        """Build the grid for convex counter-clockwise polygons (k, 2), m, and a trunk with the given radius, m."""
+        """Build the grid for convex counter-clockwise polygons (k, 2) and a trunk with the given radius, in metres."""
         reach = radius + MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
@@ -171,13 +173,15 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ClearanceField(NamedTuple):
-    """Grid of signed distances to the static geoms within a band of heights, in arrays for kernels."""
+    """Grid of signed distances to the static geoms within a range of heights, in arrays for kernels."""
 
-    distance: NDArray[np.float64]  # distance of each cell's centre, m, positive outside, (nx, ny)
-    gradient: NDArray[np.float64]  # unit vector along which the distance increases, (nx, ny, 2)
-    origin_x: float  # centre of cell (0, 0), m
+    distance: NDArray[
+        np.float64
+    ]  # distance from each cell's centre in metres, positive outside geoms, shape (nx, ny)
+    gradient: NDArray[np.float64]  # unit vector of steepest increase, shape (nx, ny, 2)
+    origin_x: float  # position of the centre of cell (0, 0), in metres
     origin_y: float
-    resolution: float  # cell size, m
+    resolution: float  # cell size in metres
 
     @classmethod
     def from_model(
@@ -189,7 +193,7 @@ class ClearanceField(NamedTuple):
         resolution: float = 0.04,
         border: float = BORDER,
     ) -> "ClearanceField":
-        """Rasterize the static colliding geoms between two heights, m, up to `border` m around the rooms."""
+        """Rasterize the static colliding geoms between two heights in metres, with a border around the rooms."""
         plan = footprint(model, low=low, high=high)
         xmin, ymin, xmax, ymax = plan.bounds
         origin = np.array([xmin - border, ymin - border])
@@ -207,7 +211,7 @@ class ClearanceField(NamedTuple):
 
 @kernel
 def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, float, float]:
-    """Interpolate the distance at a point, m, and return it with the direction (x, y) away from the nearest geom."""
+    """Return the interpolated distance at a point in metres, and the direction (x, y) away from the nearest geom."""
     distance, gradient = field.distance, field.gradient
     u = (x - field.origin_x) / field.resolution
     v = (y - field.origin_y) / field.resolution
@@ -232,7 +236,7 @@ def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
     for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = end - start
         length = float(np.hypot(*edge))
-        if length > 1e-9:  # counter-clockwise: the inside is to the left of every edge
+        if length > 1e-9:  # The polygon is counter-clockwise, so its inside is to the left of every edge.
             offset = cells - start
             left_by = (edge[0] * offset[..., 1] - edge[1] * offset[..., 0]) / length
             inside &= left_by >= -0.5

@@ -1,7 +1,7 @@
-"""Compiled houses, cached per process and content, and object models prepared for scenes.
+"""Compiled houses, cached by content, and object models prepared for scenes.
 
-The navigable floor comes from an installed package, because navmeshes belong to the planner, which `mjsim` must not
-import. This module defines the protocol and loads the entry point `mjsim.navigable`.
+The walkable floor is computed by an installed package, because navigation meshes belong to the planner, which `mjsim`
+must not import. This module defines the protocol and loads the entry point `mjsim.navigable`.
 """
 
 import functools
@@ -22,25 +22,25 @@ from mjsim.house.compiled.footprint import Footprint, footprint
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap, receptacle_geometries
 from mjsim.values.errors import AssetError, SamplingError
 
-VISUAL_BODY = "looks"  # name of the body with an object's visual geoms
+VISUAL_BODY = "looks"  # name of the body that carries an object's visual geoms
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
-MAX_HOUSES = 4  # size of the cache, in houses of about 30 MB each
+MAX_HOUSES = 4  # number of cached houses, of about 30 MB each
 T = TypeVar("T")
-GROUP = "mjsim.navigable"  # entry points of navmesh builders
+GROUP = "mjsim.navigable"  # entry point group of walkable-floor builders
 
 
 class NavigablePoints(Protocol):
-    """The part of the walkable-floor interface that sampling needs. Points are (x, y) in m."""
+    """The part of a walkable floor that sampling needs. Points are (x, y) in metres."""
 
     def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Draw a point (2,) uniformly from the part of the floor that a person can reach."""
+        """Draw a point (2,) uniformly from the reachable part of the floor."""
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Return True if a person can stand at a point (2,)."""
+        """Return True if a person can stand at the given point (2,)."""
 
     def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
-        """Return the point (2,) nearest to `point` that `sample` could draw, or `point` itself if it is one."""
+        """Return the point (2,) nearest to `point` that `sample` could draw."""
 
 
 class NavigableFloor(NavigablePoints, Protocol):
@@ -48,19 +48,19 @@ class NavigableFloor(NavigablePoints, Protocol):
 
     @property
     def topdown_map(self) -> NDArray[np.int32]:
-        """Islands of the floor, shape (rows, columns): 0 for the largest, 1, 2, ... for others, -1 for obstacles."""
+        """Connected region of each cell, shape (rows, columns): 0 for the largest region, -1 for obstacles."""
 
 
 class NavigableBuilder(Protocol):
     """A function that computes the walkable floor of a house."""
 
     def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigableFloor:
-        """Compute the floor among convex polygons (vertices, 2), m, within (x_min, y_min, x_max, y_max), m."""
+        """Compute the floor among convex polygons (k, 2) within (x_min, y_min, x_max, y_max), all in metres."""
         ...
 
 
 def installed_builder() -> NavigableBuilder:
-    """Load the builder of an installed package, the first by name. Raise a SamplingError if there is none."""
+    """Load the floor builder of the first installed package that has one. Raise a SamplingError if there is none."""
     offers = sorted(entry_points(group=GROUP), key=lambda e: e.name)
     if not offers:
         raise SamplingError(
@@ -75,7 +75,7 @@ def installed_builder() -> NavigableBuilder:
 
 
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Remove everything without effect on motion, in place: visual geoms, materials, textures, unused meshes.
+    """Remove visual geoms, materials, textures and unused meshes from a model in place.
 
     Bodies stay, so that a state fits the models with and without visuals.
     """
@@ -85,10 +85,10 @@ def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
-    """Move the visual geoms of an object to a body of their own, fixed to the object's, in place.
+    """Move an object's visual geoms to a separate body that is fixed to the object, in place.
 
-    This saves time because the broad phase visits, in each step, all geoms of every body that can collide, even while
-    the body sleeps. Geoms in nested frames are not moved.
+    This makes steps faster: the broad phase visits every geom of a body that can collide, even while the body sleeps.
+    Geoms in nested frames are not moved.
     """
     body = spec.body("object")
     groups: list[tuple[Any, list[Any]]] = []
@@ -122,7 +122,7 @@ def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
     names = [geom.name for geom in geoms]
     before = len(body.geoms)
     for geom in geoms:
-        geom.name = ""  # names must be unique, and attaching a frame first copies its geoms
+        geom.name = ""  # names must be unique, and attaching a frame copies its geoms first
         geom.set_frame(frame)
     body.attach_frame(frame, "", "")
     spec.delete(frame)
@@ -135,9 +135,9 @@ def _is_visual(geom: Any) -> bool:
 
 
 class CompiledHouse:
-    """A compiled house with its receptacles, without misplaced objects and without a person.
+    """A compiled house with its receptacles, without objects and without a person.
 
-    Obtain it from `compiled_house`. Its contents are shared and must not be changed.
+    Instances from `compiled_house` are shared and must not be changed.
     """
 
     def __init__(self, catalogue: Catalogue) -> None:
@@ -146,7 +146,7 @@ class CompiledHouse:
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """The compiled model. Raises an AssetError if a model is malformed or a mount is missing."""
+        """The compiled model. Raises an AssetError if a model is malformed or a receptacle's mount is missing."""
         with compile_errors(f"house {self.catalogue.house_path}"):
             return self._spec.copy().compile()
 
@@ -170,11 +170,11 @@ class CompiledHouse:
 
     @cached_property
     def navigable(self) -> NavigableFloor:
-        """The walkable floor. Raises a SamplingError if no builder is installed."""
+        """The walkable floor. Raises a SamplingError if no floor builder is installed."""
         return installed_builder()(self.floor.obstacles, self.floor.bounds)
 
     def spec(self, *, visuals: bool = True) -> mujoco.MjSpec:
-        """Return an editable copy whose static bodies are fused into one, with or without visual geoms."""
+        """Return an editable copy in which all static bodies are fused into one. `visuals` includes visual geoms."""
         return (self._fused if visuals else self._collision).copy()
 
     def object_spec(self, path: Path, *, visuals: bool = True) -> mujoco.MjSpec:
@@ -184,7 +184,7 @@ class CompiledHouse:
         return self.cached((path, False), lambda: remove_visuals(whole.copy()))
 
     def cached(self, key: Any, compute: Callable[[], T]) -> T:
-        """Return the value cached under `key`. The first call computes it with `compute`."""
+        """Return the value cached under `key`. The first call computes it."""
         if key not in self._derived:
             self._derived[key] = compute()
         return cast(T, self._derived[key])
@@ -208,8 +208,9 @@ class CompiledHouse:
     @cached_property
     def _fused(self) -> mujoco.MjSpec:
         spec = self._spec.copy()
-        # The broad phase visits every body of the house in every step. With one body, steps take a quarter of the time.
-        # Compiling fuses the bodies of the spec itself, so scenes made from it need not do it again.
+        # The broad phase visits every body of the house in every step. With a single body, a step takes a quarter of
+        # the time. Compiling also fuses the bodies of the spec itself, so scenes made from this spec start with a
+        # single body.
         spec.compiler.fusestatic = True
         with compile_errors(f"house {self.catalogue.house_path}"):
             spec.compile()
@@ -222,16 +223,15 @@ class CompiledHouse:
 
 @functools.lru_cache(maxsize=MAX_HOUSES)
 def compiled_house(catalogue: Catalogue) -> CompiledHouse:
-    """Return the compiled house of a catalogue. Catalogues of the same content share it.
+    """Return the compiled house of a catalogue. Catalogues with the same content share one instance.
 
-    A changed file changes the content of catalogues loaded afterwards, so they get a new house. Nothing is read or
-    compiled before it is used.
+    Models are read and compiled on first use.
     """
     return CompiledHouse(catalogue)
 
 
 def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
-    """Return the walkable floor of a house, which the installed builder computes once per process.
+    """Return the walkable floor of a house. It is computed once per process.
 
     Raises:
         SamplingError: No builder is installed, or it cannot be loaded.
@@ -242,7 +242,7 @@ def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
 
 @contextmanager
 def compile_errors(what: str) -> Iterator[None]:
-    """Turn MuJoCo's compile errors into an AssetError that names `what` and a remedy."""
+    """Turn MuJoCo's compile errors into an AssetError that names `what` and suggests a remedy."""
     try:
         yield
     except (ValueError, mujoco.FatalError) as error:
@@ -262,5 +262,5 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     option.impratio = 10.0
     option.sleep_tolerance = SLEEP_TOLERANCE
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    # A silent reset would hide that the simulation diverged. `World` raises an error for the warning instead.
+    # Disable the automatic reset, which would hide that the simulation diverged. `World` raises an error instead.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

@@ -11,12 +11,12 @@ from mjsim.house.compiled.sites import ReceptacleGeometry
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Groups of colliding geoms: structure and furniture (0), collision guards (3). Not ceilings (1), decoration (2) or the
-# person (4).
+# Groups of colliding geoms: structure and furniture (0) and collision guards (3), without ceilings (1), decoration (2)
+# and the person (4).
 SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
-DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # groups that the first-person view shows
-RIM = 0.06  # horizontal margin around a receptacle's volume that counts as its own walls, m
-_SKIP = 1e-6  # distance skipped to pass through a surface, in units of the ray's length
+DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # geom groups that the first-person view shows
+RIM = 0.06  # Geoms up to this far outside a receptacle's volume count as its own walls, in metres.
+_SKIP = 1e-6  # step past a surface that the ray passes through, as a fraction of the ray's length
 _MAX_SKIPS = 32
 
 
@@ -31,7 +31,7 @@ def first_hit(
     without: int = -1,
     reach: float = math.inf,
 ) -> tuple[float, int]:
-    """Return the distance and id of the nearest geom along a ray, or infinity and -1 if it hits none.
+    """Return the distance to the nearest geom along a ray and the geom's id, or infinity and -1 if the ray hits none.
 
     Args:
         start, ray: Start, m, and direction, (3,). Distances are in units of the direction's length.
@@ -58,16 +58,16 @@ def moving_geoms(model: mujoco.MjModel) -> Mask:
 
 
 def sees(model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, point: Floats) -> bool:
-    """Return True if no static solid geom is between two points (3,), m."""
+    """Return True if no static solid geom is between two points (3,), in metres."""
     return first_hit(model, data, eye, point - eye, through=moving_geoms(model), reach=1.0)[0] >= 1.0
 
 
 def receptacle_in_sight(
     model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, receptacle: ReceptacleGeometry
 ) -> bool:
-    """Return True if the top of a receptacle's volume, at its middle or nearest point, is visible from an eye (3,), m.
+    """Return True if an eye (3,) sees the centre or the nearest point of the top of a receptacle's volume.
 
-    Geoms within its outline are taken for its own rim, which does not hide it.
+    Geoms within the receptacle's outline count as its own rim, which does not hide it.
     """
     half, through = receptacle.half_size, moving_geoms(model)
     nearest = np.clip(

@@ -16,17 +16,19 @@ PREFIX = "room:"
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
-    """Rooms as rectangles on the floor, one or more per room (PAPER section 5)."""
+    """Rooms as rectangles on the floor. A room has one or more rectangles (PAPER section 5)."""
 
-    labels: Mapping[str, str]  # room key -> label shown to people ("Kitchen"), in the catalogue's order
-    keys: tuple[str, ...]  # room key of each rectangle, length k
-    centers: NDArray[np.float64]  # centres, m, (k, 2)
-    half_sizes: NDArray[np.float64]  # half extents along the rectangle's own axes, m, (k, 2)
-    axes: NDArray[np.float64]  # rectangle axes as columns, (k, 2, 2)
+    labels: Mapping[
+        str, str
+    ]  # labels shown to participants ("Kitchen") by room key, in the catalogue's order
+    keys: tuple[str, ...]  # room key of each of the k rectangles
+    centers: NDArray[np.float64]  # centres in metres, shape (k, 2)
+    half_sizes: NDArray[np.float64]  # half extents along the rectangle's own axes in metres, shape (k, 2)
+    axes: NDArray[np.float64]  # rectangle axes as columns, shape (k, 2, 2)
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str] | None = None) -> "RoomMap":
-        """Read the box sites `room:<key>` and `room:<key>:<n>` of a compiled house. By default, labels are the keys.
+        """Read the rooms from the box sites `room:<key>` and `room:<key>:<n>`. Labels default to the keys.
 
         Raises:
             AssetError: A room has no site, a site has no room, or a site is not an upright box.
@@ -57,40 +59,40 @@ class RoomMap:
         )
 
     def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Return the distances, m, (..., k), from points (..., 2), m, to each rectangle. They are 0 inside."""
+        """Return the distances in metres from points (..., 2) to each rectangle, shape (..., k). Inside they are 0."""
         offsets = np.asarray(xy, dtype=np.float64)[..., None, :2] - self.centers
         local = np.einsum("kji,...kj->...ki", self.axes, offsets)
         outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
         return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
 
     def room_at(self, xy: ArrayLike) -> str:
-        """Return the key of the room that contains a point (2,), m, or else of the nearest room."""
+        """Return the key of the room that contains a point (2,), or of the nearest room."""
         return self.keys[int(np.argmin(self.distances(xy)))]
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
-        """Return True if a point (2,), m, is in a room, or within `margin` metres of one."""
+        """Return True if a point (2,) is in a room or at most `margin` metres outside one."""
         x, y = np.asarray(xy, dtype=np.float64)[:2].tolist()
         return bool(nearest_rectangle(x, y, *self.rectangles) <= margin)
 
     @property
     def rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Arrays for kernels: centres and half sizes, m, each (k, 2), and axes, (k, 2, 2)."""
+        """Centres and half sizes (k, 2) in metres and axes (k, 2, 2), for kernels."""
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
-        """Return the label of a room. Raise an AssetError if there is no such room."""
+        """Return the label of a room. Raise an AssetError if the room does not exist."""
         if key not in self.labels:
             raise AssetError(f"no room {key!r}; the house has {sorted(self.labels)}")
         return self.labels[key]
 
     @property
     def area(self) -> float:
-        """Sum of the areas of all rectangles, m2. Overlaps count twice."""
+        """Sum of the areas of all rectangles in square metres. Overlaps count twice."""
         return float(4 * self.half_sizes.prod(axis=1).sum())
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Axis-aligned extent of all rooms: (xmin, ymin, xmax, ymax), m."""
+        """Axis-aligned extent of all rooms in metres: (xmin, ymin, xmax, ymax)."""
         reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)
         low, high = (self.centers - reach).min(axis=0), (self.centers + reach).max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
@@ -104,7 +106,7 @@ def nearest_rectangle(
     half_sizes: NDArray[np.float64],
     axes: NDArray[np.float64],
 ) -> float:
-    """Return the distance, m, from a point to the nearest of k rectangles, or 0 inside. Arrays are as in `RoomMap`."""
+    """Return the distance in metres from a point to the nearest rectangle of a `RoomMap`, or 0 inside one."""
     nearest = math.inf
     for k in range(len(centers)):
         dx, dy = x - centers[k, 0], y - centers[k, 1]
@@ -124,26 +126,28 @@ def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str)
 class ReceptacleGeometry:
     """Geometry of a receptacle in the house frame."""
 
-    key: str  # receptacle key
-    center: NDArray[np.float64]  # centre of the volume in which objects count as delivered, m, (3,)
-    half_size: NDArray[np.float64]  # half extents of the volume along its own axes, m, (3,)
-    rotation: NDArray[np.float64]  # the volume's axes as columns, (3, 3)
-    approach: NDArray[np.float64]  # floor point (x, y) at which a person stands to use it, m, (2,)
+    key: str
+    center: NDArray[
+        np.float64
+    ]  # centre of the volume in which objects count as delivered, in metres, shape (3,)
+    half_size: NDArray[np.float64]  # half extents along the volume's own axes in metres, shape (3,)
+    rotation: NDArray[np.float64]  # axes of the volume as columns, shape (3, 3)
+    approach: NDArray[np.float64]  # floor point at which a person stands to use it, in metres, shape (2,)
 
     def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
-        """Return True if a point (3,), m, is in the volume, enlarged by `margin` m on each side."""
+        """Return True if a point (3,) is inside the volume, enlarged by `margin` metres on each side."""
         local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
     def distance(self, xy: NDArray[np.float64]) -> float:
-        """Return the horizontal distance from a floor point (2,) to the nearest point of the volume, m."""
+        """Return the horizontal distance in metres from a floor point (2,) to the nearest point of the volume."""
         local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
         outside = np.maximum(np.abs(local) - self.half_size, 0.0)
         return float(np.hypot(outside[0], outside[1]))
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
-    """Read the box sites `<key>/volume` and the sites `<key>/approach` of a compiled model."""
+    """Read the geometry of receptacles from the sites `<key>/volume` and `<key>/approach` of a compiled model."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     found = {}

@@ -1,1 +1,1 @@
-"""Composed houses: sampled episodes, settled objects, the person's body, and compiled scenes."""
+"""Episode scenes: sampling, settling of dropped objects, the person's body, and compilation."""

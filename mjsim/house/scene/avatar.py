@@ -1,4 +1,4 @@
-"""The person's body: two slide joints and a yaw joint, a head that pitches, and two hands that hold objects by welds.
+"""The person's body in MuJoCo: joints for walking, turning and looking, and two hands that hold objects by welds.
 
 All contact bits are set here. Two geoms collide if contype of one shares a bit with conaffinity of the other:
 
@@ -27,50 +27,50 @@ from mjsim.values.person_parameters import PersonParameters
 STATIC_BIT = 1
 OBJECT_BIT = 4
 PREFIX = "avatar/"
-BASE = "avatar/base"  # slides along x and y
-SOLE = "avatar/sole"  # fixed to the base; collides with objects
-BODY = "avatar/body"  # yaws on the base; parent of head and hands
+BASE = "avatar/base"  # body that slides along x and y
+SOLE = "avatar/sole"  # body of the foot, fixed to the base; collides with objects
+BODY = "avatar/body"  # body that turns on the base; parent of the head and the hands
 HEAD = "avatar/head"
 EYE = "avatar/eye"
 TRUNK = "avatar/trunk"
 FOOT = "avatar/foot"
 HANDS = ("left", "right")
 GRIPS = (0, 1)
-GENTLE, FIRM = "gentle", "firm"  # kinds of welds between hand and object
-SIDES = 64  # number of sides of the prisms of trunk and foot
-# Contact of the foot: time constant, s, damping ratio and impedance. The low impedance limits the force to a multiple
-# of the object's weight, so that a person steps over an object that is stuck at a wall. The high damping ties the
-# force to speed, so that such an object neither pushes the person away nor flies off.
+GENTLE, FIRM = "gentle", "firm"  # types of welds between a hand and an object
+SIDES = 64  # number of sides of the prisms for trunk and foot
+# Contact of the foot: time constant in seconds, damping ratio and impedance. The low impedance limits the force to a
+# multiple of the object's weight, so that a person steps over an object that is stuck at a wall. The high damping makes
+# the force depend on speed, so that such an object neither pushes the person away nor flies off.
 _FOOT_CONTACT = (0.1, 3.0, 0.2)
 EYE_FORWARD = 0.06
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
-# Postures of a hand in the body frame of a person of default eye height: forward, to its own side, up; m.
+# Hand postures relative to the body, for a person of default eye height: forward, outward and up, in metres.
 REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
 HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
-# Kind of weld -> time constant, s, torque scale, minimum and maximum impedance. A gentle weld turns a fallen object
-# upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by less
-# than 2 degrees even if the object brushes a door frame at walking speed.
+# Welds by type: time constant in seconds, torque scale, minimum and maximum impedance. A gentle weld turns a fallen
+# object upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by
+# less than 2 degrees even if the object brushes a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
-_TORQUESCALE = 10  # index in the data of a weld
+_TORQUESCALE = 10  # index of the torque scale in a weld's data
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
 _GLOVE = (0.93, 0.74, 0.22, 1.0)
 _SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
-    """Return the name of the `GENTLE` or `FIRM` weld that holds an object in a hand at its grip site 0 or 1."""
+    """Return the name of the weld between a hand and grip site 0 or 1 of an object. `kind` is `GENTLE` or `FIRM`."""
     return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
 
 
 def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> tuple[float, float, float]:
-    """Return a posture such as `CARRY` for hand 0 (left) or 1 (right): x, y, z in the body frame, m.
+    """Return the position (x, y, z) of hand 0 (left) or 1 (right) in a posture such as `CARRY`, in the body frame.
 
-    Its height is proportional to the person's eye height, m.
+    Heights scale with the person's eye height. Lengths are in metres.
     """
     forward, side, up = place
     return forward, side if hand == 0 else -side, up * (eye_height / PersonParameters.eye_height)
@@ -79,7 +79,7 @@ def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> 
 def eye_position(
     x: float, y: float, heading: float, pitch: float, eye_height: float
 ) -> tuple[float, float, float]:
-    """Return the eye position, m, of a person at (x, y) m with a heading, head pitch and eye height, rad and m."""
+    """Return the eye position of a person at (x, y), in metres. Heading and pitch are in radians."""
     out = EYE_FORWARD * math.cos(pitch)
     height = eye_height + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
@@ -92,7 +92,7 @@ def attach_avatar(
     start: tuple[float, float, float],
     person: PersonParameters,
 ) -> None:
-    """Add the person at `start` (m, m, rad) and inactive welds between each hand and each object, in place.
+    """Add the person at `start` (x, y, heading), and an inactive weld between each hand and each grip, in place.
 
     Raises:
         AssetError: The scene has no body `<instance>/object`, or an object lacks a grip site.
@@ -137,7 +137,7 @@ def _set_inertia(
 
 def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: float) -> Any:
     x, y, heading = start
-    # The base does not turn, because contacts off its axis would spin it.
+    # The base does not turn: contacts off its axis would spin it.
     base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
     _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -152,15 +152,15 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
         name=TRUNK,
         pos=[0, 0, 0.88],
         conaffinity=STATIC_BIT,
-        condim=1,  # without friction, the person slides along walls
+        condim=1,  # without friction, so that the person slides along walls
         priority=2,
         solref=[0.008, 1],
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
         **_prism(spec, TRUNK, radius, 0.84),
     )
-    # The foot is soft, and lower than any carried object. It pushes light objects along the floor without launching
-    # them. It extends below the floor, so that it touches flat objects with its side and never stands on them. It has
-    # a body of its own because the broad phase filters by body, and the foot never collides with the house.
+    # The foot is soft, and lower than any carried object, so that it pushes light objects along the floor without
+    # launching them. It extends below the floor, so that it touches flat objects with its side and never stands on
+    # them. It has its own body because the broad phase filters by body, and the foot never collides with the house.
     sole = base.add_body(name=SOLE)
     sole.fuse = 0
     _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
@@ -179,10 +179,10 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
 
 
 def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) -> dict[str, Any]:
-    """Return arguments of a geom that is an upright prism of `SIDES` sides, nearly a cylinder.
+    """Return the geom arguments for an upright prism of `SIDES` sides, nearly a cylinder.
 
-    Cylinders of MuJoCo 3.17 (`multiccd`) have wrong contact normals where the round side touches the edge of a box.
-    Meshes do not.
+    MuJoCo 3.17 (`multiccd`) computes wrong contact normals where the round side of a cylinder touches the edge of a
+    box, but not for meshes.
     """
     angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
     ring = radius * np.column_stack((np.cos(angles), np.sin(angles)))
@@ -194,15 +194,15 @@ def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) ->
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
     """Add a velocity servo if kp is 0, otherwise a position servo with damping.
 
-    The activation is the target and the control its rate of change, so the target follows a ramp over the physics
-    steps of a control step.
+    The activation is the target and the control is its rate of change, so the target ramps over the physics steps of a
+    control step.
     """
     spec.add_actuator(
         name=PREFIX + joint,
         target=PREFIX + joint,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
-        actearly=True,  # the ramp starts with the first physics step
+        actearly=True,  # start the ramp with the first physics step
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[kp or kv] + [0.0] * 9,
@@ -213,7 +213,7 @@ def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, forc
 
 
 def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
-    # The axis of the hinge is -y, so that a positive pitch looks up.
+    # The hinge axis is -y, so that a positive pitch looks up.
     half = -START_PITCH / 2
     head = body.add_body(
         name=HEAD, pos=[0, 0, person.eye_height], quat=[math.cos(half), 0, math.sin(half), 0]
@@ -227,7 +227,7 @@ def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
         ref=_angle(spec, START_PITCH),
     )
     _add_actuator(spec, "pitch", kp=60.0, kv=3.0, force=30.0)
-    # Camera axes: x to the person's right, y up, looking along -z.
+    # Camera axes: x to the right, y up. The camera looks along -z.
     fovy = round(math.degrees(person.vertical_field), 9)
     head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=fovy)
 
@@ -269,7 +269,7 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
 
 
 def draw_hand(node: Any, name: str, side: float) -> None:
-    """Draw a cleaning glove and a sleeve. `side` is 1 for the left and -1 for the right hand."""
+    """Add a cleaning glove and a sleeve to a hand. `side` is 1 for the left and -1 for the right hand."""
 
     def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
         node.add_geom(

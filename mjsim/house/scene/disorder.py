@@ -1,4 +1,4 @@
-"""Observed disorder: the numbers of misplaced objects, and their distances from their places, to draw episodes from."""
+"""Observed disorder, from which episodes are drawn: how many objects are misplaced, and how far from home they are."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from mjsim.support.files import read_text
 from mjsim.values.errors import EpisodeError, brief
 
-_COUNTS, _DISTANCES = 0, 1  # keys of the random generators
+_COUNTS, _DISTANCES = 0, 1
 
 
 class _Count(msgspec.Struct):
@@ -40,7 +40,7 @@ class Disorder:
 
     @classmethod
     def load(cls, path: Path) -> "Disorder":
-        """Read the `disorder.json` of `mjsim import episodes`. Raise an EpisodeError if it cannot be read."""
+        """Read a `disorder.json` written by `mjsim import episodes`. Raise an EpisodeError if it cannot be read."""
         try:
             found = msgspec.json.decode(read_text(path), type=_DisorderFile)
         except (OSError, UnicodeDecodeError, msgspec.MsgspecError) as error:
@@ -58,7 +58,7 @@ class Disorder:
         }
 
     def count(self, seed: int, most: int) -> int:
-        """Draw a number of objects, 1 to `most`, from the observed numbers."""
+        """Draw a number of objects, at most `most`, from the observed numbers."""
         fitting = [n for n in self.misplaced if 1 <= n <= most]
         if not fitting:
             raise EpisodeError(f"no episode has 1 to {most} misplaced objects; allow more")

@@ -1,7 +1,7 @@
-"""Sampling of disorganized houses (PAPER section 4).
+"""Sampling of episodes in disorganized houses (PAPER section 4).
 
-Each random choice has a generator of its own, made from the seed and the choice's purpose. So a seed has the same
-points at every level, and a change in one choice does not affect the others.
+Each random choice has its own generator, made from the seed and the purpose of the choice. Thus a seed has the same
+points at every level, and changing one choice does not affect the others.
 """
 
 import enum
@@ -20,17 +20,17 @@ from mjsim.house.validation.validate import require_usable
 from mjsim.values.episode import POINTS, Episode, PlacedObject, StartPose
 from mjsim.values.errors import SamplingError, brief
 
-MIN_DISTANCE = 1.0  # smallest distance between points, and from points to receptacles, m
-START_CLEARANCE = 0.5  # smallest distance from the start to every object, m
-DROP = (0.01, 0.02)  # range of heights above the floor from which objects are dropped, m
-PACKINGS, DRAWS = 20, 4000  # an incomplete packing is discarded as a whole to keep points uniform
+MIN_DISTANCE = 1.0  # minimum distance between points, and from points to receptacles, in metres
+START_CLEARANCE = 0.5  # minimum distance from the start to every object, in metres
+DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
+PACKINGS, DRAWS = 20, 4000  # An incomplete packing is discarded as a whole, so that points stay uniform.
 DROPS = 8
 MAX_POINTS = 1000
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
 class _Purpose(enum.IntEnum):
-    """Keys of the random generators. Changing a number changes the episodes of all seeds."""
+    """Keys of random generators. Changing a number changes the episodes of all seeds."""
 
     POINTS = 0
     CATEGORIES = 1
@@ -108,7 +108,7 @@ def sample_episode(
 def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
-    """Return the points that all levels of a seed share, m, (points, 2). Raise a SamplingError if they do not fit."""
+    """Return the points that all levels of a seed share, in metres, shape (points, 2). May raise a SamplingError."""
     points = min(points, catalogue.points or points)
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
@@ -121,7 +121,7 @@ def sample_points(
     count: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Draw navigable points (count, 2), m, that are apart from each other and from `keep_away` (k, 2), by rejection."""
+    """Draw walkable points (count, 2) that are far enough from each other and from `keep_away` (k, 2), in metres."""
     best = 0
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng)
@@ -136,7 +136,7 @@ def sample_points(
 
 
 def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
-    """Return how many points, at most `count`, a single attempt at packing fits into the house."""
+    """Return how many points one packing attempt fits into the house, at most `count`."""
     return len(_pack(navigable, keep_away, count, np.random.default_rng(0)))
 
 
@@ -146,7 +146,6 @@ def _pack(
     count: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Collect at most `count` points in `DRAWS` draws, m, shape (k, 2)."""
     taken = np.empty((len(keep_away) + count, 2))
     taken[: len(keep_away)] = keep_away
     filled = len(keep_away)
@@ -176,7 +175,6 @@ def _rng(seed: int, purpose: _Purpose, *level: int) -> np.random.Generator:
 
 
 def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator) -> list[str]:
-    """Draw the category of each point, in shuffled rounds that contain every category once."""
     keys = list(catalogue.categories)
     blocks = -(-count // len(keys))
     order = np.concatenate([rng.permutation(len(keys)) for _ in range(blocks)])
@@ -184,7 +182,6 @@ def _point_categories(catalogue: Catalogue, count: int, rng: np.random.Generator
 
 
 def _point_models(catalogue: Catalogue, categories: Sequence[str], rng: np.random.Generator) -> list[str]:
-    """Draw the object model of each point, without replacement until all models of the category are used."""
     decks: dict[str, list[str]] = {key: [] for key in catalogue.categories}
     models = []
     for category in categories:
@@ -232,7 +229,7 @@ def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generato
 def _start_candidates(
     centroid: NDArray[np.float64], rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
-    """Yield the objects' centroid (2,), m, then random points in growing circles around it."""
+    """Yield the objects' centroid (2,), then random points in growing circles around it."""
     yield centroid
     for radius in RADIUS_STEP * np.arange(1, RADII + 1):
         for _ in range(DRAWS_PER_RADIUS):
@@ -243,7 +240,7 @@ def _start_candidates(
 
 def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:
     clear = bool((np.hypot(*(objects - point).T) >= START_CLEARANCE).all())
-    # Snapping moves points on islands, such as the inside of a table, to the floor on which all objects are.
+    # Snapping moves isolated points, such as inside a table, to the floor on which the objects are.
     return (
         clear
         and navigable.is_navigable(point)

@@ -1,4 +1,4 @@
-"""Composition of a house, its receptacles, an episode's objects and the person into one compiled model."""
+"""Scenes: a house, its receptacles, an episode's objects and the person in one compiled model."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -25,14 +25,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
-    """Addresses of the objects in the arrays of `MjModel` and `MjData`, in the episode's order."""
+    """Addresses of an episode's objects in the arrays of `MjModel` and `MjData`, in the episode's order."""
 
-    names: tuple[str, ...]  # instance names
-    bodies: NDArray[np.int32]  # body ids, (n,)
-    qpos: NDArray[np.int32]  # first `qpos` address of each free joint (3 position, 4 quaternion), (n,)
-    dofs: NDArray[np.int32]  # first `qvel` address (3 linear, 3 angular), (n,)
-    trees: NDArray[np.int32]  # kinematic tree ids, for sleep states, (n,)
-    geom_owner: NDArray[np.int32]  # index of each geom's object, or -1, (ngeom,)
+    names: tuple[str, ...]  # names of the objects in the episode
+    bodies: NDArray[np.int32]  # body ids, shape (n,)
+    qpos: NDArray[np.int32]  # address in `qpos` of each free joint (3 position, 4 quaternion), shape (n,)
+    dofs: NDArray[np.int32]  # address in `qvel` of each free joint (3 linear, 3 angular), shape (n,)
+    trees: NDArray[np.int32]  # kinematic tree ids, to look up sleep states, shape (n,)
+    geom_owner: NDArray[np.int32]  # object index of each geom, or -1, shape (ngeom,)
     _rows: NDArray[np.intp] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -40,7 +40,7 @@ class SceneIndex:
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
-        """Find the objects in a compiled model. Raise an AssetError if one lacks its body or free joint."""
+        """Find the objects in a compiled model. Raise an AssetError if one has no body or free joint."""
         bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
         joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
         owner_of_body = np.full(model.nbody, -1, np.int32)
@@ -56,22 +56,22 @@ class SceneIndex:
         )
 
     def position_of(self, name: str) -> int:
-        """Return the index of an instance. Raise an EpisodeError if it is unknown."""
+        """Return the index of an object by its name. Raise an EpisodeError if the name is unknown."""
         try:
             return self.names.index(name)
         except ValueError:
             raise EpisodeError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
 
     def body(self, name: str) -> int:
-        """Return the body id of an instance. Raise an EpisodeError if it is unknown."""
+        """Return the body id of an object by its name. Raise an EpisodeError if the name is unknown."""
         return int(self.bodies[self.position_of(name)])
 
     def geoms(self, name: str) -> NDArray[np.intp]:
-        """Return the geom ids of an instance. Raise an EpisodeError if it is unknown."""
+        """Return the geom ids of an object by its name. Raise an EpisodeError if the name is unknown."""
         return np.flatnonzero(self.geom_owner == self.position_of(name))
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Copy positions (n, 3), m, and quaternions wxyz (n, 4) of all objects from a `qpos`."""
+        """Copy the positions (n, 3), in metres, and quaternions wxyz (n, 4) of all objects from a `qpos` array."""
         rows = qpos[self._rows]
         return rows[:, :3], rows[:, 3:]
 
@@ -99,13 +99,13 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def cached(self, key: str, make: Callable[[], T]) -> T:
-        """Return the value cached under `key`. The first call makes it with `make`."""
+        """Return the value cached under `key`. The first call computes it."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
 
     def counterpart(self, *, visuals: bool) -> "Scene":
-        """Return the scene of the same episode with or without visual geoms. States fit both."""
+        """Return the scene of the same episode with or without visual geoms. Both scenes accept the same states."""
         if visuals == self.visuals:
             return self
         return self.cached(
@@ -121,7 +121,7 @@ def compose(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """Compose and compile an episode: house, receptacles, objects in their poses, person at the start.
+    """Compose and compile an episode: the house, its receptacles, the objects in their poses, and the person.
 
     Args:
         episode: Episode to compose.
@@ -137,7 +137,7 @@ def compose(
             overlaps something else.
     """
     _require(check_fit(episode, catalogue), episode)
-    if avatar:  # scenes for dropping objects have no avatar, and their poses are not final
+    if avatar:  # scenes for dropping objects have no avatar, and the objects are not in their final poses
         _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
     scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
     if avatar:
@@ -153,7 +153,7 @@ def assemble(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """Compose an episode as `compose` does, but without checking it."""
+    """Compose an episode without checking it. See `compose` for the arguments."""
     person = person or PersonParameters()
     house = compiled_house(catalogue)
     require_usable(house)
@@ -167,7 +167,7 @@ def assemble(
         if avatar:
             start = episode.start
             attach_avatar(spec, names, start=(start.x, start.y, start.heading), person=person)
-        spec.dedup_assets()  # attaching copies a model's assets for every instance
+        spec.dedup_assets()  # merge assets, because attaching copies a model's assets for every object
         model = spec.compile()
     tighten(model)
     return Scene(

@@ -1,4 +1,4 @@
-"""Settling of dropped objects by physics, in a house without a person."""
+"""Physics simulation that lets dropped objects settle, in a house without a person."""
 
 from dataclasses import dataclass, replace
 
@@ -11,25 +11,25 @@ from mjsim.house.scene.scene import Scene, compose
 from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.errors import PhysicsError
 
-REST_SPEED = 0.01  # m/s
-MAX_TIME = 6.0  # s
-MAX_DRIFT = 0.3  # largest distance from the point where it was dropped, m
-MAX_SINK = 0.02  # largest depth below the floor, m
+REST_SPEED = 0.01  # speed below which an object is at rest, in m/s
+MAX_TIME = 6.0  # time limit in seconds
+MAX_DRIFT = 0.3  # maximum distance from the drop point, in metres
+MAX_SINK = 0.02  # maximum depth below the floor, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
     """Result of settling."""
 
-    objects: tuple[PlacedObject, ...]  # all objects in their settled poses, in the episode's order
-    faults: dict[str, str]  # instance name -> why its pose cannot be used
+    objects: tuple[PlacedObject, ...]  # settled objects, in the episode's order
+    faults: dict[str, str]  # reasons why a pose cannot be used, by object name
 
 
 def settle(episode: Episode, catalogue: Catalogue) -> Settled:
-    """Simulate a house without a person until every object sleeps, at most 6 s.
+    """Simulate a house without a person until every object sleeps, for at most 6 s.
 
-    An object has a fault if it is then still faster than 1 cm/s, is more than 0.3 m from its point, or is outside the
-    house.
+    An object is faulty if it then still moves faster than 1 cm/s, is more than 0.3 m from its drop point, or is outside
+    the house.
 
     Raises:
         PhysicsError: MuJoCo warned.

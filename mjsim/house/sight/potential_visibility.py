@@ -1,6 +1,6 @@
 """Potential visibility: objects that may come into view soon, for displays that draw from snapshots.
 
-The result is conservative: it may include objects that stay hidden. Only walls and large furniture hide objects, an
+The result is conservative: it may include objects that stay hidden. Only walls and large furniture hide objects, each
 object counts as a ball around it, and the person may turn and walk at full speed. The visibility of an object from the
 cells of a grid at eye height is computed once, and again after the object has moved.
 """
@@ -18,35 +18,35 @@ from mjsim.house.sight.drawn_state import large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.observation import Observation
 
-CELL = 0.25  # cell size, m
-_MOVED = 1e-3  # distance by which an object counts as moved, m
+CELL = 0.25  # cell size in metres
+_MOVED = 1e-3  # distance by which an object must move to count as moved, in metres
 _UNKNOWN, _HIDDEN, _OPEN = -1, 0, 1
-_OPAQUE = 0.99  # smallest alpha of walls that hide objects
-_MARGIN = 1e-6  # tolerance for rounding, m
+_OPAQUE = 0.99  # minimum alpha of walls that hide objects
+_MARGIN = 1e-6  # tolerance for rounding errors, in metres
 
 
 class _WallSegments(NamedTuple):
     """Opaque static boxes, the largest first."""
 
-    centers: Floats  # m, (w, 3)
-    axes: Floats  # axes as columns, (w, 3, 3)
-    half_sizes: Floats  # half extents, m, (w, 3)
+    centers: Floats  # centres in metres, shape (w, 3)
+    axes: Floats  # axes as columns, shape (w, 3, 3)
+    half_sizes: Floats  # half extents in metres, shape (w, 3)
 
 
 class _VisibilityGrid(NamedTuple):
-    """Known visibility of objects from cells of the floor."""
+    """Cached visibility of objects from cells of the floor."""
 
-    origin: Floats  # corner of the first cell, and eye height, m, (3,)
-    seen: NDArray[np.int8]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, (rows, columns, n)
+    origin: Floats  # corner of the first cell, and eye height, in metres, shape (3,)
+    seen: NDArray[
+        np.int8
+    ]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, shape (rows, columns, n)
 
 
 class PotentialVisibility:
-    """Predictor of the objects that a person may see within a time.
+    """Predictor of the objects that may come into view soon.
 
-    Args:
-        scene: The composed episode.
-        horizon: The time, s.
-        field_of_view: Horizontal field of view, rad. By default, that of the scene's person.
+    Args: scene: The composed episode. horizon: How far to look ahead, in seconds. field_of_view: Horizontal field of
+    view in radians. By default, that of the scene's person.
     """
 
     def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:
@@ -65,13 +65,14 @@ class PotentialVisibility:
         self._centers = np.full((len(self._radii), 3), np.inf)
 
     def may_see(self, seen: Observation, aspect: float) -> Mask:
-        """Return a mask (n,) of the objects that may come into a view with an aspect ratio (width over height)."""
+        """Return a mask (n,) of the objects that may come into a view with the given aspect ratio (width / height)."""
         centers = _centers(seen.object_positions, seen.object_quaternions, self._offsets)
         moved = (np.abs(centers - self._centers) > _MOVED).any(axis=1)
         if moved.any():
             self._centers[moved] = centers[moved]
             self._grid.seen[:, :, moved] = _UNKNOWN
-        corner = math.atan(self._width * math.hypot(1.0, 1.0 / aspect))  # angle from the middle of the view
+        # Angle between the centre and a corner of the view
+        corner = math.atan(self._width * math.hypot(1.0, 1.0 / aspect))
         c, s, cp, sp = (f(a) for a in (seen.heading, seen.pitch) for f in (math.cos, math.sin))
         gaze = np.array([c * cp, s * cp, sp])
         arguments = seen.eye, gaze, corner + self._swing, self._stride
@@ -79,7 +80,7 @@ class PotentialVisibility:
 
 
 def _balls(scene: Scene) -> tuple[Floats, Floats]:
-    """Return bounding balls of the objects: centres in the frames of their bodies, m, (n, 3), and radii, m, (n,)."""
+    """Return bounding balls of the objects: centres (n, 3) in the object frames, and radii (n,), in metres."""
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
     model, owner = scene.model, scene.index.geom_owner
     data = mujoco.MjData(model)
@@ -91,7 +92,7 @@ def _balls(scene: Scene) -> tuple[Floats, Floats]:
     for i in range(count):
         geoms = np.flatnonzero((owner == i) & (model.geom_group <= 2))
         boxes = model.geom_aabb[geoms]
-        corners = boxes[:, None, :3] + signs * boxes[:, None, 3:]  # in the frames of the geoms
+        corners = boxes[:, None, :3] + signs * boxes[:, None, 3:]  # in the geom frames
         rotations = data.geom_xmat[geoms].reshape(-1, 3, 3)
         points = data.geom_xpos[geoms, None] + np.einsum("gij,gkj->gki", rotations, corners)
         body = np.zeros(9)
@@ -117,7 +118,6 @@ def _extent(walls: _WallSegments, margin: float) -> tuple[Floats, Floats]:
 
 @kernel
 def _centers(positions: Floats, quaternions: Floats, offsets: Floats) -> Floats:
-    """Compute the centres of objects, m, (n, 3), from their poses and the centres in their own frames."""
     centers = np.empty_like(positions)
     for i in range(len(positions)):
         w, x, y, z = quaternions[i]
@@ -140,7 +140,7 @@ def _may_see(
     walls: _WallSegments,
     grid: _VisibilityGrid,
 ) -> Mask:
-    """Return a mask of the objects within an angle, rad, of the gaze that are visible from a cell in reach of the eye.
+    """Return a mask of the objects that are visible from a cell near the eye, at most `angle` radians off the gaze.
 
     `eye` and the unit vector `gaze` are (3,). `stride` is how far the eye can move, m. `centers` (n, 3) and `radii`
     (n,) are balls around the objects, m. Results for cells are stored in `grid`.
@@ -177,13 +177,13 @@ def _may_see(
 
 @kernel
 def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
-    """Return `_OPEN` if the centre, left, right, top or bottom of a ball is not hidden by a wall, else `_HIDDEN`."""
+    """Return `_OPEN` if some ray to the centre or an edge of a ball passes no wall, else `_HIDDEN`."""
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
     distance = math.hypot(level, ray[2])
     if distance <= radius or level < radius:
         return _OPEN
-    reach = 1.0 - radius / distance  # fraction of the ray up to the ball
+    reach = 1.0 - radius / distance  # fraction of the ray outside the ball
     if not _is_blocked(eye, center, reach, walls):
         return _OPEN
     side = np.array([-ray[1], ray[0], 0.0]) * (radius / level)
@@ -196,7 +196,7 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegme
 
 @kernel
 def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
-    """Return True if the line from `start` to `end`, (3,), m, enters a wall within the first fraction `reach`."""
+    """Return True if the first `reach` (a fraction) of the line from `start` to `end`, (3,) each, meets a wall."""
     for w in range(len(walls.centers)):
         enter, leave = 0.0, reach
         for k in range(3):

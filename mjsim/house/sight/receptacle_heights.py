@@ -1,4 +1,4 @@
-"""Heights of the contents of receptacles, by casting many vertical rays at once into the few geoms nearby."""
+"""Heights of receptacle contents, by casting many vertical rays at once into the few geoms nearby."""
 
 import math
 from typing import NamedTuple
@@ -22,21 +22,21 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 
 
 class Shapes(NamedTuple):
-    """Shapes of all geoms, in arrays of `MjModel`."""
+    """Shapes of all geoms, in arrays from `MjModel`."""
 
-    types: Ints  # `geom_type`, (ngeom,)
-    sizes: Floats  # `geom_size`, m, (ngeom, 3)
-    bounds: Floats  # `geom_rbound`, m, (ngeom,)
-    meshes: Ints  # `geom_dataid`, (ngeom,)
-    first_vertex: Ints  # `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, (nmesh,)
+    types: Ints  # `geom_type`, shape (ngeom,)
+    sizes: Floats  # `geom_size` in metres, shape (ngeom, 3)
+    bounds: Floats  # `geom_rbound` in metres, shape (ngeom,)
+    meshes: Ints  # `geom_dataid`, shape (ngeom,)
+    first_vertex: Ints  # `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, each of shape (nmesh,)
     first_face: Ints
     face_count: Ints
-    vertices: Floats  # `mesh_vert`, m, (nmeshvert, 3)
-    faces: Ints  # `mesh_face`, (nmeshface, 3)
+    vertices: Floats  # `mesh_vert` in metres, shape (nmeshvert, 3)
+    faces: Ints  # `mesh_face`, shape (nmeshface, 3)
 
 
 class ReceptacleHeights:
-    """Measures by rays how high the receptacles of a scene are filled."""
+    """Measures by ray casts how high the receptacles of a scene are filled."""
 
     def __init__(self, scene: Scene) -> None:
         model = scene.model
@@ -62,7 +62,7 @@ class ReceptacleHeights:
     def heights(
         self, data: mujoco.MjData, receptacle: ReceptacleGeometry, points: Floats, top: float, ignore: Ints
     ) -> Floats:
-        """Return the height of the first solid surface below each point (k, 2), m, starting at `top`, or -inf.
+        """Return the height of the first solid surface below each point (k, 2), starting at height `top`, or -inf.
 
         The rays pass through the bodies whose ids are in `ignore`.
         """
@@ -88,7 +88,7 @@ class ReceptacleHeights:
 def cast_down(
     points: Floats, top: float, geoms: Ints, positions: Floats, rotations: Floats, shapes: Shapes
 ) -> Floats:
-    """Return the height of the first of some geoms below each point (k, 2) at height `top`, m, (k,), or -inf."""
+    """Return the height at which a vertical ray from each point (k, 2) first hits one of the geoms, or -inf."""
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
@@ -96,7 +96,7 @@ def cast_down(
         bound, axes = (
             shapes.bounds[geom] ** 2,
             rotations[geom],
-        )  # the columns of the rotation are the geom's axes
+        )  # The columns of the rotation are the axes of the geom.
         size, is_box = shapes.sizes[geom], shapes.types[geom] == _BOX
         along[0], along[1], along[2] = -axes[6], -axes[7], -axes[8]
         for k in range(len(points)):
@@ -113,7 +113,7 @@ def cast_down(
 
 @kernel
 def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float:
-    """Return where a ray enters a geom that is not a box, in the geom's frame, or -1."""
+    """Return how far along a ray in the geom's frame it enters a geom that is not a box, or -1."""
     kind, size = shapes.types[geom], shapes.sizes[geom]
     if kind != _MESH:
         return _into_round(start, along, size, kind)
@@ -124,7 +124,6 @@ def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float
 
 @kernel
 def _into_box(start: Floats, along: Floats, size: Floats) -> float:
-    """Return where a ray enters a box with half sizes `size`, or -1."""
     enter, leave = 0.0, math.inf
     for axis in range(3):
         if abs(along[axis]) < 1e-12:
@@ -139,7 +138,6 @@ def _into_box(start: Floats, along: Floats, size: Floats) -> float:
 
 @kernel
 def _into_round(start: Floats, along: Floats, size: Floats, kind: int) -> float:
-    """Return where a ray enters a sphere, ellipsoid, capsule or cylinder, or -1."""
     if kind == _SPHERE:
         return _into_ball(start, along, size[0], size[0], size[0], 0.0)
     if kind == _ELLIPSOID:
@@ -160,7 +158,6 @@ def _into_round(start: Floats, along: Floats, size: Floats, kind: int) -> float:
 
 @kernel
 def _into_ball(start: Floats, along: Floats, rx: float, ry: float, rz: float, z: float) -> float:
-    """Return where a ray enters an ellipsoid around (0, 0, z), or -1."""
     sx, sy, sz = start[0] / rx, start[1] / ry, (start[2] - z) / rz
     ax, ay, az = along[0] / rx, along[1] / ry, along[2] / rz
     return _root(ax * ax + ay * ay + az * az, sx * ax + sy * ay + sz * az, sx * sx + sy * sy + sz * sz - 1.0)
@@ -168,7 +165,6 @@ def _into_ball(start: Floats, along: Floats, rx: float, ry: float, rz: float, z:
 
 @kernel
 def _into_tube(start: Floats, along: Floats, radius: float, half: float) -> float:
-    """Return where a ray enters the side of a cylinder along z, or -1."""
     a = along[0] * along[0] + along[1] * along[1]
     if a < 1e-12:
         return -1.0
@@ -179,14 +175,12 @@ def _into_tube(start: Floats, along: Floats, radius: float, half: float) -> floa
 
 @kernel
 def _root(a: float, b: float, c: float) -> float:
-    """Return the smaller root of a t^2 + 2 b t + c, or -1."""
     inside = b * b - a * c
     return (-b - math.sqrt(inside)) / a if inside >= 0.0 else -1.0
 
 
 @kernel
 def _sooner(first: float, second: float) -> float:
-    """Return the smaller of two depths, where negative ones mean a miss."""
     if first < 0.0 or (0.0 <= second < first):
         return second
     return first
@@ -194,7 +188,7 @@ def _sooner(first: float, second: float) -> float:
 
 @kernel
 def _into_mesh(start: Floats, along: Floats, vertices: Floats, faces: Ints, count: int) -> float:
-    """Return where a ray first meets a triangle (Moeller and Trumbore, 1997), or -1."""
+    """Return how far along a ray it first meets a triangle, or -1 (Moeller and Trumbore, 1997)."""
     best = -1.0
     for face in range(count):
         a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]

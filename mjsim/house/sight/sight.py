@@ -20,36 +20,37 @@ from mjsim.house.sight.drawn_state import drawn_state, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.person_parameters import PersonParameters
 
-INSET = 0.7  # ray targets, as a share of the half extents, because corners of the boxes of round objects are empty
+# Rays go to points at this fraction of the half extents. The corners of a box around a round object are empty.
+INSET = 0.7
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
-_MARGIN = 1e-6  # tolerance for rounding, m
+_MARGIN = 1e-6  # tolerance for rounding errors, in metres
 
 
 @dataclass(frozen=True)
 class FieldOfView:
     """Angles and range of a person's view."""
 
-    horizontal: float  # full angle, rad
-    vertical: float  # full angle, rad
-    range: float  # distance at which objects are noticed, m
+    horizontal: float  # full angle in radians
+    vertical: float  # full angle in radians
+    range: float  # distance up to which objects are noticed, in metres
 
     @classmethod
     def of(cls, person: PersonParameters) -> "FieldOfView":
-        """Return the field of view of a person, whose picture has the aspect ratio 4:3."""
+        """Return the field of view of a person, for an image with aspect ratio 4:3."""
         return cls(person.field_of_view, person.vertical_field, person.viewing_distance)
 
 
 def persons_geoms(scene: Scene) -> Mask:
-    """Return a mask of the geoms of the person's body, (ngeom,)."""
+    """Return a mask (ngeom,) of the geoms of the person's body."""
     return _sight(scene).person
 
 
 def in_field_of_view(
     points: ArrayLike, eye: ArrayLike, heading: float, pitch: float, field: FieldOfView
 ) -> Mask:
-    """Return a mask (n,) of the points (n, 3), m, inside the field of view, at any distance, even behind obstacles.
+    """Return a mask (n,) of the points (n, 3) inside the field of view, at any distance and even behind obstacles.
 
-    The other arguments are as for `visible_objects`.
+    `points` and `eye` are in metres, `heading` and `pitch` in radians.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field)
     forward, left, up = gaze.axes @ (np.reshape(points, (-1, 3)) - gaze.eye).T
@@ -99,7 +100,7 @@ def visible_objects(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> tuple[str, ...]:
-    """Return the instance names of the objects in view, in the episode's order.
+    """Return the names of the objects in view, in the episode's order.
 
     An object is in view if one of seven rays, to the centre of its bounding box and to points around it, is inside the
     field of view and hits the object first. Walls, furniture and other objects block rays, the person's body does not.
@@ -121,7 +122,7 @@ def visible_shares(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> dict[str, float]:
-    """Return the share of the seven rays that hit the object, for each object in view: 0 < share <= 1.
+    """Return, for each object in view, the fraction of the seven rays that hit it: above 0, at most 1.
 
     The arguments are as for `visible_objects`.
     """
@@ -133,17 +134,17 @@ def visible_shares(
 class _SightGeometry(NamedTuple):
     """Static data of a scene: drawn geoms of objects, large static boxes, and the person's geoms."""
 
-    geoms: NDArray[np.int64]  # ids of the objects' drawn geoms, (g,)
-    owners: NDArray[np.int64]  # index of the object of each, (g,)
-    boxes: Floats  # centre and half extents of the bounding box of each, in its own frame, m, (g, 6)
-    wall_centers: Floats  # centres of large boxes, the largest first, m, (w, 3)
-    wall_axes: Floats  # axes as columns, (w, 3, 3)
-    wall_half_sizes: Floats  # m, (w, 3)
-    person: Mask  # mask of the person's geoms, (ngeom,)
+    geoms: NDArray[np.int64]  # ids of drawn geoms that belong to objects, shape (g,)
+    owners: NDArray[np.int64]  # object index of each of these geoms, shape (g,)
+    boxes: Floats  # centre and half extents of the bounding box of each of these geoms, in its own frame, shape (g, 6)
+    wall_centers: Floats  # centres of large static boxes, the largest first, in metres, shape (w, 3)
+    wall_axes: Floats  # axes as columns, shape (w, 3, 3)
+    wall_half_sizes: Floats  # half extents in metres, shape (w, 3)
+    person: Mask  # mask of the geoms of the person's body, shape (ngeom,)
 
 
 class _Gaze(NamedTuple):
-    """Eye (3,), m; rows forward, left and up (3, 3); tangents of half the angles of view (2,); range, m."""
+    """Eye (3,), axes (forward, left and up as rows), tangents of the half angles of view, and range in metres."""
 
     eye: Floats
     axes: Floats
@@ -161,7 +162,7 @@ def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaz
 def _object_hits(
     scene: Scene, data: mujoco.MjData, gaze: _Gaze, among: Collection[str] | None, *, once: bool
 ) -> Iterator[int]:
-    """Yield the index of an object for each ray that hits it first, or at most once per object if `once`."""
+    """Yield an object's index for each ray that hits the object first, at most once per object if `once`."""
     scene, data = drawn_state(scene, data)
     sight, names = _sight(scene), scene.index.names
     looked_for = frozenset(names if among is None else among)
@@ -202,10 +203,10 @@ def _sight_geometry(scene: Scene) -> _SightGeometry:
 def _open_rays(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask, gaze: _Gaze
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Collect the rays inside the field of view, without those that a large wall certainly blocks.
+    """Collect the rays to objects that are inside the field of view and are not certainly blocked by a large wall.
 
-    Poses of geoms are (ngeom, 3) m and (ngeom, 9), `wanted` (n,) is a mask of objects. Returns the object index of each
-    ray, (k,), in order, and vectors from the eye to points in the object's bounding box, m, (k, 3).
+    Returns the object index of each ray, shape (k,), in ascending order, and the vectors from the eye to points in the
+    object's bounding box, in metres, shape (k, 3). `wanted` (n,) is a mask of objects.
     """
     low, high = _bounding_boxes(sight, positions, rotations, wanted)
     owners, rays = np.empty(7 * len(wanted), np.int64), np.empty((7 * len(wanted), 3))
@@ -226,7 +227,7 @@ def _open_rays(
 def _bounding_boxes(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask
 ) -> tuple[Floats, Floats]:
-    """Return lower and upper corners, m, each (n, 3), of boxes around wanted objects, and inf and -inf for others."""
+    """Return the lower and upper corners, both (n, 3), of axis-aligned boxes around the wanted objects."""
     low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
     for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba has no `strict`
         if not wanted[i]:
@@ -242,7 +243,6 @@ def _bounding_boxes(
 
 @kernel
 def _in_field(ray: Floats, gaze: _Gaze) -> bool:
-    """Return True if a vector (3,) from the eye, m, ends inside the field of view."""
     if ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2 > gaze.range**2:
         return False
     forward = ray[0] * gaze.axes[0, 0] + ray[1] * gaze.axes[0, 1] + ray[2] * gaze.axes[0, 2]
@@ -253,11 +253,11 @@ def _in_field(ray: Floats, gaze: _Gaze) -> bool:
 
 @kernel
 def _is_blocked(ray: Floats, low: Floats, high: Floats, eye: Floats, sight: _SightGeometry) -> bool:
-    """Return True if a ray (3,) from the eye enters a wall before the box from `low` to `high`, each (3,), m.
+    """Return True if a ray from the eye enters a wall before the box with corners `low` and `high`, each (3,).
 
-    For safety, walls are shrunk and the box is enlarged by `_MARGIN`.
+    Walls are shrunk and the box is enlarged by `_MARGIN`, so that rounding errors never block a ray.
     """
-    reach = 0.0  # share of the ray at which it enters the box
+    reach = 0.0  # fraction of the ray at which it enters the box
     for k in range(3):
         if ray[k] > _MARGIN:
             reach = max(reach, (low[k] - _MARGIN - eye[k]) / ray[k])

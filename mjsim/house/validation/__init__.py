@@ -1,1 +1,1 @@
-"""Rules of docs/models.md: generators of findings about houses, receptacles, objects and episodes."""
+"""Rules for models and episodes (docs/models.md). Each rule is a generator of findings."""

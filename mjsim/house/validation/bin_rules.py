@@ -1,4 +1,4 @@
-"""Rules for the receptacles of a house: a person can reach, see and fill each of them."""
+"""Rules for a house's receptacles: a person can reach, see and fill each of them."""
 
 import math
 from collections.abc import Iterator
@@ -14,11 +14,11 @@ from mjsim.house.validation.floor import WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
 DEFAULT = PersonParameters()
-SNAP = 1.0  # largest distance from the site `approach` to where a person can stand, m
-MAX_TOP = 1.4  # largest height of the top of a receptacle's volume, m
-ABOVE = 0.3  # free height that an object needs above a receptacle, m
-INSIDE_GAP = 0.006  # depth up to which geoms of the house may extend into the volume, m
-SUPPORT_GAP = 0.05  # largest gap below a receptacle, m
+SNAP = 1.0  # maximum distance from the site `approach` to a point where a person can stand, in metres
+MAX_TOP = 1.4  # maximum height of the top of a receptacle's volume, in metres
+ABOVE = 0.3  # free height above a receptacle that an object needs, in metres
+INSIDE_GAP = 0.006  # how far geoms of the house may extend into the volume, in metres
+SUPPORT_GAP = 0.05  # maximum gap below a receptacle, in metres
 _WITHIN = ((0.0, 0.0), (0.6, 0.6), (0.6, -0.6), (-0.6, 0.6), (-0.6, -0.6))
 _LIFT = np.array([0.0, 0.0, 0.01])
 _DOWN = np.array([0.0, 0.0, -1.0])

@@ -13,13 +13,16 @@ Severity = Literal["error", "warning"]
 class Finding:
     """A fault of a model or an episode."""
 
-    rule: str  # the broken convention (`mass`), a heading of the rules in docs/models.md
-    subject: str  # the faulty thing (`object mug`, `house`, `object_03`)
-    message: str  # the fault, with its value
+    rule: str  # broken rule, such as `mass`: a heading in docs/models.md
+    subject: str  # what is faulty, such as `object mug`, `house` or `object_03`
+    message: str  # description of the fault, with the faulty value
     remedy: str
-    severity: Severity = "error"  # errors prevent use, warnings are about surprises for people
-    file: str = ""  # name of the file to change, if `subject` does not tell
-    place: tuple[float, ...] | None = None  # (x, y) or (x, y, z) in the frame of the house or the object, m
+    severity: Severity = (
+        "error"  # Errors prevent use. Warnings announce effects that may surprise participants.
+    )
+    file: str = ""  # name of the file to change, unless `subject` already identifies it
+    # Position in the frame of the house or object in metres: (x, y) or (x, y, z)
+    place: tuple[float, ...] | None = None
 
     def __str__(self) -> str:
         where = f"{self.subject} ({self.file})" if self.file else self.subject
@@ -31,7 +34,7 @@ def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def one_line(findings: Iterable[Finding], name: object) -> str:
-    """Format the first error, prefixed with `name`, and the number of further errors as an exception message."""
+    """Format an exception message from the first error and the number of further errors, prefixed with `name`."""
     first, *more = errors(findings)
     rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
     return f"{name}: {first}{rest}"

@@ -1,4 +1,4 @@
-"""Rules for a house's floor: it is closed, level and in one piece, and all receptacles can be used."""
+"""Rules for a house's floor: it is closed, level and connected, and a person can use all receptacles from it."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -17,14 +17,15 @@ from mjsim.house.validation.floor import BODY_BAND, BORDER, WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
 DEFAULT = PersonParameters()
-PASSAGE = 0.70  # width below which people squeeze through, m
-MIN_PASSAGE = 0.50  # width of the body with the planner's clearance, m
-ROOM_AREA = 0.25  # smallest walkable area of a room, m^2
-FLOOR_GAP = 0.006  # largest deviation of the floor from z = 0, m
-HEADROOM = 2.0  # height of the highest eyes, m
+PASSAGE = 0.70  # A person squeezes through passages narrower than this, in metres.
+MIN_PASSAGE = 0.50  # width of the body plus the planner's clearance, in metres
+ROOM_AREA = 0.25  # minimum walkable area of a room in m^2
+FLOOR_GAP = 0.006  # maximum deviation of the floor from z = 0, in metres
+HEADROOM = 2.0  # height of the tallest person's eyes, in metres
 _RAYS = 3000
-_HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)  # groups of colliding geoms, ceilings and lamps
-_CHEST = 1.0  # start height of rays, m, which is free wherever a person can stand
+# Geom groups in which things can hang: colliding geoms, ceilings and lamps
+_HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)
+_CHEST = 1.0  # start height of vertical rays, in metres; free wherever a person can stand
 
 
 def check_floor(floor: WalkableFloor) -> list[Finding]:
@@ -32,7 +33,7 @@ def check_floor(floor: WalkableFloor) -> list[Finding]:
 
 
 def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
-    """Describe why a person can stand nowhere in a house. Most often its floor is too high."""
+    """Report that a person can stand nowhere in a house, most often because the floor is too high."""
     steps = np.stack(np.meshgrid(*2 * [np.linspace(-0.9, 0.9, 7)]), axis=-1).reshape(-1, 2)
     offsets = np.einsum("kij,nkj->nki", rooms.axes, steps[:, None] * rooms.half_sizes)
     points = (rooms.centers + offsets).reshape(-1, 2)
@@ -45,7 +46,7 @@ def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
 
 
 def _shell(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check that the outer walls are closed: free space must not connect rooms with the border of the grid."""
+    """Check that outer walls are closed, so that free space in the rooms is not connected to the border of the grid."""
     free = floor.clearance.distance > 0
     components, _ = label(free)
     indoors = floor.rectangle_of >= 0
@@ -84,7 +85,7 @@ def _rooms(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _passages(floor: WalkableFloor) -> Iterator[Finding]:
-    """Find passages narrower than `PASSAGE` by the rooms that a wider person could not enter."""
+    """Find passages narrower than `PASSAGE`, by the rooms that a wider person could not enter."""
     field = floor.clearance
     inside = distance_transform_edt(floor.rectangle_of < 0) * field.resolution <= BORDER / 2
     radius = PASSAGE / 2 - field.resolution
@@ -98,7 +99,7 @@ def _passages(floor: WalkableFloor) -> Iterator[Finding]:
     for key in dict.fromkeys(floor.rooms.keys):
         room = np.isin(floor.rectangle_of, floor.rectangles_of(key))
         if (wide[room] == main).any() or not (body[room] == at_home).any():
-            continue  # the way is wide enough, or there is none, which another rule reports
+            continue  # The passage is wide enough, or there is none, which another rule reports.
         place, width = _narrowest(field, wide, main, room & (wide > 0), body == at_home)
         at = floor.centres[place]
         yield floor.compiled.warning(
@@ -116,9 +117,9 @@ def _narrowest(
     beyond: NDArray[np.bool_],
     body: NDArray[np.bool_],
 ) -> tuple[tuple[int, int], float]:
-    """Return the cell and the width, m, of the widest passage from component `main` of `wide` to the cells `beyond`."""
+    """Return the cell and the width of the widest passage that connects the component `main` to the cells `beyond`."""
     seeds = (wide == main) | beyond
-    if not beyond.any():  # the whole room is narrow, so use the edge of the wide component
+    if not beyond.any():  # The whole room is narrow, so use the edge of the wide component.
         seeds = wide == main
     nearest = distance_transform_edt(~seeds, return_distances=False, return_indices=True)
     near_main = (wide == main)[tuple(nearest)]
@@ -146,7 +147,7 @@ def _level(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check that nothing is at the height of eyes. Things that hang below 1.8 m are obstacles, and allowed."""
+    """Check that nothing hangs at eye height. Anything that reaches below 1.8 m is an obstacle, and is allowed."""
     points = _places(floor)
     heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
     low = int(heights.argmin())
@@ -165,7 +166,7 @@ def _places(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
-    """Return the centres (k, 2), m, of colliding geoms on the walkable floor that are too low to count as obstacles."""
+    """Return the centres (k, 2) of colliding geoms on the walkable floor that are too low to count as obstacles."""
     compiled, found = floor.compiled, [np.empty((0, 2))]
     points, area = floor.walkable
     for geom in compiled.solid:
@@ -180,7 +181,7 @@ def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
-    """Return the distance, m, from chest height above a point (2,) to the next solid geom, up (1) or down (-1)."""
+    """Return the distance from chest height above a point (2,) to the next solid geom, up (1) or down (-1)."""
     geom = np.zeros(1, np.int32)
     start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
     distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, _HANGING, 1, -1, geom)

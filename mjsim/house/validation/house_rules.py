@@ -1,4 +1,4 @@
-"""Rules for a house's MJCF file (docs/models.md, "A house"), except those for its floor in `floor_rules`."""
+"""Rules for a house's MJCF file, except its floor (docs/models.md, "A house")."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -22,16 +22,16 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import BODY_BAND
 from mjsim.values.errors import AssetError
 
-AREA = 0.1  # largest floor area that a convex hull may fill in addition to its mesh, m^2
-_SIDE = 24  # number of points along each side of a hull's outline
+AREA = 0.1  # maximum floor area that a mesh's convex hull may cover but the mesh itself does not, in m^2
+_SIDE = 24  # number of grid points along each side of a hull's outline
 _MAX_CROSSINGS = 50
-SIZE = (1.5, 150.0)  # smallest and largest side of the rectangle around all rooms, m
-GRAVITY = (0.0, 0.0, -9.81)  # m/s^2
-GRAVITY_SLACK = 0.1  # m/s^2
-OVERLAP = 0.05  # largest overlap of two rooms, m^2
+SIZE = (1.5, 150.0)  # minimum and maximum side of the rectangle around all rooms, in metres
+GRAVITY = (0.0, 0.0, -9.81)  # in m/s^2
+GRAVITY_SLACK = 0.1  # tolerance in m/s^2
+OVERLAP = 0.05  # maximum overlap of two rooms in m^2
 MOUNT = "mount:"
 RESERVED = "avatar"
-DEFAULT_TIMESTEP = 0.002  # timestep of a file that does not set it, s
+DEFAULT_TIMESTEP = 0.002  # MuJoCo's timestep for a file that does not set one, in seconds
 
 
 def check_hulls(compiled: Compiled) -> Iterator[Finding]:
@@ -55,7 +55,7 @@ def check_hulls(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return points (k, 2), m, on a grid in the convex hull of points (n, 2), m, and the area per point, m^2."""
+    """Return grid points (k, 2) in the convex hull of points (n, 2), and the area per grid point."""
     sides = np.ptp(points, axis=0) / _SIDE
     steps = np.stack(np.meshgrid(np.arange(_SIDE), np.arange(_SIDE)), axis=-1).reshape(-1, 2)
     places = points.min(axis=0) + (steps + 0.5) * sides
@@ -65,7 +65,7 @@ def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
 
 
 def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
-    """Return True if no part of a mesh is at chest height above a floor point (2,), m, or below that height."""
+    """Return True if a mesh leaves the floor point (2,) free from the floor to chest height."""
     low, high = BODY_BAND
     at, crossings = np.array([*place, high / 2]), 0
     below = _to_mesh(compiled, geom, at, -1.0)
@@ -76,7 +76,7 @@ def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
 
 
 def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: float) -> float:
-    """Return the distance, m, from a point (3,), m, straight up (1) or down (-1) to a mesh, or -1 if there is none."""
+    """Return the distance from a point (3,) straight up (1) or down (-1) to a mesh, or -1 if the ray misses it."""
     return float(mujoco.mj_rayMesh(compiled.model, compiled.data, geom, start, np.array([0.0, 0.0, up])))
 
 
@@ -111,7 +111,7 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _names(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
-    """Find names with prefixes that scenes use for receptacles, objects and the person."""
+    """Find names with prefixes that are reserved for receptacles, objects and the person."""
     model = compiled.model
     taken = {RESERVED, *catalogue.receptacles}
     kinds = (("body", model.nbody), ("geom", model.ngeom), ("site", model.nsite))

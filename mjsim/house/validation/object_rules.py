@@ -1,4 +1,4 @@
-"""Rules for an object that a person can carry (docs/models.md, "An object")."""
+"""Rules for objects that a person can carry (docs/models.md, "An object")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,17 +16,17 @@ from mjsim.house.validation.checked_model import (
 )
 from mjsim.house.validation.findings import Finding, errors
 
-SIZE = (0.06, 0.32)  # smallest and largest length of the longest side, m
-MASS = (0.03, 1.5)  # kg
-REST_GAP = 0.002  # largest distance of the lowest point from z = 0, m
-OFF_CENTRE = 0.03  # largest distance of the footprint's middle from the origin, m
-GRIP_GAP = 0.03  # largest difference of height between a grip and the top, m
-GRIP_REACH = 0.05  # largest distance of a grip from the nearest part, m
-UPRIGHT = 0.99  # smallest cosine between a grip's z axis and the vertical
-TURN = 0.1  # largest deviation from -1 of the cosine between the x axes of the grips
-THIN = 0.015  # smallest thickness of a colliding part, m
-LOOK_GAP = 0.03  # largest difference between the extents of visible and of colliding geoms, m
-SLENDER = 1e-4  # smallest moment of inertia, in units of mass times the largest distance squared
+SIZE = (0.06, 0.32)  # minimum and maximum length of the longest side, in metres
+MASS = (0.03, 1.5)  # minimum and maximum mass in kilograms
+REST_GAP = 0.002  # maximum distance of the lowest point from z = 0, in metres
+OFF_CENTRE = 0.03  # maximum distance of the footprint's centre from the origin, in metres
+GRIP_GAP = 0.03  # maximum height difference between a grip and the top, in metres
+GRIP_REACH = 0.05  # maximum distance from a grip to the nearest part, in metres
+UPRIGHT = 0.99  # minimum cosine of the angle between a grip's z axis and the vertical
+TURN = 0.1  # maximum deviation from -1 of the cosine of the angle between the x axes of the two grips
+THIN = 0.015  # minimum thickness of a colliding part, in metres
+LOOK_GAP = 0.03  # maximum difference between the extents of visible and colliding geoms, in metres
+SLENDER = 1e-4  # minimum ratio of the moment of inertia to mass times the square of the largest distance
 ROUND = [
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "CYLINDER", "ELLIPSOID")
 ]
@@ -34,7 +34,7 @@ GRIPS = ("grip_0", "grip_1")
 
 
 def check_object(path: Path, key: str | None = None) -> list[Finding]:
-    """Check an object's MJCF file. By default, its `key` in the catalogue is the file's name."""
+    """Check an object's MJCF file. Its catalogue key `key` defaults to the file's name."""
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
     return check_compiled_object(compiled) if isinstance(compiled, Compiled) else compiled
@@ -46,7 +46,7 @@ def check_compiled_object(compiled: Compiled) -> list[Finding]:
 
 
 def check_structure(compiled: Compiled, body: str) -> Iterator[Finding]:
-    """Check that a model has a single body, named `body`, with geoms that collide and geoms that are visible."""
+    """Check that a model has a single body, named `body`, with colliding and visible geoms."""
     model = compiled.model
     names = [model.body(b).name for b in range(1, model.nbody)]
     if names != [body]:
@@ -180,7 +180,7 @@ def _grip(
 
 
 def _distance(compiled: Compiled, geom: int, at: NDArray[np.float64]) -> float:
-    """Return the distance, m, from a point (3,), m, to the bounding box of a geom along its own axes."""
+    """Return the distance from a point (3,) to the bounding box of a geom along the geom's own axes."""
     box = compiled.model.geom_aabb[geom]
     local = compiled.data.geom_xmat[geom].reshape(3, 3).T @ (at - compiled.data.geom_xpos[geom])
     return float(np.linalg.norm(np.maximum(np.abs(local - box[:3]) - box[3:], 0.0)))

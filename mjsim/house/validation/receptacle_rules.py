@@ -1,4 +1,4 @@
-"""Rules for a receptacle on its own (docs/models.md, "A receptacle")."""
+"""Rules for a single receptacle (docs/models.md, "A receptacle")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,19 +11,19 @@ from mjsim.house.validation.checked_model import Compiled, compile_model
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_structure
 
-SIDE = (0.1, 1.2)  # smallest and largest side of the interior, m
-DEPTH = (0.08, 0.8)  # smallest and largest height of the interior, m
-FLOOR = 0.03  # smallest thickness of its floor, m
-GAP = 0.02  # largest gap between the volume and the floor or the walls, m
-BASE_GAP = 0.005  # largest distance of the lowest point from z = 0, m
-STIFF = 0.02  # largest time constant of its contacts, s
+SIDE = (0.1, 1.2)  # minimum and maximum side of the interior, in metres
+DEPTH = (0.08, 0.8)  # minimum and maximum height of the interior, in metres
+FLOOR = 0.03  # minimum thickness of the receptacle's floor, in metres
+GAP = 0.02  # maximum gap between the volume and the floor or walls, in metres
+BASE_GAP = 0.005  # maximum distance of the lowest point from z = 0, in metres
+STIFF = 0.02  # maximum time constant of the receptacle's contacts, in seconds
 _SLOTS = ((0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5))
 _SIDES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def check_receptacle(path: Path, key: str | None = None) -> list[Finding]:
-    """Check a receptacle's MJCF file. By default, its `key` in the catalogue is the file's name."""
+    """Check a receptacle's MJCF file. Its catalogue key `key` defaults to the file's name."""
     compiled = compile_model(f"receptacle {key or path.stem}", path)
     return check_compiled_receptacle(compiled) if isinstance(compiled, Compiled) else compiled
 
@@ -59,7 +59,7 @@ def _sites(compiled: Compiled) -> Iterator[Finding]:
 
 
 class _Volume:
-    """The site `volume` of a compiled receptacle: centre and half sizes (3,), m, and axes."""
+    """The site `volume` of a compiled receptacle: centre (3,), half sizes (3,) and axes."""
 
     def __init__(self, compiled: Compiled) -> None:
         site = compiled.site("volume")
@@ -162,7 +162,7 @@ def _contacts(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _ray(compiled: Compiled, start: NDArray[np.float64], along: NDArray[np.float64]) -> tuple[float, int]:
-    """Return the distance, m, and id of the first colliding geom along a ray, or -1 and -1."""
+    """Return the distance and id of the first colliding geom along a ray, or -1 and -1 if it hits none."""
     geom = np.array([-1], np.int32)
     groups = np.array([1, 0, 0, 1, 0, 0], np.uint8)
     return mujoco.mj_ray(compiled.model, compiled.data, start, along, groups, 1, -1, geom), int(geom[0])

@@ -1,4 +1,4 @@
-"""Outlines of models from above and from the sides, for the pictures of `mjsim check`. They need no OpenGL."""
+"""Outlines of models from above and from the sides, for the images of `mjsim check`. Drawing needs no OpenGL."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ from mjsim.values.episode import Episode
 from mjsim.values.errors import AssetError
 
 Point = tuple[float, float]
-_BAND = (0.05, 1.8)  # range of heights of a house that is drawn, m
+_BAND = (0.05, 1.8)  # heights between which a house is drawn, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Outlines of a model in metres, seen along an axis."""
+    """Outlines of a model seen along an axis, in metres."""
 
-    title: str  # direction of view
-    axes: tuple[int, int]  # indices of the coordinates that point right and up: (0, 1) from above
-    outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each (k, 2)
-    rooms: tuple[tuple[str, NDArray[np.float64]], ...] = ()  # name and corners (4, 2) of each rectangle
-    marks: Mapping[str, Point] = field(default_factory=dict)  # name -> point, of sites, receptacles, objects
+    title: str  # name of the view
+    axes: tuple[int, int]  # indices of the coordinates that point right and up, (0, 1) for a view from above
+    outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each of shape (k, 2)
+    rooms: tuple[tuple[str, NDArray[np.float64]], ...] = ()  # name and corners (4, 2) of each room rectangle
+    marks: Mapping[str, Point] = field(default_factory=dict)  # named points: sites, receptacles and objects
 
 
 def floor_view(
@@ -35,7 +35,7 @@ def floor_view(
     receptacles: Mapping[str, ReceptacleGeometry] | None = None,
     episode: Episode | None = None,
 ) -> Drawing:
-    """Draw a house from above: obstacles, rooms, receptacles, and the objects and start of an episode."""
+    """Draw a house from above: obstacles, rooms, receptacles, and optionally an episode's objects and start."""
     marks = {key: _point(r.center, (0, 1)) for key, r in (receptacles or {}).items()}
     if episode is not None:
         marks |= {o.name: _point(o.position, (0, 1)) for o in episode.objects}
@@ -44,7 +44,7 @@ def floor_view(
 
 
 def side_views(compiled: Compiled) -> tuple[Drawing, ...]:
-    """Draw an object or a receptacle with its sites from above, from the front and from the right."""
+    """Draw an object or receptacle with its sites from above, from the front and from the right."""
     sites = {compiled.model.site(s).name: compiled.data.site_xpos[s] for s in range(compiled.model.nsite)}
     return tuple(
         Drawing(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
@@ -82,7 +82,11 @@ def _outlines(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
             )
             found.append(points[ConvexHull(points[:, :2]).vertices, :2])
-        except (AssetError, QhullError, ValueError):  # flat or not finite, as other rules report
+        except (
+            AssetError,
+            QhullError,
+            ValueError,
+        ):  # The geom is flat or not finite, which another rule reports.
             continue
     return tuple(found)
 
