@@ -1,1 +1,1 @@
-"""Studies with people: study file, recruitment, payments, data, rehearsal and the researcher's page."""
+"""Studies with human participants: study file, recruitment, payments, data, rehearsal and researcher's page."""

@@ -1,4 +1,4 @@
-"""The study file: a batch design (docs/batches.md) plus a `[study]` table. Error messages name the line."""
+"""Study files. A study file is a batch design (docs/batches.md) with an additional `[study]` table."""
 
 import hashlib
 import itertools
@@ -23,15 +23,15 @@ from experiments.visit.plan import COMPLETION, CONSENT, PHASES, PLAYED, Count, D
 from experiments.visit.texts import Texts, read_texts, story_file
 from mjsim.support.files import read_bytes
 
-TEMPLATE = Path(__file__).with_name("template.toml")  # of `mjsim study init`
+TEMPLATE = Path(__file__).with_name("template.toml")
 PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
-# an origin: scheme, host and port
+# origin of a web page: scheme, host and port
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]
 
-HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be addressed without TLS
+HERE = ("localhost", "127.0.0.1", "::1")  # hosts to which connections need no TLS
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,27 +39,29 @@ class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Pay(_Table, frozen=True):
-    """Payment of participants, in units of the currency."""
+    """Payments to participants, in units of `currency`."""
 
     currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
-    reward: Money = 0.0  # for completing the study
-    screen_out: Money = 0.0  # for screened-out participants
-    bonus_for_all: Money = 0.0  # additional payment for putting all objects away
-    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee, as a share of the pay
+    reward: Money = 0.0  # pay for completing the study
+    screen_out: Money = 0.0  # pay for screened-out participants
+    bonus_for_all: Money = 0.0  # bonus for putting all objects away
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = (
+        None  # platform fee, as a fraction of the pay
+    )
     wage: Money = 0.0  # hourly wage below which `mjsim study check` reports the pay as too low
-    partial: bool = False  # True to pay part of the reward to participants who leave during or after the task
+    partial: bool = False  # if True, participants who leave during or after the task get part of the reward
 
 
 class Recruitment(_Table, frozen=True):
-    """Recruitment platform, with the codes and ids that it expects."""
+    """The recruitment platform, with the codes and ids that its links contain."""
 
     platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
-    completed: Code = ""  # completion codes, as set up on the platform
+    completed: Code = ""  # completion code that is entered on the platform
     screened_out: Code = ""
     no_consent: Code = ""
-    study_id: Code = ""  # the platform's study id; participants of its other studies are refused
-    sites: tuple[Site, ...] = ()  # origins of the platform's pages, which embed an ExternalQuestion
-    api_url: str = ""  # URL of the platform's API, if not the default
+    study_id: Code = ""  # the platform's id of the study; links from other studies are refused
+    sites: tuple[Site, ...] = ()  # origins of the platform's pages that embed an ExternalQuestion
+    api_url: str = ""  # URL of the platform's API; empty for the default
 
     def __post_init__(self) -> None:
         url = urlsplit(self.api_url)
@@ -111,26 +113,25 @@ class StudySettings(_Table, frozen=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the design, with the trial of each wanted participant."""
+    """A cell of the design, with one trial for each participant wanted."""
 
     trials: Sequence[TrialConfig]
 
     @property
     def label(self) -> str:
-        """Condition and number of objects, such as `optimal, 6 objects`."""
         return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
 
     def trial(self, place: int) -> TrialConfig:
-        """Return the trial for the place with this index. Indexes beyond the last trial wrap around."""
+        """Return the trial at an index. Indices beyond the last trial wrap around."""
         return self.trials[place % len(self.trials)]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A validated study file with its texts."""
+    """A validated study file, with the texts that participants read."""
 
     path: Path
-    sha256: str  # hash of the file
+    sha256: str  # SHA-256 of the study file
     settings: StudySettings
     cells: Sequence[Cell]
     texts: Texts
@@ -144,7 +145,7 @@ class Study:
 
 
 def read_people_study(path: Path) -> Study:
-    """Read a study file.
+    """Read and validate a study file.
 
     Raises:
         ConfigError: The file is missing or not valid. The message names the file, the line and the value.
@@ -221,7 +222,7 @@ _KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
 
 
 def at_line(path: Path, text: str, message: str) -> str:
-    """Prefix a msgspec error message with the file and, if found, the line of the value."""
+    """Prefix a msgspec error message with the file and, if it can be found, the line of the value."""
     found = _PATH.search(message)
     wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
     if unknown := re.search(r"unknown field `([^`]+)`", message):
@@ -231,7 +232,7 @@ def at_line(path: Path, text: str, message: str) -> str:
 
 
 def line_of(text: str, wanted: str) -> int | None:
-    """Return the line of a key such as `study.pay.reward`, or of its nearest enclosing table if it is missing."""
+    """Return the line number of a key such as `study.pay.reward`, or else of its innermost table in the file."""
     table, best, depth = "", None, 0
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):

@@ -1,4 +1,4 @@
-"""The visit plan of a study."""
+"""Visit plans of studies."""
 
 import math
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from experiments.visit.store import Assignment, CellQuota
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
-    """Return the visit plan of a study. `film` shows the house; `platform` replaces the study's platform.
+    """Create a study's visit plan with a video of the house. `platform` can replace the study's own platform.
 
     Raises:
         ConfigError: A setting that the platform requires is missing.

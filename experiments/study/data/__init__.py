@@ -1,1 +1,1 @@
-"""Data of a study: collect, export, copy, erase and forget."""
+"""Collection, export and deletion of study data."""

@@ -1,4 +1,4 @@
-"""The tidy table of a study with people: one row per participant, from the database and the runs."""
+"""Collect a tidy table of a study from its database and runs, with one row per participant."""
 
 import csv
 import hashlib
@@ -25,21 +25,21 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
-FREE = ("line", "text")  # kinds of items with free-text answers
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # first characters of spreadsheet formulas
+FREE = ("line", "text")  # types of items that have free-text answers
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # characters with which a spreadsheet formula can start
 Row = TypeVar("Row", Answer, PhaseRow)
 _NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Collected:
-    """Data of a study, ready to be written.
+    """Collected data of a study.
 
     Attributes:
-        rows: Participants who ended the task, with measures and answers.
-        texts: Free-text answers as participant, item and text.
-        unfinished: Number of participants without a row, by status.
-        unusable: Reasons why runs cannot be read, by participant.
+        rows: One row per participant who ended the task, with measures and answers.
+        texts: Free-text answers. Each row has the participant, the item and the text.
+        unfinished: Number of participants who did not end the task, by status.
+        unusable: For each participant whose run cannot be read, the reason.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -49,9 +49,9 @@ class Collected:
 
 
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
-    """Collect the rows of all participants of a study whose runs are in `folder`.
+    """Collect the data of all participants whose runs are in `folder`.
 
-    Platform ids and participants who asked for their data to be deleted are left out.
+    Participants who asked for the deletion of their data are omitted, and so are all platform ids.
     """
     people = [person for person in await store.people() if not person.delete_wanted]
     check_people(study, people)
@@ -83,10 +83,10 @@ def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
 
 
 def check_people(study: Study, people: Sequence[PersonRow]) -> None:
-    """Check that real and simulated participants are not mixed.
+    """Check that a study has only real participants, and a rehearsal only simulated ones.
 
     Raises:
-        RecordError: A study has simulated participants, or a rehearsal has real ones.
+        RecordError: A participant is of the wrong type.
     """
     simulated = sum(person.platform == REHEARSAL for person in people)
     if simulated and not study.rehearsal:
@@ -99,7 +99,7 @@ def check_people(study: Study, people: Sequence[PersonRow]) -> None:
 
 
 def collect_visits(folder: Path) -> Collected:
-    """Collect the finished tasks of visits under a folder of `mjsim play`. Participants' links are left out."""
+    """Collect the finished tasks of all visits in an output folder of `mjsim play`, without participants' links."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     under_way = 0
@@ -128,12 +128,12 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 
 
 def person_name(person: PersonRow) -> str:
-    """Return the name by which tables refer to a participant, such as `p00012`."""
+    """Return the participant's name in tables, such as `p00012`."""
     return f"p{person.id:05d}"
 
 
 def visit_name(folder: str) -> str:
-    """Return the name by which tables refer to a visit of `mjsim play`, such as `v1b9c03af`."""
+    """Return the name in tables of a visit to `mjsim play`, such as `v1b9c03af`."""
     return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
 
 
@@ -146,7 +146,7 @@ def person_number(name: str) -> int:
 
 
 def harmless(text: str) -> str:
-    """Escape a text that a spreadsheet would evaluate as a formula."""
+    """Escape text that a spreadsheet would evaluate as a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
 
 
@@ -163,11 +163,6 @@ def _about(person: PersonRow, trial: TrialRow, phases: Sequence[PhaseRow]) -> di
 
 
 def _answers(items: Sequence[Item], answers: Sequence[Answer]) -> dict[str, Any]:
-    """Return a participant's final answers by table column.
-
-    Columns are named `likert_NAME` for scales, `answer_NAME` for other survey items and `PHASE_NAME` for numeric
-    answers of other phases.
-    """
     given = {(answer.phase, answer.item): answer.value for answer in answers if answer.final}
     columns: dict[str, Any] = {}
     for item in items:

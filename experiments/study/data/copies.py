@@ -1,4 +1,4 @@
-"""The list of copies made of a study's data, so that erasing a participant reaches them too."""
+"""A list of all copies of a study's data, from which participants must be erased too."""
 
 from collections.abc import Collection
 from datetime import UTC, datetime
@@ -9,14 +9,14 @@ import msgspec
 
 from mjsim.support.files import write_text_atomically
 
-INDEX = "copies.jsonl"  # in the study's folder; folders of tables and exports have their own
+INDEX = "copies.jsonl"
 
 DATABASES = ("backup", "database")
 Kind = Literal["backup", "database", "export", "table", "analysis", "film", "page", "metrics"]
 
 
 class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A file or folder made from study data. `source` is the part of the study's folder that it was made from."""
+    """A file or folder made from study data. `source` is the part of the study's folder from which it was made."""
 
     kind: Kind
     path: str
@@ -25,7 +25,7 @@ class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
-    """Record a copy in a folder's list. Call this before writing the copy."""
+    """Add a copy to a folder's list. Call this before writing the copy."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     line = msgspec.json.encode(Copy(kind, str(path.absolute()), made, source)) + b"\n"
     with (folder / INDEX).open("ab") as file:
@@ -33,7 +33,7 @@ def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
 
 
 def note_derived(source: Path, kind: Kind, path: Path) -> None:
-    """Record a file made from a run or table in the nearest parent folder that has a list of copies, if any."""
+    """Record a file made from a run or table in the list of the nearest parent folder that has one."""
     source = source.absolute()
     for folder in (source, *source.parents):
         if (folder / INDEX).is_file():
@@ -49,7 +49,6 @@ def copies(folder: Path) -> list[Copy]:
 
 
 def forget_copies(folder: Path, paths: Collection[str]) -> None:
-    """Remove deleted copies from the list."""
     if not paths:
         return
     left = [copy for copy in copies(folder) if copy.path not in paths]

@@ -1,4 +1,4 @@
-"""Erasing a participant from a study: first copies and files, then the database rows."""
+"""Erase a participant from a study. Copies and files are changed first, then the database."""
 
 import asyncio
 import csv
@@ -18,17 +18,17 @@ from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.store import PersonRow, Store, change_database
 from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
-LEFTOVER_S = 3600.0  # age from which temporary files are considered abandoned, in seconds
+LEFTOVER_S = 3600.0  # age at which temporary files are considered abandoned, in seconds
 
 
 async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
-    """Erase a participant from the study, and from its listed backups, tables and exports.
+    """Erase a participant from the study and from its recorded backups, tables and exports.
 
     Args:
-        name: Name of the participant in tables, such as `p00012`.
+        name: The participant's name in tables, such as `p00012`.
 
     Returns:
-        One line per copy that was changed or is missing.
+        One message per copy that was changed or is missing.
 
     Raises:
         ConfigError: `name` is not a participant's name.
@@ -56,7 +56,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
 
 async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who: str) -> list[str]:
     async def gone(other: Store) -> bool:
-        # Compare times of arrival too: after a backup is restored, the number may belong to another participant.
+        # Compare arrival times too, since numbers are assigned again after an old backup is restored.
         same = {one.id for one in await other.people() if one.created == person.created} & {person.id}
         for number in same:
             await other.erase(number, who, unpaid=True)
@@ -70,7 +70,7 @@ async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who:
 async def change_databases(
     store: Store, folder: Path, work: Callable[[Store], Awaitable[bool]], name: str
 ) -> list[str]:
-    """Apply `work` to the listed backups and restored databases. Return one line per changed or missing copy."""
+    """Apply `work` to all recorded backups and restored databases. Return one message per changed or missing copy."""
     study, told = await store.study(), []
     for copy in copies(folder):
         path = Path(copy.path)
@@ -83,9 +83,9 @@ async def change_databases(
 
 
 def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
-    """Remove a participant, by any of `names`, from the listed files of a folder. Return one line per file."""
+    """Remove a participant from the files made from a folder. Return one message per file."""
     told, deleted, listed = list[str](), set[str](), copies(folder)
-    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not record analyses
+    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not add analyses to the list
         listed.append(Copy("analysis", str(usual), ""))
     for place in {folder, *(Path(copy.path).parent for copy in listed)}:
         for left in place.glob(f"{WORK}*"):
@@ -123,7 +123,6 @@ def _shown(copy: Copy) -> str:
 
 
 def _remove_from_tables(folder: Path, names: Sequence[str]) -> bool:
-    """Remove a participant from the tables and runs of a folder. Return True if any were found."""
     found = False
     if (parquet := folder / f"{NAME}.parquet").is_file():
         rows = read_rows(parquet)

@@ -1,4 +1,4 @@
-"""The export of a study: tables, runs and a codebook in a folder that follows Psych-DS (psych-ds.github.io)."""
+"""Export a study as a Psych-DS data set (psych-ds.github.io) with tables, runs and a codebook."""
 
 import csv
 import io
@@ -49,7 +49,7 @@ class Variable:
     """A table column, as described in the codebook.
 
     Attributes:
-        levels: Values with their meanings, for columns with few values.
+        levels: The meaning of each value of a categorical column.
     """
 
     name: str
@@ -79,10 +79,10 @@ class Exported:
 
 
 async def export(study: Study, store: Store, folder: Path, out: Path, *, replace: bool = False) -> Exported:
-    """Write an export to `out` atomically.
+    """Export a study to the folder `out`, atomically.
 
-    Participants are numbered. The export contains no platform ids, links, hashes of links or addresses, and no
-    participants who did not consent or who asked for their data to be deleted.
+    Participants are identified by numbers. The export contains no platform ids, IP addresses, links or hashes of
+    links. It omits participants who did not consent or who asked for the deletion of their data.
 
     Raises:
         RecordError: `out` exists and cannot be replaced, or no participant has finished the task.
@@ -153,7 +153,6 @@ async def _phases(store: Store, people: Mapping[int, PersonRow]) -> Table:
 
 
 def _answers(study: Study, answers: Iterable[Answer]) -> Iterable[dict[str, Any]]:
-    """Yield one row per answer. Free texts are left out, and so is non-numeric data that belongs to no item."""
     kinds = {(name, item.name): item.kind for name, section in study.texts.items() for item in section.items}
     for answer in answers:
         kind, value = kinds.get((answer.phase, answer.item)), answer.value
@@ -179,7 +178,7 @@ def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
 
 
 def csv_text(table: Table) -> str:
-    """Return a table as CSV with formulas escaped."""
+    """Format a table as CSV, and escape texts that a spreadsheet would evaluate as formulas."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
     writer.writeheader()

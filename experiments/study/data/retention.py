@@ -1,4 +1,4 @@
-"""Deletion of identifying data by date (`keep_days` of the study file)."""
+"""Delete identifying data some days after a participant's last activity, as set by `keep_days` in the study file."""
 
 import asyncio
 import datetime
@@ -15,18 +15,18 @@ from experiments.study.data.erase import change_databases, erase, remove_from_fi
 from experiments.visit.store import PersonRow, Store, utc_now
 
 LOG = logging.getLogger("mjsim.study")
-WHO = "keep_days"  # author in the audit log
-DAY = 86400.0  # seconds
+WHO = "keep_days"  # name under which deletions appear in the audit log
+DAY = 86400.0  # one day, in seconds
 
 
 @dataclass(frozen=True)
 class Retained:
-    """Names of the participants whose data were deleted or kept.
+    """Names of all participants who have been inactive for long enough.
 
     Attributes:
-        forgotten: No longer identifiable.
-        erased: Deleted completely, as they had asked.
-        unpaid: Kept until they are paid.
+        forgotten: Participants whose identifying data was deleted.
+        erased: Participants whose data was deleted completely, at their request.
+        unpaid: Participants whose data is kept until they have been paid.
     """
 
     forgotten: tuple[str, ...]
@@ -39,11 +39,11 @@ async def forget_old(
 ) -> Retained:
     """Delete platform ids, keys and links of participants `keep_days` after their last activity.
 
-    Participants who asked for deletion are erased. Measures and answers of the others stay under their number.
-    Participants with an unpaid payment are skipped. Listed backups are changed, too.
+    Participants who asked for deletion are erased. The measures and answers of others are kept under their number.
+    Participants with a pending payment are skipped. Recorded backups are changed too.
 
     Args:
-        dry: Only report what would be deleted.
+        dry: Report the affected participants without deleting anything.
     """
     before = (now or utc_now()) - datetime.timedelta(days=keep_days)
     owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
@@ -51,7 +51,7 @@ async def forget_old(
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
     played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
-    # Skip participants whose runs are on another host, which deletes the data itself.
+    # Leave participants whose runs are on another host to that host.
     places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
     kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
@@ -73,13 +73,13 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
             found = await forget_old(store, visits, keep_days)
             if found.forgotten or found.erased:
                 LOG.info("%d people forgotten, %d erased", len(found.forgotten), len(found.erased))
-        except (StoreError, OSError) as error:  # try again tomorrow
+        except (StoreError, OSError) as error:  # the next try is tomorrow
             LOG.warning("%s", error)
         await asyncio.sleep(DAY)
 
 
 async def _names(store: Store, people: Sequence[PersonRow]) -> dict[int, str]:
-    """Return a new folder name for each participant. The old one, the hash of the link, would identify them."""
+    """Choose new folder names, since a hash of the link still identifies its participant."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
@@ -96,10 +96,10 @@ async def _forget(store: Store, visits: Path, people: Sequence[PersonRow], names
         return bool(identified)
 
     await change_databases(store, visits.parent, gone, "them")
-    for person in people:  # files made from visit folders contain the hash of the link
+    for person in people:  # derived files contain the old folder name, a hash of the link
         traces = (person.token_hash, visit_name(person.token_hash))
         await asyncio.to_thread(remove_from_files, visits.parent, traces)
-    for person in people:  # an interrupted run may have renamed some folders already
+    for person in people:  # an interrupted deletion may have renamed some folders already
         if (folder := visits / person.token_hash).is_dir():
             await asyncio.to_thread(folder.rename, visits / names[person.id])
     await store.forget(numbers, [names[number] for number in numbers], WHO)

@@ -1,1 +1,1 @@
-"""Payments of a study: rules, payouts and the platform's client."""
+"""Payments to participants: rules, payouts and the interface of recruitment platforms."""

@@ -1,4 +1,4 @@
-"""Payouts: sends the owed payments to the recruitment platform, each at most once."""
+"""Send owed payments to the recruitment platform, each at most once."""
 
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sent:
-    """Outcome of sending a payment.
+    """Result of an attempt to send a payment.
 
     Attributes:
         key: Key of the payment in the ledger.
-        state: `paid`, `refused` (it can be sent again), or `in doubt` (the platform may have paid).
-        text: The platform's reference, or the reason why it was not paid.
-        stops: True if the platform cannot pay anyone at the moment.
+        state: `paid`, `refused` (another attempt is possible) or `in doubt` (the platform may have paid).
+        text: The platform's reference, or the reason why the payment was not made.
+        stops: True if the platform can currently make no payments at all.
     """
 
     key: str
@@ -30,30 +30,29 @@ class Sent:
 
 
 class Sender:
-    """Sends owed payments to the platform, under keys that begin with the name of the study.
+    """Sends owed payments to the platform.
 
     Each attempt is recorded in the ledger before the request is sent. If the outcome of an attempt is unknown, the
-    payment is sent again only after the platform's lists are up to date and do not show it.
+    payment is sent again only when the platform's lists must show the first attempt and do not.
     """
 
     def __init__(self, study: str, store: Store, payer: Payer) -> None:
         self._study, self._ledger, self._identity, self._payer = study, store.ledger, store.identity, payer
 
     async def send(self) -> AsyncIterator[Sent]:
-        """Send all owed payments, and yield the outcome of each."""
+        """Send all owed payments, and yield the result of each."""
         for last in await self._ledger.owed(in_doubt_after=timedelta()):
             done = await self._settle(last) if last.in_doubt else None
             if done is None:
                 attempt = await self._ledger.begin_sending(last.key)
                 if attempt is None:
-                    continue  # another process is already sending it
+                    continue  # another process is already sending this payment
                 done = await self._send(last.key, await self._order(last, attempt))
             yield done
             if done.stops:
                 return
 
     async def _settle(self, last: PaymentEvent) -> Sent | None:
-        """Find out if an attempt with an unknown outcome was paid. Return None if it was not."""
         later = last.at + max(IN_DOUBT_AFTER, self._payer.listed_after)
         if later > await self._ledger.now():
             again = f"{later:%Y-%m-%d %H:%M} UTC"
@@ -88,7 +87,6 @@ class Sender:
         return Sent(key, "paid", reference)
 
     async def _made_before(self, order: Order) -> str | None:
-        """Return the platform's reference if it refused a payment that was made before, for example by hand."""
         try:
             return await _understood(self._payer.find(order))
         except (DeclinedError, UnsureError):

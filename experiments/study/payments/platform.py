@@ -1,4 +1,4 @@
-"""The payment interface of recruitment platforms, and an HTTP client for their APIs."""
+"""Payment interface of recruitment platforms, and an HTTP client for their APIs."""
 
 import asyncio
 import os
@@ -12,37 +12,37 @@ import httpx
 from experiments.errors import ConfigError, ExperimentError
 from experiments.visit.store.values import PaymentKind
 
-TIMEOUT = 30.0  # response timeout, in seconds; less than the ten minutes after which others may retry
-# number of attempts at a rate-limited request, and the longest delay between two of them, in seconds
+TIMEOUT = 30.0  # timeout for a response, in seconds; other processes may retry after ten minutes
+# maximum number of attempts if requests are rate-limited, and the longest delay between two, in seconds
 TRIES, LONGEST_WAIT = 4, 60.0
 LISTED_AFTER = timedelta(minutes=10)
-MAX_TEXT = 300  # maximum length of a platform's message
+MAX_TEXT = 300  # maximum length of a platform's error message, in characters
 TOO_MANY = 429
 
 
 class DeclinedError(ExperimentError):
-    """The platform did not carry out the request. The message gives the reason."""
+    """The platform refused the request or could not be reached."""
 
 
 class StoppedError(DeclinedError):
-    """The platform cannot pay anyone: it is unreachable, or rejects the secret."""
+    """The platform can make no payments, because it is unreachable or rejects the API secret."""
 
 
 class UnsureError(ExperimentError):
-    """The outcome of the request is unknown."""
+    """It is unknown whether the platform carried out the request."""
 
 
 @dataclass(frozen=True)
 class Order:
-    """A payment to be made by a platform.
+    """A payment to be made through a recruitment platform.
 
     Attributes:
-        key: Key of the payment, unique among all studies and the same for all attempts.
-        attempt: Number of the attempt to send it.
-        cents: Hundredths of the currency, 0 for a rejection.
-        why: Reason, shown to the participant.
-        identity: Ids that the platform sent when the participant arrived.
-        others: Bonuses that the participant has already received, in cents.
+        key: Key of the payment, which is unique among all studies and identical for all attempts.
+        attempt: Number of the attempt to make the payment.
+        cents: Amount in hundredths of the currency, or 0 for a rejection.
+        why: Reason for the payment, which is shown to the participant.
+        identity: Ids with which the participant arrived, by query parameter.
+        others: Amounts of the bonuses that the participant has already received, in hundredths of the currency.
     """
 
     key: str
@@ -55,14 +55,14 @@ class Order:
 
     @property
     def amount(self) -> str:
-        """Amount in units of the currency, such as `7.50`."""
+        """Amount as a decimal number, such as `7.50`."""
         return f"{self.cents // 100}.{self.cents % 100:02}"
 
     def id(self, name: str) -> str:
-        """Return one of the ids that the platform sent, by the name of its query parameter.
+        """Return the participant's id that the platform sent in a query parameter.
 
         Raises:
-            DeclinedError: The participant did not come from the platform, or the ids are erased.
+            DeclinedError: The participant did not come from the platform, or the ids have been erased.
         """
         if not (value := self.identity.get(name, "")):
             raise DeclinedError(f"the person's {name} is not known; pay by hand")
@@ -70,10 +70,10 @@ class Order:
 
 
 class Payer(Protocol):
-    """Client of a recruitment platform. Its methods raise DeclinedError and UnsureError.
+    """Payment client of a recruitment platform. Its methods raise DeclinedError and UnsureError.
 
     Attributes:
-        listed_after: Time after which the platform's lists reliably show the outcome of a request.
+        listed_after: Time until the platform's lists reliably show the outcome of a request.
         shortest_reason: Minimum length of the reason for a rejection, in characters.
     """
 
@@ -81,7 +81,7 @@ class Payer(Protocol):
     shortest_reason: int
 
     async def find(self, order: Order) -> str | None:
-        """Look for the payment on the platform. Return its reference, or None if it has not been made."""
+        """Find the payment in the platform's lists and return its reference. Return None if it has not been made."""
         ...
 
     async def send(self, order: Order) -> str:
@@ -106,8 +106,8 @@ class Api:
         """Send a request and return the JSON of the response, or None if it is empty.
 
         Raises:
-            DeclinedError: The request was not carried out, because the platform was unreachable or refused it.
-            UnsureError: The request may have been carried out, because there is no valid response.
+            DeclinedError: The platform was unreachable or refused the request.
+            UnsureError: There is no valid response, so the platform may have carried out the request.
         """
         for attempt in range(1, TRIES + 1):
             answer = await self._answer(method, path, request)
@@ -123,7 +123,7 @@ class Api:
             raise DeclinedError(f"the platform says {said}")
         try:
             return answer.json() if answer.content else None
-        except ValueError as error:  # such as the error page of a proxy
+        except ValueError as error:  # for example, a proxy may answer with an HTML page
             raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:
@@ -140,7 +140,7 @@ class Api:
 
 
 def secret(name: str) -> str:
-    """Return a secret from the environment. Raises ConfigError if it is missing or cannot be sent."""
+    """Read a secret from an environment variable. Raises ConfigError if it is missing or cannot be sent in a header."""
     if not (value := os.environ.get(name, "").strip()):
         raise ConfigError(f"{name} is not set in the environment; it holds the platform's secret for paying")
     if not (value.isascii() and value.isprintable()):

@@ -1,4 +1,4 @@
-"""Payment rules of a study. Decided payments are recorded in the ledger."""
+"""Apply a study's payment rules and record the payments that are due."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from experiments.visit.store.values import PaymentKind
 
 @dataclass(frozen=True)
 class Due:
-    """A payment required by the rules."""
+    """A payment that is due to a participant."""
 
     person_id: int
     kind: PaymentKind
@@ -29,9 +29,9 @@ class Due:
 def due(
     study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """Return the payments required by the study file's rules, in the participants' order of arrival.
+    """Return the payments that are due by the study file's rules, in the participants' order of arrival.
 
-    Active and rejected participants get nothing.
+    No payments are due to active or rejected participants.
     """
     pay, phases = study.settings.pay, study.settings.phases
     delivered = {row.person_id for row in trials if row.phase == TASK and row.ended == ALL_DELIVERED}
@@ -65,7 +65,7 @@ def due(
 
 
 def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[Due]:
-    """Return the payments that are not in the ledger yet. Recorded payments are final, even if the rules change."""
+    """Return the payments that are not in the ledger yet. Recorded payments remain valid even if the rules change."""
     known = {event.key for event in history}
     once = {event.person_id for event in history if event.kind in ONCE}
     return [
@@ -74,7 +74,7 @@ def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[
 
 
 async def decide(store: Store, payments: Sequence[Due]) -> int:
-    """Record due payments in the ledger, and return the number of new ones. Repeated calls add nothing."""
+    """Add the given payments to the ledger unless they are recorded already. Return the number added."""
     new = 0
     for payment in undecided(payments, await store.ledger.history()):
         person, kind, cents = payment.person_id, payment.kind, payment.cents
@@ -83,10 +83,10 @@ async def decide(store: Store, payments: Sequence[Due]) -> int:
 
 
 async def reject(store: Store, person: PersonRow, currency: str, why: str) -> None:
-    """Record the rejection of a finished participant. It is sent to the platform with the payments.
+    """Record that a participant's work is rejected. The platform is notified when payments are sent.
 
     Raises:
-        StoreError: The participant did not finish, or a payment is already decided.
+        StoreError: The participant did not finish the study, or a payment is already recorded.
     """
     name = person_name(person)
     if person.status != "finished":

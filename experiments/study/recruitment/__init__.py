@@ -1,4 +1,4 @@
-"""Recruitment platforms. Each module has a recruiter for arrivals and a client for payments."""
+"""Recruitment platforms. Each module handles arriving participants and payments on one platform."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from experiments.study.recruitment.external_question import ExternalQuestion, Ex
 from experiments.study.recruitment.prolific import Prolific, ProlificPayer
 from experiments.visit.recruiter import OpenLink, Recruiter
 
-# Settings that each platform requires.
+# Keys of the table `[study.recruitment]` that each platform requires.
 NEEDED: Mapping[str, Sequence[str]] = {
     "prolific": ("completed", "screened_out", "no_consent"),
     "connect": ("completed",),
@@ -20,10 +20,10 @@ PAY_DOLLARS = ("connect", "external-question")
 
 
 def recruiter(settings: Recruitment) -> Recruiter:
-    """Return the recruiter of a study's platform.
+    """Create the recruiter for a study's recruitment platform.
 
     Raises:
-        ConfigError: A setting that the platform requires is missing.
+        ConfigError: The study file lacks a setting that the platform requires.
     """
     for name in NEEDED.get(settings.platform, ()):
         if not getattr(settings, name):
@@ -40,10 +40,10 @@ def recruiter(settings: Recruitment) -> Recruiter:
 
 
 def payer(settings: StudySettings) -> Payer:
-    """Return the client that pays through a study's platform.
+    """Create the payment client for a study's recruitment platform.
 
     Raises:
-        ConfigError: The platform makes no payments, or not in this currency, or the environment lacks its secret.
+        ConfigError: The platform cannot pay, does not support the currency, or has no secret in the environment.
     """
     recruitment, currency = settings.recruitment, settings.pay.currency
     if recruitment.platform in PAY_DOLLARS and currency != "USD":

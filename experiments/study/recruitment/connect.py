@@ -1,8 +1,7 @@
-"""CloudResearch Connect: links with three parameters, the completion page, and its API (v1).
+"""Recruitment and payments through CloudResearch Connect (API v1).
 
-The platform's public help documents links and completion. The API is documented only for customers. This module uses
-the calls that public clients use: approve, reject and pay a bonus for an assignment, and list the assignments of a
-project. Amounts are US dollars.
+The platform's public help describes only links and completion pages. The API calls are those of public clients: approve
+or reject an assignment, pay a bonus, and list the assignments of a project. Amounts are in US dollars.
 """
 
 import re
@@ -20,7 +19,7 @@ _ID = re.compile(r"[0-9A-Za-z-]{4,64}")
 
 
 class Connect:
-    """Recruiter for one project of the platform."""
+    """Recruiter for a project on CloudResearch Connect."""
 
     platform = "connect"
     parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)
@@ -39,14 +38,14 @@ class Connect:
             return InvalidLink(f"{PROJECT} is not that of this study")
         return Candidate(ids[PERSON], ids)
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code suffices
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002
         if how != "finished":
             return WayBack(gives_back=True)
         return WayBack(self._code, f"{self._site}/participant/project/{self._code}/complete")
 
 
 class ConnectPayer:
-    """Approves and rejects assignments, and pays bonuses. An approval makes the platform pay the project's reward."""
+    """Payment client for CloudResearch Connect. Approving an assignment makes the platform pay the project's reward."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -57,7 +56,7 @@ class ConnectPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Find the payment by the assignment's status or the sum of its bonuses."""
+        """Look for the payment in the assignment's status or the sum of its bonuses."""
         listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
         mine: Mapping[str, Any] = next(
             (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}
@@ -69,7 +68,7 @@ class ConnectPayer:
         return "listed with the assignment" if paid >= sum(order.others) + order.cents else None
 
     async def send(self, order: Order) -> str:
-        """Approve, reject or pay a bonus. The platform refuses a second request with the same token."""
+        """Approve or reject the assignment, or pay a bonus. The platform refuses to use the same token twice."""
         action = {"reward": "approve", "rejection": "reject"}.get(order.kind, "bonus")
         row = {"id": order.id(ASSIGNMENT), "message": order.why}
         body: Mapping[str, Any] = {"participants": [row]}

@@ -1,8 +1,8 @@
-"""ExternalQuestion, as on Mechanical Turk: the study runs in a frame of the platform's page and ends with a form.
+"""Recruitment and payments through the ExternalQuestion interface of Mechanical Turk.
 
-Mechanical Turk closed on 2026-09-30. Platforms with the same interface are configured in the study file: `sites`, whose
-pages embed the study and receive its form, and `api_url`. The client calls the operations of Mechanical Turk's API
-(2017-01-17) as JSON. A secret in `Authorization` replaces the signature.
+The platform embeds the study in a frame and receives a form at the end. Mechanical Turk closed on 2026-09-30. For other
+platforms with this interface, set `sites` and `api_url` in the study file. Requests are those of Mechanical Turk's API
+(2017-01-17) as JSON, but a secret in the header `Authorization` replaces the signature.
 """
 
 import json
@@ -24,7 +24,7 @@ _ID = re.compile(r"[0-9A-Za-z]{4,64}")
 
 
 class ExternalQuestion:
-    """Recruiter for one task (HIT) of a platform that embeds the study."""
+    """Recruiter for a task (HIT) on a platform that embeds the study in its pages."""
 
     platform = "external-question"
     parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)
@@ -34,7 +34,7 @@ class ExternalQuestion:
         self.embedded_by, self._task = settings.sites, settings.study_id
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Return a Preview if the task is not accepted yet. The query must name a site from the study file."""
+        """Validate the link of an arriving person. It must contain one of the `sites` of the study file."""
         if query.get(ASSIGNMENT) == PREVIEW:
             return Preview()
         ids = {name: query.get(name, "") for name in self.parameters}
@@ -55,7 +55,7 @@ class ExternalQuestion:
 
 
 class ExternalQuestionPayer:
-    """Approves and rejects assignments, and pays bonuses. An approval makes the platform pay the task's reward."""
+    """Payment client for ExternalQuestion tasks. Approving an assignment makes the platform pay the task's reward."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -71,7 +71,7 @@ class ExternalQuestionPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Find the payment by the assignment's status, or by its key in the reason for a bonus."""
+        """Look for the payment in the assignment's status, or for its key in the reasons of bonuses."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
         if done is not None:
@@ -82,7 +82,7 @@ class ExternalQuestionPayer:
         return "bonus" if named else None
 
     async def send(self, order: Order) -> str:
-        """Approve, reject or pay a bonus. The platform refuses a second bonus with the same token."""
+        """Approve or reject the assignment, or pay a bonus. The platform refuses a second bonus with the same token."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         if order.kind in ("reward", "rejection"):
             operation = "ApproveAssignment" if order.kind == "reward" else "RejectAssignment"

@@ -1,4 +1,4 @@
-"""Prolific: links with three parameters, completion codes in the return URL, and its API (v1)."""
+"""Recruitment and payments through Prolific (API v1)."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ _ID = re.compile(r"[0-9A-Za-z]{8,64}")
 
 
 class Prolific:
-    """Recruiter for one study of the platform."""
+    """Recruiter for a study on Prolific."""
 
     platform = "prolific"
     parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)
@@ -41,7 +41,7 @@ class Prolific:
             return InvalidLink(f"{STUDY} is not that of this study")
         return Candidate(ids[PERSON], ids)
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - the code suffices
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002
         code = self._codes.get(how, "")
         if not code:
             return WayBack(gives_back=True)
@@ -49,11 +49,11 @@ class Prolific:
 
 
 class ProlificPayer:
-    """Approves and rejects submissions, and pays bonuses. An approval makes the platform pay the study's reward.
+    """Payment client for Prolific. Approving a submission makes the platform pay the study's reward.
 
-    Screened-out participants get the amount that the platform's study sets for them. A partial payment is a bonus.
-    Bonuses can also be paid for a returned submission. The platform would pay a prepared bonus twice if asked twice, so
-    the submission's list of bonuses, which is some minutes late, decides whether a bonus was paid.
+    The study's settings on the platform determine the pay of screened-out participants. Partial payments are bonuses,
+    which can be paid even for a returned submission. The platform does not refuse duplicate bonuses, so a retry first
+    consults the submission's list of bonuses, which lags by some minutes.
     """
 
     listed_after = timedelta(hours=1)
@@ -66,7 +66,7 @@ class ProlificPayer:
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
-        """Find the payment by the submission's status or the amounts of its bonuses."""
+        """Look for the payment in the submission's status or the amounts of its bonuses."""
         submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
         done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
         if done is not None:
@@ -76,7 +76,7 @@ class ProlificPayer:
         return "listed with the submission" if paid else None
 
     async def send(self, order: Order) -> str:
-        """Change the status of the submission, or prepare and pay a bonus."""
+        """Approve, reject or screen out the submission, or pay a bonus."""
         changes: Mapping[str, Mapping[str, str]] = {
             "reward": {"action": "APPROVE"},
             "screen_out": {"action": "COMPLETE", "completion_code": self._screened_out},
@@ -94,7 +94,6 @@ class ProlificPayer:
         await self._api.close()
 
     async def _prepare(self, order: Order) -> str:
-        """Prepare a bonus without paying it, and return its number."""
         row: Mapping[str, Any] = {
             "study_id": order.id(STUDY),
             "csv_bonuses": f"{order.id(SUBMISSION)},{order.amount}",

@@ -1,1 +1,1 @@
-"""Rehearsals: simulated participants on the study's real server."""
+"""Rehearsals, in which simulated participants visit a study's real server."""

@@ -1,4 +1,4 @@
-"""Cost and duration of a study, and the effects that it can detect."""
+"""Estimates of a study's cost and duration, and of the effects that it can detect."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases.base import Phase
 
-# time to answer an item, in seconds: think, point, click (Card, Moran and Newell, CACM 23, 1980)
+# time to choose an answer and click it, in seconds (Card, Moran and Newell, CACM 23, 1980)
 CHOOSING = 2.65
-WRITING = 20.0  # time to write a free-text answer, in seconds (a guess)
-PEOPLE = 2  # number of simulated participants per cell
-GUEST = "guest"  # simulated participant, if the study file names none
+WRITING = 20.0  # assumed time to write a free-text answer, in seconds
+PEOPLE = 2  # number of participants simulated in each cell
+GUEST = "guest"  # simulated participant to use if the study file names none
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class TrialDurations:
     """Mean durations of simulated trials, in seconds."""
 
     training: float
-    tasks: Mapping[str, float]  # by cell
+    tasks: Mapping[str, float]  # by label of the cell
 
 
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
-    """Simulate trials of each cell, write their runs to `folder`, and return mean durations."""
+    """Simulate some trials of each cell, write their runs to `folder`, and return their mean durations."""
     trials = [_simulated(cell, study.path) for cell in study.cells]
     house = House.load(trials[0][0].house)
 
@@ -71,7 +71,7 @@ def durations(
 ) -> dict[str, float]:
     """Return the expected duration of each phase, in seconds.
 
-    This is the time for reading, answering, the film and trials (averaged over cells), or the minimum time if longer.
+    A duration includes reading, answering, watching the film and playing. It is never less than the phase's minimum.
     """
     found = {}
     for phase in phases:
@@ -89,13 +89,13 @@ def durations(
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a study, in units of its currency.
+    """Estimated cost of a study, in units of its currency.
 
     Attributes:
-        rewards: Rewards of all wanted participants.
-        bonuses: Bonuses, if every participant gets one.
-        fee: Platform fee on rewards and bonuses, or None if the study file states none.
-        hourly: Reward per hour, if the study takes the announced minutes.
+        rewards: Rewards if all participants finish.
+        bonuses: Bonuses if all participants earn them.
+        fee: Platform fee on rewards and bonuses. None if the study file does not specify it.
+        hourly: Hourly wage if a visit takes as long as announced.
     """
 
     rewards: float
@@ -105,7 +105,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """Upper bound of the cost, excluding payments to screened-out participants."""
+        """Maximum cost without payments to screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 
@@ -117,7 +117,7 @@ def cost(study: Study) -> Cost:
 
 
 def detectable(study: Study) -> dict[str, float]:
-    """Return the smallest detectable partial eta squared of each effect, with 80 % power at a level of 5 %."""
+    """Return the partial eta squared of each effect that is detected with 80 % power at a significance level of 5 %."""
     conditions = {cell.trials[0].assistance for cell in study.cells}
     levels = {cell.trials[0].objects for cell in study.cells}
     if len(conditions) * len(levels) != len(study.cells) or study.people <= len(study.cells):

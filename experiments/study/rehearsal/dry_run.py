@@ -1,4 +1,4 @@
-"""A dry run: a short rehearsal with one participant for each way in which a visit can end."""
+"""Dry runs. A dry run is a short rehearsal with one simulated participant for each way in which a visit can end."""
 
 import asyncio
 import socket
@@ -31,18 +31,18 @@ from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
 from experiments.web.server.pool import WorkerPool
 
-MINIMUM_S = 1.0  # cap on the minimum times of phases, in seconds
-TASK_S = 1.0  # duration of the task, in seconds
-PLACES = 10  # how often the trials of a cell are repeated, so that every participant gets a place
-FACTOR = 1e6  # factor by which reading is sped up
-TIMEOUT_S = 400.0  # HTTP timeout, in seconds; long, since code may have to be compiled
+MINIMUM_S = 1.0  # upper limit for the minimum times of phases, in seconds
+TASK_S = 1.0
+PLACES = 10  # number of times that the trials of a cell are repeated, so that no participant is turned away
+FACTOR = 1e6  # factor by which reading times are divided
+TIMEOUT_S = 400.0  # HTTP timeout, in seconds; the first request may wait for compilation
 
-Photograph = Callable[[str, str], Awaitable[None]]  # called with a name and a URL
+Photograph = Callable[[str, str], Awaitable[None]]  # is called with the name and URL of a page
 
 
 @dataclass
 class Walked:
-    """Result of a dry run."""
+    """Faults found in a dry run, and the number of words on each page."""
 
     faults: list[str] = field(default_factory=list)
     words: dict[str, int] = field(default_factory=dict)
@@ -51,10 +51,10 @@ class Walked:
 async def dry_run(
     study: Study, platform: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
 ) -> Walked:
-    """Send simulated participants through a study. One finishes it, and the others leave early, each in its own way.
+    """Send simulated participants through a study. One finishes it, and each of the others leaves in a different way.
 
-    Every phase must refuse wrong and early forms, and accept a correct form only once. Minimum times are at most one
-    second, and the task ends after a second.
+    Every phase must refuse wrong and early forms, and accept a correct form only once. Minimum times and the task are
+    limited to one second.
     """
     study = rehearsed(_shortened(study), 1.0)
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
@@ -182,7 +182,6 @@ class _Server(uvicorn.Server):
 
 @asynccontextmanager
 async def _serving(app: Any) -> AsyncIterator[str]:
-    """Serve an application on a free local port, and yield its URL."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
         config = uvicorn.Config(
             app, log_config=None, access_log=False, log_level="error", ws="websockets-sansio",

@@ -1,4 +1,4 @@
-"""The WebSocket client with which a simulated participant plays trials."""
+"""WebSocket client with which a simulated participant plays trials."""
 
 import asyncio
 import contextlib
@@ -13,18 +13,18 @@ from websockets.typing import Origin
 
 from experiments.study.rehearsal.player import STEPS, SimulatedPlayer
 
-ANSWER_TIMEOUT = 2.0  # time to wait for a new state before sending the next input, in seconds
-DELAYED = 15  # number of inputs that a slow connection delays
-OPENING_TIMEOUT = 600.0  # how long to wait until a session is ready, in seconds
+ANSWER_TIMEOUT = 2.0  # timeout for a new state before the next input is sent, in seconds
+DELAYED = 15  # number of inputs at the start that a slow connection delays
+OPENING_TIMEOUT = 600.0  # timeout for a session to get ready, in seconds
 VIEW = {"type": "view", "width": 1280, "height": 720, "codec": "none"}
 
 
 class LostError(Exception):
-    """The server closed the connection or does not answer."""
+    """The server has closed the connection or does not answer."""
 
 
 class Link:
-    """A connection to a trial, opened by :func:`connected`. `decisions` counts the inputs sent."""
+    """A connection to a trial, opened by :func:`connected`. `decisions` is the number of inputs sent."""
 
     def __init__(self, socket: ClientConnection, player: SimulatedPlayer) -> None:
         self._socket, self._player = socket, player
@@ -35,19 +35,16 @@ class Link:
         self.refused: list[str] = []
 
     async def occupied(self) -> None:
-        """Wait until the server reports that another page holds the session."""
+        """Wait until the server reports that the session is open in another page."""
         await self._wait(lambda: self._occupied, OPENING_TIMEOUT)
 
     def cut(self) -> None:
         self._socket.transport.abort()
 
     async def play(self, decisions: int, delay: float) -> bool:
-        """Play until the trial is saved or `decisions` inputs were sent. Return True if it was saved.
+        """Play until the trial is saved or `decisions` inputs have been sent. Return True if the trial was saved.
 
-        `delay` is the time by which the first inputs are delayed, in seconds.
-
-        Raises:
-            LostError: The connection is lost.
+        The first inputs are delayed by `delay` seconds. Raises LostError if the connection is lost.
         """
         await self._wait(
             lambda: self._phase in ("ready", "paused", "over") or self._occupied, OPENING_TIMEOUT
@@ -90,7 +87,6 @@ class Link:
         await self._news.wait()
 
     async def say(self, **message: Any) -> None:
-        """Send a message. Raises LostError if the connection is lost."""
         try:
             await self._socket.send(json.dumps(message))
         except WebSocketException as error:
@@ -130,7 +126,7 @@ class Link:
 async def connected(
     base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
 ) -> AsyncIterator[Link]:
-    """Connect to a trial like a browser page, and disconnect at the end."""
+    """Connect to a trial as a browser page would. The connection is closed at the end of the context."""
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:
         link = Link(socket, player)

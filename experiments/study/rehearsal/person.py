@@ -1,4 +1,4 @@
-"""A simulated person, who visits a study's pages by HTTP and plays its trials by WebSocket."""
+"""Simulated participants, who visit a study's pages by HTTP and play its trials by WebSocket."""
 
 import asyncio
 import re
@@ -20,23 +20,23 @@ from experiments.visit.plan import COMPREHENSION
 from experiments.visit.texts.items import Item
 
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
-READING = 15.0  # mean reading time of a page, in seconds of study time
-AWAY = 600.0  # longest absence of a returning person, in seconds of study time
+READING = 15.0  # mean time to read a page, in seconds of study time
+AWAY = 600.0  # longest absence of a returning participant, in seconds of study time
 DELAY = 0.2  # delay of the first inputs on a bad connection, in seconds
-CUTS = 3  # how often a bad connection is cut per trial
-TRIES = 20  # number of attempts to connect to a trial or to submit a form
-QUEUED = 'http-equiv="refresh"'  # marks the queue page
-QUEUE_PAUSE = 3.0  # polling period of the queue page, in seconds
+CUTS = 3  # number of times that a bad connection is cut during a trial
+TRIES = 20  # maximum number of attempts to connect to a trial or to submit a form
+QUEUED = 'http-equiv="refresh"'  # text by which the queue page is recognized
+QUEUE_PAUSE = 3.0  # time between two requests of the queue page, in seconds
 PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
 
 
 @dataclass
 class Rehearsed:
-    """Progress and outcome of a simulated person.
+    """Progress and outcome of a simulated participant's visit.
 
     Attributes:
-        link: Path of the personal link, empty before the visit starts.
-        outcome: `finished`, the way of leaving, or `stuck`. Empty during the visit.
+        link: Path of the participant's personal link. Empty before the visit starts.
+        outcome: `finished`, `stuck`, or how the participant left. Empty during the visit.
         answers: Accepted forms, by phase.
     """
 
@@ -57,22 +57,24 @@ async def _ignore(name: str, page: httpx.Response) -> None:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Server, study and time scale, shared by all people of a rehearsal."""
+    """Server, study and time scale of a rehearsal, shared by all simulated participants."""
 
     base: str
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
     house: House
-    parameters: Mapping[str, str]  # query parameters of links; a person's id replaces empty values
-    minimum: Mapping[str, float]  # minimum times on the server, in seconds
-    attempts: int  # allowed attempts at the comprehension check
-    factor: float  # factor by which waiting is sped up
-    hasty: bool = False  # True to also submit forms too early, which the server must refuse
-    watch: Watch = _ignore  # called with the name of each page and the response
+    parameters: Mapping[
+        str, str
+    ]  # query parameters of links; empty values are replaced by the participant's id
+    minimum: Mapping[str, float]  # minimum durations enforced by the server, in seconds, by phase
+    attempts: int  # number of attempts allowed at the comprehension check
+    factor: float  # factor by which waiting times are divided
+    hasty: bool = False  # if True, forms are also submitted too early, which the server must refuse
+    watch: Watch = _ignore  # is called with the name of each page and the response
 
 
 class SimulatedPerson:
-    """A simulated person who visits the study as planned."""
+    """A simulated participant who visits the study as planned."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed
@@ -82,7 +84,7 @@ class SimulatedPerson:
         self._headers = {"Origin": around.base, "X-Forwarded-For": f"10.0.{number // 250}.{number % 250 + 1}"}
 
     async def begin(self) -> None:
-        """Start a visit and store its link. If two starts are planned, both must give the same link."""
+        """Start a visit and store its link. If the participant starts it twice, both links must be the same."""
         number = self._planned.number
         ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
         await self._around.watch("welcome", await self._get("/", ids))
@@ -95,7 +97,7 @@ class SimulatedPerson:
             self.rehearsed.link = link
 
     async def go(self) -> None:
-        """Go through the study from the current page to the end, and store the outcome."""
+        """Continue the visit from the current page to its end, and store the outcome."""
         self.rehearsed.outcome = await self._go()
 
     async def _go(self) -> str:
@@ -143,11 +145,10 @@ class SimulatedPerson:
             self._fault(f"the page says {page.status_code}")
             return "stuck"
         how = self._planned.leaves
-        # A trial may end before the moment at which its participant was to leave. The visit then finishes.
+        # A participant who plans to leave during a trial finishes the visit if the trial ends first.
         return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
-        """Read a page, answer and submit. Some people submit a wrong form first, or every form twice."""
         rng, link, factor = self._rng, self.rehearsed.link, self._around.factor
         await asyncio.sleep(float(rng.exponential(READING)) / factor)
         form = form_of(phase, rng)
@@ -186,7 +187,6 @@ class SimulatedPerson:
         return how
 
     async def _play(self, trial: str, leaves: bool) -> bool:
-        """Play a trial, reconnecting after planned interruptions. Return False if the person leaves during it."""
         planned, rng = self._planned, self._rng
         breaks = [(moment(trial, rng), "cut") for _ in range(CUTS * planned.bad)]
         breaks += [(moment(trial, rng), "second page")] * planned.twice
@@ -244,7 +244,7 @@ class SimulatedPerson:
     async def _answered(self, method: str, path: str, **more: Any) -> httpx.Response:
         try:
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
-        except httpx.TransportError as error:  # a person would reload the page
+        except httpx.TransportError as error:  # try again, as a participant would by reloading the page
             self._fault(f"{method} of a page was not answered: {type(error).__name__}")
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
         if answer.is_server_error:
@@ -259,7 +259,7 @@ MARK = "Rehearsal: drawn at random"
 
 
 def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a form that the phase accepts. For a custom phase without items, it has no answers."""
+    """Return a form that the phase accepts. It has no answers if a custom phase has no items."""
     example: dict[str, Any] = getattr(phase, "example", dict)()
     items = phase.items if isinstance(phase, FormPhase) else ()
     points = len(phase.texts.scale) if isinstance(phase, FormPhase) else 0
@@ -270,7 +270,7 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
     """Return a form that the phase must refuse, or None if it accepts any.
 
-    It answers a question wrongly if one has a right answer. Otherwise all answers are missing.
+    If a question has a right answer, the form has a wrong one. Otherwise, all answers are missing.
     """
     example: dict[str, Any] = getattr(phase, "example", dict)()
     for item in phase.items if isinstance(phase, FormPhase) else ():

@@ -1,4 +1,4 @@
-"""Screenshots of pages, taken by an installed Chromium through its DevTools protocol."""
+"""Take screenshots of pages with an installed Chromium, through its DevTools protocol."""
 
 import asyncio
 import base64
@@ -20,14 +20,14 @@ from mjsim.support.files import write_text_atomically
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # window sizes, in pixels
 MAX_HEIGHT = 6000  # maximum height of a screenshot, in pixels
-SETTLE = 1.5  # time for a page's scripts to run, in seconds
+SETTLE = 1.5  # delay before a screenshot in which a page's scripts can run, in seconds
 LOADING = 120.0  # timeout for loading a trial, in seconds
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
 START = 120.0  # timeout for the start of the browser, in seconds
 
 
 def browser() -> str | None:
-    """Return the path of an installed Chromium, or None."""
+    """Return the path of an installed Chromium, or None if there is none."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
@@ -46,7 +46,7 @@ class Camera:
         self._session = attached["sessionId"]
 
     async def photograph(self, name: str, url: str) -> None:
-        """Take a screenshot of a whole page at each size."""
+        """Take a screenshot of the whole page at each window size."""
         self.taken.append(f"{len(self.taken) + 1:02d}-{name.replace(':', '-')}")
         for size, (width, height) in SIZES.items():
             screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == "phone"}
@@ -58,7 +58,9 @@ class Camera:
             clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
-        await self._ask("Page.navigate", url="about:blank")  # makes the server release a trial's session
+        await self._ask(
+            "Page.navigate", url="about:blank"
+        )  # leave the page, so that the server ends a trial's session
 
     async def _settle(self) -> None:
         loop = asyncio.get_running_loop()
@@ -108,7 +110,6 @@ async def camera(program: str, folder: Path) -> AsyncIterator[Camera]:
 
 
 async def _address(profile: Path) -> str:
-    """Return the browser's DevTools address, which it writes into its profile."""
     file, loop = profile / "DevToolsActivePort", asyncio.get_running_loop()
     until = loop.time() + START
     while loop.time() < until:
@@ -120,7 +121,7 @@ async def _address(profile: Path) -> str:
 
 
 def write_contact_sheet(folder: Path, names: Sequence[str], title: str) -> Path:
-    """Write an HTML page with all screenshots, and return its path."""
+    """Write an HTML page that shows all screenshots, and return its path."""
     rows = "\n".join(
         f"<h2>{html.escape(name)}</h2><p>"
         + " ".join(

@@ -1,4 +1,4 @@
-"""The plan of a rehearsal: when simulated people arrive, leave, return, reload or lose the connection."""
+"""Plan when simulated participants arrive, leave, return, reload a page or lose the connection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,22 +14,22 @@ from experiments.visit.recruiter import Recruiter
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails", "gives up"]
 STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # query parameters of links
-RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # shares of all people
-HOW = (0.6, 0.2, 0.2)  # probabilities of vanishing, withdrawing, and withdrawing with deletion
+RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # fractions of all participants
+HOW = (0.6, 0.2, 0.2)  # probabilities of the first three ways of leaving
 
 
 @dataclass(frozen=True)
 class Planned:
-    """Planned behaviour of a simulated person.
+    """Planned behaviour of a simulated participant.
 
     Attributes:
         arrives: Time of arrival, in seconds of study time.
-        leaves: Way of leaving the study early, or None.
-        returns_in: Phase in which the person closes the page and later reopens the link, or None.
-        reloads_in: Phase in which the person reloads the page, or None.
-        bad: True if the connection is delayed and cut.
-        twice: True if forms are submitted twice at once, links opened twice, and trials opened in a second page.
-        wrong: True if each form is first submitted with a mistake.
+        leaves: How the participant leaves the study early, or None.
+        returns_in: Phase in which the participant closes the page and later reopens the link, or None.
+        reloads_in: Phase in which the participant reloads the page, or None.
+        bad: True if the connection is slow and interrupted.
+        twice: True if the participant submits forms twice, opens links twice, and opens trials in a second page.
+        wrong: True if the participant first submits each form with a mistake.
     """
 
     number: int
@@ -47,10 +47,10 @@ class Planned:
 def plan_people(
     phases: Sequence[str], people: int, seed: int, *, per_minute: float, dropouts: float
 ) -> list[Planned]:
-    """Plan the people of a rehearsal, in order of arrival. The same seed gives the same people.
+    """Plan the participants of a rehearsal, in order of arrival. The same seed gives the same plan.
 
     Args:
-        people: Number of people. Their arrivals are a Poisson process.
+        people: Number of participants. Their arrivals form a Poisson process.
         per_minute: Mean number of arrivals per minute of study time.
     """
     found, arrives = [], 0.0
@@ -87,19 +87,19 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 
 
 def moment(phase: str, rng: np.random.Generator) -> int:
-    """Draw the number of inputs after which a planned interruption of a trial happens."""
+    """Draw the number of inputs before a planned interruption of a trial."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
 
 
 def link_parameters(study: Study, platform: Recruiter) -> dict[str, str]:
-    """Return the query parameters of the platform's links. Those that identify a participant are empty."""
+    """Return the query parameters of the platform's links, with empty values for the ids of participants."""
     settings = study.settings.recruitment
     own = {**dict.fromkeys(STUDY_IDS, settings.study_id), SUBMIT_TO: next(iter(settings.sites), "")}
     return {name: own.get(name, "") for name in platform.parameters}
 
 
 def rehearsed(study: Study, factor: float) -> Study:
-    """Return a copy of the study for simulated people, with all waiting times divided by `factor`."""
+    """Copy a study for simulated participants, with minimum times and timeouts divided by `factor`."""
     settings = study.settings
     away = ("abandoned_after", "timed_out_after")
     shorter = {name: getattr(settings.limits, name) / factor for name in away}

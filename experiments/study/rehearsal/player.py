@@ -1,4 +1,4 @@
-"""A simulated player of a trial, which chooses its inputs from the protocol's messages (docs/protocol.md)."""
+"""Simulated player that chooses the inputs of a trial from the messages that browsers receive (docs/protocol.md)."""
 
 import math
 from collections.abc import Mapping
@@ -11,25 +11,28 @@ from planner.errors import UnreachableError
 
 STEP = 0.04  # duration of a control step, in seconds
 STEPS = 16  # control steps per input
-NEAR = 0.15  # distance at which a corner of the path is reached, in metres
+NEAR = 0.15  # distance from a corner of the path at which it counts as reached, in metres
 ALIGNED = 0.7  # largest heading error at which the player walks, in radians
-SEEN = 0.8  # distance at which a viewpoint counts as visited, in metres
-STUCK = 0.05  # progress within `STUCK_AFTER` inputs below which the player is stuck, in metres
+SEEN = 0.8  # distance from a viewpoint at which it counts as visited, in metres
+STUCK = 0.05  # the player is stuck if it moves less than this within `STUCK_AFTER` inputs, in metres
 STUCK_AFTER = 6
-BACKWARDS = 3  # number of backward inputs after getting stuck
+BACKWARDS = 3  # number of inputs for which a stuck player walks backwards
 PRESS_GAP = 15  # shortest time between two presses, in control steps
 
 
 class SimulatedPlayer:
-    """A player that puts objects away, walking along shortest paths.
+    """A player that puts objects away and walks along shortest paths.
 
-    It walks to the goal on the display. Without one, it walks to the nearest known object or bin, or searches.
+    It walks to the goal on the display, if there is one. Otherwise, it walks to the nearest known object or bin, or
+    searches for objects.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._models: dict[str, str] = {}
-        self._places: dict[str, tuple[float, float]] = {}  # known positions of objects outside their bins
+        self._places: dict[
+            str, tuple[float, float]
+        ] = {}  # last known positions of objects that are not put away
         self._held: tuple[str | None, str | None] = (None, None)
         self._goal: tuple[float, float] | None = None
         self._reach: Any = None
@@ -56,7 +59,7 @@ class SimulatedPlayer:
                 self._take_snapshot(message)
 
     def act(self) -> dict[str, Any]:
-        """Return the input for the next control steps, without the fields `number` and `step`."""
+        """Return the next input, without the fields `number` and `step`."""
         state = self.state
         if state is None or state["busy"]:
             return {}
@@ -83,7 +86,7 @@ class SimulatedPlayer:
         self.state = state
         self._models |= state["models"]
         for name in filter(None, self._held):
-            if name not in state["held"]:  # put away
+            if name not in state["held"]:  # the object has been put away
                 self._models.pop(name, None)
                 self._places.pop(name, None)
         self._held = (state["held"][0], state["held"][1])

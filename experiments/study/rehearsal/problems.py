@@ -9,16 +9,16 @@ from experiments.study.recruitment import recruiter
 from experiments.visit.plan import COMPREHENSION, CONSENT
 from mjsim.support.files import read_text
 
-PAID = ("prolific", "connect", "external-question")  # platforms whose participants are paid
+PAID = ("prolific", "connect", "external-question")  # platforms that pay participants
 EXAMPLES = ("your institution", "example.org", "example.com")
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A problem in a study file.
+    """A problem found in a study file.
 
     Attributes:
-        key: Key in the file, such as `study.contact`.
+        key: Key of the setting, such as `study.contact`.
     """
 
     key: str
@@ -26,7 +26,7 @@ class Problem:
 
 
 def problems_of_file(study: Study) -> list[Problem]:
-    """Return the problems that are found without simulating the study."""
+    """Return the problems that can be found without simulating the study."""
     return [Problem(f"study.{key}", text) for key, text in _found(study)]
 
 
@@ -58,7 +58,7 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
 
 
 def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:
-    """Check the announced minutes against the expected duration of the shortest and longest cell, in seconds."""
+    """Compare the announced duration with the expected durations of the shortest and longest cell, in seconds."""
     told, low, high = study.settings.minutes, shortest / 60, longest / 60
     if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
         return []

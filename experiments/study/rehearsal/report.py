@@ -1,4 +1,4 @@
-"""The report of a rehearsal, which compares the database with the people's own records."""
+"""Report of a rehearsal, which compares the database with the records of the simulated participants."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from experiments.visit.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
-STATUS: dict[str, Leaving] = {  # expected status in the database, by outcome
+STATUS: dict[str, Leaving] = {  # status expected in the database after each outcome of a visit
     "finished": "finished",
     "withdraws": "withdrawn",
     "withdraws and deletes": "withdrawn",
@@ -37,8 +37,8 @@ class RehearsalReport:
     """Result of a rehearsal.
 
     Attributes:
-        cells: Number of finished people, by cell.
-        owed: Sum of payments that would be due, in cents.
+        cells: Number of participants who finished, by cell.
+        owed: Total of all payments that would be due, in hundredths of the currency.
     """
 
     settings: RehearsalSettings
@@ -52,7 +52,7 @@ class RehearsalReport:
 async def report(
     study: Study, settings: RehearsalSettings, store: Store, people: Sequence[Rehearsed], out: Path
 ) -> RehearsalReport:
-    """Decide payments, collect and export, compare the database with the people's records, and write the report."""
+    """Record payments, export the data, compare the database with the participants' records, and write a report."""
     study, served = replace(study, rehearsal=True), out / SERVED
     known = {person.token_hash: person for person in await store.people()}
     faults = [f"person {one.number}: {fault}" for one in people for fault in one.faults]
@@ -91,15 +91,15 @@ PASSED, WITHOUT = "rehearsal passed", "pays without a rehearsal"
 
 
 async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, without: bool) -> None:
-    """Check that a rehearsal of this study file has passed, and record that in the audit log.
+    """Require a successful rehearsal of this study file, and record it in the audit log.
 
     Args:
-        folder: Folder of a rehearsal, or None if its success is already in the audit log.
-        without: True to go on without a rehearsal, which is recorded instead.
+        folder: Folder of a rehearsal, or None if the audit log already contains a successful one.
+        without: True to allow the study without a rehearsal. The audit log records this instead.
 
     Raises:
-        ConfigError: No rehearsal of this version of the study file has passed.
-        RecordError: The store holds simulated participants.
+        ConfigError: There is no successful rehearsal of this version of the study file.
+        RecordError: The database contains simulated participants.
     """
     check_people(study, await store.people())
     log = await store.audit_log()

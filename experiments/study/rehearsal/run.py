@@ -1,4 +1,4 @@
-"""A rehearsal: starts the study's server and sends simulated people to it."""
+"""Run a rehearsal, which starts the study's server and sends simulated participants to it."""
 
 import asyncio
 import contextlib
@@ -22,9 +22,9 @@ from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
-WORKERS = "20"  # number of concurrent trials, which need not run in real time
-END_TIMEOUT = 60.0  # timeout for stopping the server, in seconds
-HTTP_TIMEOUT = 120.0  # timeout for requests, in seconds
+WORKERS = "20"  # maximum number of concurrent trials; they need not run in real time
+END_TIMEOUT = 60.0  # timeout for the server to stop, in seconds
+HTTP_TIMEOUT = 120.0  # timeout for HTTP requests, in seconds
 
 
 class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,9 +33,9 @@ class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     study: str  # SHA-256 of the study file
     people: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
     seed: int
-    per_minute: float  # arrivals per minute of study time
-    dropouts: float  # share of people who leave early
-    factor: float  # factor by which waiting is sped up
+    per_minute: float  # mean number of arrivals per minute of study time
+    dropouts: float  # fraction of participants who leave early
+    factor: float  # factor by which waiting times are divided
 
 
 async def rehearse(
@@ -45,15 +45,15 @@ async def rehearse(
     film: Path | None,
     on_person: Callable[[Rehearsed], None],
 ) -> list[Rehearsed]:
-    """Simulate all people who have not finished yet. Return the results of all people, in order.
+    """Simulate the visits that have not ended yet. Return the results of all participants, in order.
 
     Args:
-        film: Film of the house, or None to let the server make it.
-        on_person: Called for each finished person, including those of an earlier run.
+        film: Video of the house, or None to have the server create it.
+        on_person: Is called for each visit that has ended, including those of an earlier run.
 
     Raises:
-        ConfigError: The folder holds another rehearsal.
-        RecordError: The server did not start, or stopped early.
+        ConfigError: The folder contains a different rehearsal.
+        RecordError: The server did not start, or stopped unexpectedly.
     """
     _keep(settings, out)
     known = read_people(out / PEOPLE)
@@ -72,7 +72,7 @@ async def rehearse(
 
 
 def read_people(path: Path) -> dict[int, Rehearsed]:
-    """Read the latest record of each person, by number."""
+    """Read the latest record of each simulated participant, by number."""
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = {}
     for line in lines:
@@ -107,7 +107,7 @@ async def _server(
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(
             *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
-        )  # a session of its own keeps Ctrl-C from reaching the server
+        )  # in a separate session, the server does not receive Ctrl-C
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
             if not url:
@@ -138,7 +138,7 @@ async def _send(
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
     minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
-    # Keep no idle connections, since the client would check all of them before each request.
+    # Keep no idle connections, because the client checks all of them before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(

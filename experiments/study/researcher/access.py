@@ -1,4 +1,4 @@
-"""Access to the researcher's page: login cookies, roles and rate limits."""
+"""Access control for the researcher's page: login cookies, roles and rate limits."""
 
 import asyncio
 import datetime
@@ -14,13 +14,17 @@ from experiments.web.server.guards import Rate
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
-ATTEMPTS = 10, 300.0  # limit of login attempts per address and per name, and its period in seconds
-CHECKS = 2  # concurrent password checks; each takes 64 MiB
-ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # each role has all rights of those before it
+ATTEMPTS = 10, 300.0  # maximum number of login attempts per address and per name, and its period in seconds
+CHECKS = 2  # maximum number of concurrent password checks, each of which needs 64 MiB
+ORDER: tuple[Role, ...] = (
+    "viewer",
+    "assistant",
+    "owner",
+)  # each role includes the permissions of those before it
 
 
 def may(who: Researcher, role: Role) -> bool:
-    """Return True if the researcher has the rights of `role`."""
+    """Return True if the researcher has the permissions of `role`."""
     return ORDER.index(who.role) >= ORDER.index(role)
 
 
@@ -43,7 +47,7 @@ class Access:
         return self._from.allows(address) and self._names.allows(name)
 
     async def log_in(self, connection: HTTPConnection, name: str, password: str) -> str | None:
-        """Start a login and return its token, or None if the credentials are wrong. An earlier login ends."""
+        """Log in and return the login's token, or None if the credentials are wrong. An earlier login is revoked."""
         async with self._checks:
             researcher = await self._researchers.check(name, password)
         if researcher is None:
@@ -54,7 +58,7 @@ class Access:
         return token
 
     async def log_out(self, connection: HTTPConnection) -> None:
-        """End the login that the cookie belongs to, if any."""
+        """Revoke the login of the cookie, if there is one."""
         if (token := self._token(connection)) is not None:
             await self._researchers.log_out(token_hash(token))
 

@@ -31,10 +31,10 @@ from experiments.web.server.sessions import Sessions
 from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
-HEALTH_TIMEOUT = 3.0  # timeout of the database during a health check, in seconds
-CHECK_PERIOD = 5.0  # how often the login of a watching researcher is checked, in seconds
-PAGE_SIZE = 100  # participants per page of the list
-MAX_WANTED = 1_000_000  # largest quota of a cell
+HEALTH_TIMEOUT = 3.0  # timeout for the database in a health check, in seconds
+CHECK_PERIOD = 5.0  # period at which the login of a watching researcher is checked, in seconds
+PAGE_SIZE = 100  # number of participants on each page of the list
+MAX_WANTED = 1_000_000  # largest number of participants that can be wanted in a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 UNKNOWN = "Not found", "This page does not exist."
 _PAGE = re.compile(r"\d{1,9}", re.ASCII)
@@ -43,7 +43,7 @@ Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class ResearcherContext:
-    """The data shown on the researcher's page."""
+    """Data sources of the researcher's page."""
 
     study: Study
     store: Store
@@ -52,10 +52,10 @@ class ResearcherContext:
 
 
 class ResearcherServer:
-    """Server of the researcher's page, the health check and the metrics.
+    """Serves the researcher's page, the health check and the metrics.
 
     Args:
-        public: Public URL of the page behind a proxy, or None.
+        public: Public URL of the page if it is behind a proxy, or None.
         proxies: Proxies whose X-Forwarded-For header is trusted.
     """
 
@@ -68,7 +68,7 @@ class ResearcherServer:
         self._access = Access(watched.store.researchers, secure=secure)
 
     def app(self, host: str) -> Starlette:
-        """Return the ASGI application for a server that listens at `host`."""
+        """Create the ASGI application for a server that listens on `host`."""
         return Starlette(
             routes=[
                 Route("/health", self._health),
@@ -217,12 +217,12 @@ class ResearcherServer:
         try:
             while not (await asyncio.wait([watching], timeout=CHECK_PERIOD))[0]:
                 if await self._access.who(socket) is None:
-                    break  # logged out
+                    break  # the researcher has logged out
         finally:
             watching.cancel()
             with suppress(asyncio.CancelledError):
                 await watching
-        with suppress(RuntimeError, WebSocketDisconnect):  # already closed
+        with suppress(RuntimeError, WebSocketDisconnect):  # the connection is closed already
             await socket.close(1008)
 
     async def _audit(self, request: Request, who: Researcher) -> Response:
@@ -231,7 +231,7 @@ class ResearcherServer:
     def _change(
         self, role: Role, before: StudyState | None, after: StudyState
     ) -> Callable[[Request], Awaitable[Response]]:
-        """Return an endpoint that changes the study's state from `before`, or from any state if None, to `after`."""
+        """Create an endpoint that changes the study's state to `after`, from any state if `before` is None."""
 
         async def change(request: Request, who: Researcher) -> Response:
             state = (await self._store.study()).state

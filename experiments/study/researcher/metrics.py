@@ -1,4 +1,4 @@
-"""Prometheus metrics, and recent warnings and errors. They do not identify participants."""
+"""Prometheus metrics and recent log messages, without data that identifies participants."""
 
 import logging
 import time
@@ -14,13 +14,23 @@ from experiments.visit.store import Counts
 from experiments.web.server.player import Meter
 from experiments.web.server.sessions import Sessions
 
-LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # histogram buckets, in seconds
-KEPT = 50  # number of warnings and errors kept
+LATENCIES = (
+    0.01,
+    0.025,
+    0.05,
+    0.1,
+    0.25,
+    0.5,
+    1.0,
+    3.0,
+    10.0,
+)  # upper limits of histogram buckets, in seconds
+KEPT = 50  # number of recent warnings and errors to keep
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A warning or error in the log."""
+    """A warning or an error from the log."""
 
     at: datetime
     level: str
@@ -83,7 +93,7 @@ class ServerMetrics(Meter):
         self._answers.labels(f"{status // 100}xx").observe(seconds)
 
     def text(self, counts: Counts, sessions: Sessions) -> bytes:
-        """Return all metrics in the Prometheus text format."""
+        """Format all metrics in the Prometheus text format."""
         for gauge in (self._people, self._places, self._sessions):
             gauge.clear()
         for status, number in counts.statuses.items():
@@ -100,7 +110,7 @@ class ServerMetrics(Meter):
 
 
 class FaultLog(logging.Handler):
-    """Counts warnings and errors, and keeps the latest."""
+    """Log handler that counts warnings and errors and keeps the most recent ones."""
 
     def __init__(self, counter: Counter) -> None:
         super().__init__(logging.WARNING)

@@ -1,4 +1,4 @@
-"""The state of a study for the researcher's page: cells, phases, dropouts, frame rates and payments."""
+"""Summary of a study for the researcher's page: cells, phases, dropouts, frame rates and payments."""
 
 import statistics
 from collections import Counter
@@ -17,7 +17,7 @@ LEFT: tuple[Status, ...] = ("no_consent", "screened_out", "withdrawn", "timed_ou
 
 @dataclass(frozen=True)
 class CellLine:
-    """Places of a cell."""
+    """Numbers of places in a cell of the design."""
 
     index: int
     label: str
@@ -29,7 +29,7 @@ class CellLine:
 
 @dataclass(frozen=True)
 class PhaseLine:
-    """Participants in a phase: active ones (`here`), idle ones among them (`away`), and dropouts by status."""
+    """Numbers of active (`here`), idle (`away`) and dropped-out (`left`) participants in a phase."""
 
     name: str
     here: int
@@ -39,7 +39,7 @@ class PhaseLine:
 
 @dataclass(frozen=True)
 class Frames:
-    """Frame rates of several participants, in fps."""
+    """Number of participants whose frame rate was measured, and the lowest and median rate in fps."""
 
     people: int
     lowest: float
@@ -48,7 +48,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class PayLine:
-    """Payments of one kind and currency. Amounts are in hundredths of the currency."""
+    """Payments of one type and currency. Amounts are in hundredths of the currency."""
 
     kind: str
     currency: str
@@ -62,7 +62,7 @@ class PayLine:
 
 @dataclass(frozen=True)
 class Overview:
-    """State of a study. `checked` has the frame rates from device checks, `playing` those of current sessions."""
+    """Summary of a study. Frame rates are from device checks (`checked`) and from current sessions (`playing`)."""
 
     at: datetime
     state: StudyState
