@@ -1,1 +1,1 @@
-"""Trials and batches of trials: settings, designs, running and resuming them, and tables."""
+"""Trials and batches of trials: settings, designs, execution and result tables."""

@@ -1,4 +1,4 @@
-"""Runs many trials on all cores. Each finished trial is stored, so a killed batch can be resumed."""
+"""Runs a batch of trials in parallel. Each finished trial is stored, so a killed batch can be resumed."""
 
 import dataclasses
 import functools
@@ -34,12 +34,12 @@ from mjsim.house.compiled.house import MAX_HOUSES
 from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
-RETRIES = 5  # how often a trial is rerun after the loss of its machine before it is run alone
+RETRIES = 5  # how often a trial is rerun after its machine was lost, before it is run alone
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """Numbers of trials that this call has finished, that earlier calls finished, and that failed; the last failure."""
+    """Progress of a batch: trials finished by this call, finished earlier and failed, and the last error."""
 
     done: int
     resumed: int
@@ -60,26 +60,26 @@ def run_batch(
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
 ) -> list[Mapping[str, Any]]:
-    """Run every trial of the design that `out` does not hold yet, then write the tables.
+    """Run every trial of the design that is not in `out` yet, then write the tables.
 
     Args:
         design: The trials.
         out: Folder of the batch. An existing batch is extended.
-        workers: Number of trials at a time (default: one per core of this machine or of the Ray cluster).
+        workers: Number of trials that run in parallel (default: one per core of this machine or of the Ray cluster).
         executor: `processes` of this machine, or a `ray` cluster whose machines share the folder.
         packed: Store the trials in archives, one per worker process, instead of run directories.
-        shard: Run and read only this share of the design, and write no tables.
+        shard: Run and read only this part of the design, and write no tables.
         on_progress: Called at the start and after every trial.
-        on_note: Called with lines for the user, such as what is run again and what the tables leave out.
-        on_read: Called after each finished trial that is read, with the numbers of trials read and to be read.
+        on_note: Called with messages for the user, such as which trials are rerun or are missing from the tables.
+        on_read: Called after each finished trial is read, with the number of trials read so far and the total number.
 
     Returns:
-        A row for every trial in the folder, those of the design first and in its order. With a shard, only its own.
+        A row for each trial in the folder or, with a shard, in the shard. Those of the design come first, in its order.
 
     Raises:
         ConfigError: An argument is invalid, or a machine of the cluster cannot be used.
         ConnectionError: The Ray cluster is lost.
-        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run. No trial was run.
+        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run. No trials were run.
         OSError: A table cannot be written.
     """
     if workers is not None and workers < 1:
@@ -151,10 +151,6 @@ def _run_missing(
 def _results(
     missing: Mapping[Path, TrialConfig], executor: ExecutorContext, archives: str | None
 ) -> Iterator[StoredTrial | str]:
-    """Yield each trial that succeeds, or an error message. Trials whose process may die are run last, one by one.
-
-    Trials are run house by house, because making a house takes longer than many trials.
-    """
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
@@ -175,7 +171,7 @@ def _results(
 
 
 def _died(path: Path) -> Path:
-    """Return the marker file of a trial that was running when a process died. Another trial may have been the cause."""
+    """Return a marker file for a trial that was running when a process died. Another trial may have been the cause."""
     return path.with_name(f".{path.name}.died")
 
 
@@ -185,7 +181,6 @@ def _together(
     alone: dict[Path, TrialConfig],
     run: Callable[[TrialConfig, Path], StoredTrial | str],
 ) -> Iterator[StoredTrial | str]:
-    """Run the remaining trials, a few at a time. If a process dies, move the trials in progress to `alone`."""
     running: dict[Future[StoredTrial | str], tuple[Path, TrialConfig]] = {}
     lost, usable = Counter[Path](), True
     while True:
@@ -201,9 +196,7 @@ def _together(
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
             (path, config), error = running.pop(future), future.exception()
-            if isinstance(
-                error, ConfigError | ConnectionError
-            ):  # from the cluster, because trials return their errors as strings
+            if isinstance(error, ConfigError | ConnectionError):
                 raise error
             if isinstance(error, LostMachineError) and lost[path] < RETRIES:
                 lost[path], left[path] = lost[path] + 1, config
@@ -220,7 +213,6 @@ def _together(
 
 @functools.lru_cache(MAX_HOUSES)
 def _house(name: str) -> House:
-    """Load a house and cache a few per process. Freezing it speeds up garbage collection."""
     house = House.load(name)
     gc.freeze()
     return house
@@ -230,9 +222,10 @@ _archive = functools.cache(new_archive)  # one per process, open until the proce
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
-    """Run a trial and read it. Return an error as text, because not every exception can be pickled.
+    """Run a trial and read its result. Return an error as text, because not every exception can be pickled.
 
-    The trial runs in the work folder of the batch. If `archives`, a prefix of archive names, is given, it is packed.
+    The trial runs in the work folder of the batch. If `archives`, a prefix of archive names, is given, the trial is
+    packed.
     """
     with nullcontext(out.parent) if archives is None else work_folder(folder) as parent:
         run = parent / out.name

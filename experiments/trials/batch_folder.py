@@ -33,11 +33,11 @@ from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConf
 from mjsim.house.catalogue.house_ref import parse_house
 
 OUTDATED = "outdated"
-MAX_NAME = 120  # longest name of a trial without seeds and hash, in characters
+MAX_NAME = 120  # maximum length of a trial name without seeds and hash, in characters
 _SETTINGS = frozenset(SETTINGS)
 CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
 
-# Size in bytes and modification time in ns of each file that `read_trial` reads, or None for a missing file
+# Size in bytes and modification time in nanoseconds of each file that `read_trial` reads, or None if it is missing
 Stamp = tuple[tuple[int, int] | None, ...]
 
 
@@ -46,10 +46,10 @@ class StoredTrial:
     """A trial of a batch.
 
     Attributes:
-        path: Its run directory, even if it is packed.
-        row: Its row of the tables, computed from log and trajectory.
+        path: Run directory of the trial. A packed trial has the same path.
+        row: Row of the result tables, computed from log and trajectory.
         as_measured: True if `metrics.json` agrees with the row.
-        stamp: Stamp of its files before they were read.
+        stamp: Stamp of its files, taken before they were read.
     """
 
     path: Path
@@ -61,7 +61,7 @@ class StoredTrial:
 
     @property
     def complete(self) -> bool:
-        """False for trials that failed or were interrupted, which are run again."""
+        """False for a trial that failed or was interrupted, and must be rerun."""
         return self.row["ended"] in COMPLETE
 
     @functools.cached_property
@@ -69,17 +69,16 @@ class StoredTrial:
         return trial_key(self.settings)
 
     def is_in(self, house: str, inputs: Inputs) -> bool:
-        """Return True if the trial took place in that house, or in one with the same content."""
+        """Return True if the trial took place in this house, or in one with the same content."""
         return self.inputs["house"] == inputs["house"] or self.settings["house"] == house
 
 
 def trial_key(settings: Mapping[str, Any]) -> str:
-    """Return a key that is equal for equal configurations, wherever the files of the house are."""
+    """Return a key that is equal for equal configurations, even if the paths of the house files differ."""
     return json.dumps({name: settings[name] for name in sorted(settings) if name != "house"})
 
 
 def read_trial(path: Path) -> StoredTrial:
-    """Read a trial. Its row is computed from log and trajectory."""
     stamp = stamp_of(path)
     sums = read_checksums(path)
     for name in CHECKED:
@@ -121,7 +120,7 @@ def _file_stamp(path: str) -> tuple[int, int] | None:
 
 
 def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
-    """Move trials to the `outdated` folder of their batch, without replacing earlier ones."""
+    """Move trials to the `outdated` folder of their batch. Earlier trials there are kept."""
     if names:
         (out / OUTDATED).mkdir(exist_ok=True)
         discard(out / TRIALS, names, out / OUTDATED, prefix)
@@ -150,7 +149,7 @@ def write_rows(
     unusable: Mapping[Path, str],
     on_note: Callable[[str], None],
 ) -> list[Mapping[str, Any]]:
-    """Write the tables of the trials in a folder. Return the rows, those of the design first."""
+    """Write the tables of the trials in a folder. Return the rows, with those of the design first."""
     for note in folder_notes(found, unusable):
         on_note(note)
     rows = [trial.row for trial in in_order(trials, found)]
@@ -171,7 +170,7 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
-    """Yield notes about trials that the tables leave out or that may not be comparable."""
+    """Yield warnings about trials that are missing from the tables or may not be comparable."""
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (

@@ -1,4 +1,4 @@
-"""The preparation of a batch: check that its trials can be run, and find those that its folder does not hold yet."""
+"""The preparation of a batch: check that its trials can be run, and find those missing from its folder."""
 
 import dataclasses
 import functools
@@ -32,7 +32,7 @@ from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.person_parameters import PersonParameters
 from planner.solvers import solver
 
-MAX_REASONS = 3  # in a line
+MAX_REASONS = 3  # maximum number of reasons listed in a note
 Houses = Callable[[str], House]
 
 
@@ -41,9 +41,9 @@ class BatchPlan:
     """Finished and missing trials of a batch.
 
     Attributes:
-        done: Trials of the design that the folder holds and that would come out the same now.
+        done: Trials of the design that are in the folder and would have the same result now.
         missing: Configuration of every other trial of the design, by run directory.
-        notes: Lines that say what is run again, and why.
+        notes: Messages that explain which trials are rerun, and why.
     """
 
     done: tuple[StoredTrial, ...]
@@ -102,7 +102,7 @@ def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
 
 
 def check_names(trials: Sequence[TrialConfig]) -> None:
-    """Raise the error of the first trial with an unknown participant, assistance, planner or behaviour."""
+    """Raise an error for the first trial with an unknown participant, assistance, planner or behaviour."""
     for check, names in (
         (participant, {trial.user for trial in trials}),
         (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
@@ -115,7 +115,7 @@ def check_names(trials: Sequence[TrialConfig]) -> None:
 
 
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check that trials can be run, as far as possible in advance. Return the inputs of each."""
+    """Check in advance, as far as possible, that trials can be run. Return the inputs of each trial."""
     check_names(trials)
     catalogue = functools.cache(load_catalogue)
     house = functools.lru_cache(MAX_HOUSES)(House.load)
@@ -133,7 +133,6 @@ def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
 
 
 def _may_be_small(trial: TrialConfig) -> bool:
-    """Return True if the house may be too small for the points. Houses of this package fit the default number."""
     custom = parse_house(trial.house).kind != "shipped"
     return trial.episode is None and (custom or trial.points > POINTS)
 
@@ -161,7 +160,6 @@ def _check_people(trials: Iterable[TrialConfig], house: Houses) -> None:
 
 
 def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters]) -> None:
-    """Check a person with the widest body and the shortest reach first. If that person fits, everyone does."""
     radii, reaches = zip(*sizes, strict=True)
     try:
         house.for_person(dataclasses.replace(PersonParameters(), body_radius=max(radii), reach=min(reaches)))
@@ -171,12 +169,11 @@ def _check_sizes(house: House, sizes: dict[tuple[float, float], PersonParameters
 
 
 def _may_not_fit(trial: TrialConfig) -> bool:
-    """Return False only for the default participant in a condition of this package, as these always work together."""
     return trial.user != DEFAULT_PARTICIPANT or trial.assistance.partition("-")[0] not in CONDITIONS
 
 
 def _begin(trial: TrialConfig, house: House) -> None:
-    """Begin a trial with a single object, so that participant and condition interact once."""
+    """Start a trial with a single object, so that participant and condition interact once."""
     small = replace(trial, objects=1, episode=None, live=False)
     person = draw_person(small)
     house = house.for_person(person)

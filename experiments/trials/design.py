@@ -31,7 +31,7 @@ MAX_NUMBERS = 1_000_000
 
 @dataclass(frozen=True)
 class Design:
-    """The trials of a batch, in order and each only once, and the exclusions of its file, if any."""
+    """The trials of a batch, in order and without duplicates, and the exclusions from its file, if any."""
 
     trials: tuple[TrialConfig, ...]
     exclusions: Exclusions | None = None
@@ -56,7 +56,10 @@ def factorial(
     seeds: Sequence[int],
     **same: Any,
 ) -> Design:
-    """Combine all values, with the seed varying fastest. `same` has the `TrialConfig` fields that all trials share."""
+    """Combine all values into a design in which the seed varies fastest.
+
+    `same` contains the `TrialConfig` fields that all trials share.
+    """
     for name, values in (("objects", objects), ("assistance", assistance), ("user", users), ("seeds", seeds)):
         if not values:
             raise ConfigError(f"a batch needs at least one value for --{name}")
@@ -71,7 +74,7 @@ def factorial(
     )
 
 
-_Seeds = int | list[int] | str | None  # a seed, several, or a range such as "0:10"
+_Seeds = int | list[int] | str | None  # a seed, several seeds, or a range such as "0:10"
 
 
 class _People(msgspec.Struct, forbid_unknown_fields=True):
@@ -81,13 +84,14 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     person_seeds: _Seeds = None
     order_seeds: _Seeds = None
     trials_per_person: Annotated[int, msgspec.Meta(ge=1)] = 1
-    houses: str | list[str] | None = None  # names, or generated homes such as "generated:0:200?rooms=5"
+    # Names, or a range of generated homes such as "generated:0:200?rooms=5"
+    houses: str | list[str] | None = None
 
     def each(self) -> list[dict[str, Any]]:
-        """Return the seeds and house of each trial. Shorter lists are repeated.
+        """Return the seeds and the house of each trial. Shorter lists are repeated.
 
-        Further trials of a person take houses, or house seeds, at even distances in these lists, so that a house that
-        comes first for one person comes second for another.
+        The trials of a person use houses, or house seeds, at even distances in these lists. A house that comes first
+        for one person therefore comes second for another.
         """
         lists: dict[str, list[Any]] = {
             name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
@@ -145,7 +149,7 @@ def read_design(path: Path) -> Design:
 
 
 def read_exclusions(path: Path) -> Exclusions:
-    """Read exclusions from a TOML file of rules and people, or from the table [exclusions] of a design."""
+    """Read exclusions from a TOML file of rules and participants, or from the table [exclusions] of a design."""
     content = _content(path, "rules")
     if "cells" in content:
         found = read_design(path).exclusions
@@ -175,7 +179,7 @@ def _located(message: str, cell: int | None) -> str:
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
-    """Return the trials of a cell. Paths are relative to `folder`."""
+    """Return the trials of a cell. Relative paths start at `folder`."""
     if unknown := sorted(set(values) - _IN_A_CELL):
         raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists the fields of a design")
     settings = {name: value for name, value in values.items() if name in SETTINGS}
@@ -200,14 +204,14 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
 
 
 def house_names(houses: str | list[str]) -> list[str]:
-    """Return names of houses. `generated:0:200?split=test` stands for a range of generated homes."""
+    """Return the names of houses. `generated:0:200?split=test` stands for a range of generated homes."""
     if isinstance(houses, list):
         return [name for entry in houses for name in house_names(entry)]
     return generated_names(houses) if is_generated(houses) else [houses]
 
 
 def numbers(text: int | list[int] | str) -> list[int]:
-    """Parse whole numbers: one, a list, a text such as `6,12` or `0:10` (which excludes 10), or a mix of both."""
+    """Parse a number, a list of numbers, or a text such as `6,12` or `0:10`, where the end of the range is excluded."""
     if isinstance(text, int):
         text = [text]
     if isinstance(text, list):
@@ -239,7 +243,7 @@ def confounded(trials: Sequence[TrialConfig]) -> str | None:
 
 
 def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
-    """Compare the assistance conditions like `confounded`, for rows of a table."""
+    """Describe the differences found by `confounded`, for the rows of a table."""
     faults = []
     for name in CONFOUNDERS:
         values: dict[str, set[str]] = {}

@@ -1,4 +1,4 @@
-"""Exclusions from a study: rules over the columns of its table, and people by id (docs/analysis.md)."""
+"""Exclusions from a study: rules about the columns of its table, and participants by ID (docs/analysis.md)."""
 
 import difflib
 import math
@@ -16,12 +16,13 @@ Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
 Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*\Z")]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
-IDS = ("participant", "fingerprint", "person_seed")  # columns that identify a person, the best first
+# Columns that identify a participant, the most reliable first
+IDS = ("participant", "fingerprint", "person_seed")
 BY_NAME = "people by name"
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule that excludes rows by the value of a column. Missing values match only the comparison `missing`."""
+    """A rule that excludes rows by the value of a column. Only the comparison `missing` matches missing values."""
 
     column: Name
     comparison: Comparison
@@ -44,7 +45,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.column} {self.comparison}{given}"
 
     def holds(self, row: Row) -> bool:
-        """Return True if a row is excluded. Raises a `TypeError` if the value of the row cannot be compared."""
+        """Return True if a row is excluded. Raises a `TypeError` if the value in the row cannot be compared."""
         found = row.get(self.column)
         unknown = found is None or (isinstance(found, float) and math.isnan(found))
         if unknown or self.comparison == "missing":
@@ -68,14 +69,14 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
 class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person excluded by id, and the reason."""
+    """A participant excluded by ID, and the reason."""
 
-    id: Name | int  # the person's value in one of the columns `IDS`
+    id: Name | int  # value in one of the columns `IDS`
     reason: Reason
 
 
 class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Rules and people. Unfinished people are excluded as well unless `unfinished` is `keep`."""
+    """Rules and excluded participants. Unfinished participants are also excluded unless `unfinished` is `keep`."""
 
     rules: tuple[Rule, ...] = ()
     people: tuple[ExcludedPerson, ...] = ()
@@ -88,14 +89,14 @@ class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"the {what} {twice} occurs twice; leave one out")
 
     def all_rules(self) -> tuple[Rule, ...]:
-        """Return the rules, including the one for unfinished people."""
+        """Return the rules, including the rule for unfinished participants."""
         implied = self.unfinished == "leave out" and str(UNFINISHED) not in map(str, self.rules)
         return (*self.rules, *([UNFINISHED] if implied else []))
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """An excluded person, with the rules that exclude the person and their reasons."""
+    """An excluded participant, with the rules that apply and the reasons."""
 
     person: str
     assistance: str
@@ -104,7 +105,10 @@ class LeftOut:
 
 
 def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[int, LeftOut]:
-    """Return the excluded people of a table by row number. All rules and people must fit the table."""
+    """Return the excluded participants of a table by row number.
+
+    Every rule must name a column of the table, and every excluded ID must occur in it.
+    """
     found: dict[int, dict[str, str]] = {}
     for number, rule in enumerate(exclusions.all_rules(), start=1):
         if rule is UNFINISHED and not any(rule.column in row for row in rows):
@@ -137,7 +141,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 
 def person_name(row: Row, number: int) -> str:
-    """Return the id of a person, or the number of their row if they have none."""
+    """Return the ID of a participant. A participant without an ID is named after the row number."""
     return str(next((row[name] for name in IDS if row.get(name) is not None), f"row {number}"))
 
 

@@ -1,6 +1,6 @@
-"""What a trial depends on besides its settings: files, source code and libraries, by hash or version.
+"""Files, source code and libraries on which the result of a trial depends, as hashes or versions.
 
-A resumed batch compares them with the current ones, and reruns trials for which something has changed.
+A resumed batch compares them with the current ones, and reruns the trials for which one of them has changed.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
-# Code on which the record of a trial depends. Code that only reads records is not included.
+# Source files that affect the record of a trial. Code that only reads records is not included.
 CODE = (
     "hud",
     "planner",
@@ -44,13 +44,13 @@ def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
 
 
 def code_versions(modules: Iterable[str] = ()) -> dict[str, str]:
-    """Return hashes and versions of all code that affects trials: this package, libraries, and these user modules."""
+    """Return hashes and versions of the code that affects trials: this package, libraries and the given modules."""
     user_code = {f"module {name}": plugin_digest(name) for name in modules}
     return {"code of mjsim": source_digest(*CODE), **_libraries(), **user_code}
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:
-    """Hash a trial's settings and inputs to 16 hex digits. The content of files counts, their paths do not."""
+    """Hash the settings and inputs of a trial to 16 hex digits. File contents affect the hash, file paths do not."""
     settings = {name: value for name, value in config.settings().items() if name not in PATHS}
     return hashlib.sha256(json.dumps([settings, sorted(inputs.items())]).encode()).hexdigest()[:16]
 
@@ -70,7 +70,7 @@ def plugins(config: TrialConfig) -> tuple[str, ...]:
 
 @functools.cache
 def plugin_digest(module: str) -> str:
-    """Hash the source of a module to 16 hex digits: its file, or the whole top-level package."""
+    """Hash the source of a module, or of its whole top-level package, to 16 hex digits."""
     spec = importlib.util.find_spec(module.partition(".")[0])
     if spec is None:
         return ""

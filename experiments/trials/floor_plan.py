@@ -1,4 +1,4 @@
-"""Draws the floor plan of a trial: rooms, objects, receptacles, the planned and the walked path."""
+"""The floor plan of a trial: rooms, objects, receptacles, the planned path and the walked path."""
 
 import contextlib
 import functools
@@ -22,15 +22,16 @@ from mjsim.support.kernels import cache_base
 from mjsim.values.episode import Episode
 from mjsim.values.observation import Observation
 
-# Okabe-Ito colours, distinct for all common kinds of colour vision
+# Okabe-Ito colours, which people with common forms of colour blindness can distinguish
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
-PIXELS_PER_METRE = 90  # scale, unless the house is large
-MAX_SIDE = 1920  # longest side of the house picture (px)
-MARGIN, ROW, COLUMN = 28, 24, 240  # frame around the house, and row and column of the legend (px)
-DASH, PERIOD = 8, 15  # length and spacing of dashes (px)
-_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # ends of a sample line in the legend (px)
+PIXELS_PER_METRE = 90  # scale, reduced for large houses
+MAX_SIDE = 1920  # length of the longer side of the house picture in pixels
+# Frame around the house, row height and column width of the legend, in pixels
+MARGIN, ROW, COLUMN = 28, 24, 240
+DASH, PERIOD = 8, 15  # length and period of dashes in pixels
+_SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # ends of the sample line in the legend, in pixels
 _SHIFT = 4  # fractional bits of coordinates in OpenCV
 
 _Points = NDArray[np.float64]
@@ -46,7 +47,7 @@ def draw_topdown(
         house: The house.
         episode: The episode.
         plan: The first `plan` event of the log.
-        walked: Positions of the person, m, shape (T, 2).
+        walked: Positions of the person in metres, shape (T, 2).
         origin: Origin of the run, such as `Simulated`.
     """
     planned = planned_path(house, episode, plan)
@@ -63,7 +64,10 @@ def draw_topdown(
 def task_picture(
     house: House, episode: Episode, title: str, planned: _Points | None = None
 ) -> NDArray[np.uint8]:
-    """Draw the start of a task and the planned path (k, 2), m. Return RGB, shape (height, width, 3)."""
+    """Draw the start of a task and the planned path as an RGB image, shape (height, width, 3).
+
+    The path is in metres, shape (k, 2).
+    """
     lines = {} if planned is None else {f"shortest way, {_length(planned):.1f} m": (planned, PLANNED)}
     drawing = _drawn_task(house, episode, lines, np.array([episode.start.x, episode.start.y]))
     drawing.text(title, np.array([drawing.width / 2, MARGIN / 2]), Face(17, 700), BLACK)
@@ -73,7 +77,6 @@ def task_picture(
 def _drawn_task(
     house: House, episode: Episode, lines: Mapping[str, tuple[_Points, str]], start: _Points
 ) -> "_Drawing":
-    """Draw everything but the title. `lines` maps legend texts to paths and colours. Planned paths are dashed."""
     drawing = _Drawing(house)
     for points, colour in lines.values():
         drawing.line(points, colour, dashed=colour == PLANNED)
@@ -96,7 +99,10 @@ def _drawn_task(
 
 
 def planned_path(house: House, episode: Episode, plan: Event, seen: Observation | None = None) -> _Points:
-    """Return the path, m, shape (k, 2), of a `plan` event from the person's place in `seen`, by default the start."""
+    """Return the path of a `plan` event in metres, shape (k, 2).
+
+    The path begins at the person's position in `seen`, or at the start if `seen` is None.
+    """
     if seen is None:
         places = {o.name: np.array(o.position[:2]) for o in episode.objects}
         here = np.array([episode.start.x, episode.start.y])
@@ -114,8 +120,6 @@ def planned_path(house: House, episode: Episode, plan: Event, seen: Observation 
 
 
 class _Drawing:
-    """The house from above, RGB, with a frame around it and space for a legend below."""
-
     def __init__(self, house: House) -> None:
         x_min, y_min, x_max, y_max = house.bounds
         self._corner = np.array([x_min, y_max])
@@ -132,12 +136,10 @@ class _Drawing:
         return int(self.image.shape[1])
 
     def pixels(self, points: _Points) -> _Points:
-        """Convert points of the house, m, shape (k, 2 or more), to columns and rows, shape (k, 2)."""
         scale = np.array([self._scale, -self._scale])
         return np.asarray((np.atleast_2d(points)[:, :2] - self._corner) * scale + MARGIN)
 
     def line(self, points: _Points, colour: str, *, dashed: bool = False) -> None:
-        """Draw a path, m, shape (k, 2), with a white halo."""
         path = self.pixels(points)
         parts = list(_dashes(path)) if dashed else [path]
         for tone, thickness in ((WHITE, 5), (colour, 2)):
@@ -188,7 +190,6 @@ class _Drawing:
         cv2.polylines(self.image, _fixed([corners]), True, _rgb(BLACK), 1, cv2.LINE_AA, _SHIFT)
 
     def _cover(self, mask: NDArray[np.uint8], left: float, top: float, colour: str) -> None:
-        """Blend a colour into the image by a mask of 0 to 255, clipped at the edges."""
         x, y = max(0, round(left)), max(0, round(top))
         under = self.image[y : y + len(mask), x : x + mask.shape[1]]
         share = mask[: under.shape[0], : under.shape[1], None] / 255.0
@@ -196,7 +197,7 @@ class _Drawing:
 
 
 def house_picture(house: House, scale: float) -> NDArray[np.uint8]:
-    """Draw the tidy house from above, RGB, or read it from the cache folder."""
+    """Draw the tidy house from above as an RGB image, or read the image from the cache folder."""
     name = f"{house.catalogue.content}-{scale:g}.png"
     kept = cache_base() / f"mjsim-floorplans-{source_digest('mjsim')}" / name
     if (picture := cv2.imread(str(kept)) if kept.is_file() else None) is not None:
@@ -206,7 +207,7 @@ def house_picture(house: House, scale: float) -> NDArray[np.uint8]:
     drawn = render_house_map(house.catalogue, house.bounds, scale)[..., :3]
     with contextlib.suppress(OSError), replacing(kept) as temporary:
         cv2.imwrite(str(temporary), cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
-        os.utime(kept.parent)  # marks the cache as used
+        os.utime(kept.parent)  # marks the cache as recently used
     return drawn
 
 

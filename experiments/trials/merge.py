@@ -30,9 +30,9 @@ class Merged:
     """A design whose shards were merged.
 
     Attributes:
-        rows: Rows of the tables, those of the design first.
-        missing: Trials of the design that no part holds.
-        shards: Number of missing trials by shard; empty if the number of shards is unknown.
+        rows: Rows of the tables, with those of the design first.
+        missing: Trials of the design that no folder contains.
+        shards: Number of missing trials for each shard. Empty if the number of shards is unknown.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -49,18 +49,18 @@ def merge_shards(
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
 ) -> Merged:
-    """Join the folders of shards in `out`, and write the tables. The parts are not changed.
+    """Join the folders of shards in `out`, and write the tables. The folders in `parts` are not changed.
 
     Args:
         design: The whole design.
-        out: Folder for the trials of all parts. It may hold some of them already.
+        out: Folder for all trials. It may contain some of them already.
         parts: Folders of further shards.
         workers: Number of processes that read trials.
-        on_note: Called with lines for the user.
-        on_read: Called after each trial that is read, with the numbers of trials read and to be read.
+        on_note: Called with messages for the user.
+        on_read: Called after each trial is read, with the number of trials read so far and the total number.
 
     Raises:
-        RecordError: A part is not the folder of a batch, or two parts have different results of the same trial.
+        RecordError: A part is not a batch folder, or two parts have different results for the same trial.
         OSError: The folder cannot be written.
     """
     check_batch_folder(out)
@@ -70,7 +70,7 @@ def merge_shards(
             raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     for folder in (out, *others):
-        adopt(folder / TRIALS)  # archives of killed shards
+        adopt(folder / TRIALS)  # recovers the archives of killed shards
     reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
     chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
     added: dict[Path, dict[str, StoredTrial]] = {}
@@ -92,14 +92,14 @@ def merge_shards(
 
 
 def _same(one: Path, other: Path) -> bool:
-    """Compare the records of two runs of a trial, except for their wall times."""
+    """Return True if the records of two runs are equal except for their wall times."""
     with opened_run(one) as first, opened_run(other) as second:
         sums = read_checksums(first), read_checksums(second)
     return all(sums[0].get(name) == sums[1].get(name) for name in CHECKED)
 
 
 def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: TrialReader) -> None:
-    """Add the trials of a part. Files of run directories are hard-linked if possible, packed trials copied."""
+    """Add the trials of a part. Run directories are hard-linked if possible, packed trials are copied."""
     trials_folder = out / TRIALS
     put_aside(
         out, {path.name for path in run_paths(trials_folder)}.intersection(trials)
@@ -132,7 +132,10 @@ def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> li
 def _shards(
     trials: Sequence[TrialConfig], missing: Iterable[TrialConfig], folders: Iterable[Path]
 ) -> dict[Shard, int]:
-    """Count missing trials by shard. The number of shards is the one that most row files have in their names."""
+    """Count the missing trials of each shard.
+
+    The number of shards is the most frequent one in the names of row files.
+    """
     files = Counter(
         int(match[1])
         for folder in folders

@@ -1,7 +1,7 @@
-"""Distributions of `mjsim.PersonParameters`, from which each trial draws its person.
+"""Distributions of `mjsim.PersonParameters`, from which the person of each trial is drawn.
 
-Names and units are those of `PersonParameters`. Names in a group have a prefix, as in `motion.reach_time`. Values
-without a distribution are the same for everyone.
+Names and units are those of `PersonParameters`. Names in a group have a prefix, as in `motion.reach_time`. Parameters
+without a distribution have the same value for all persons.
 """
 
 import math
@@ -30,12 +30,12 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 def check_person(described: Distributions) -> None:
     """Check distributions with the median person. Raises a `ConfigError` if a distribution is invalid."""
-    if described:  # without distributions, it is the default person
+    if described:  # otherwise the person is the default one
         _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
 def view_limits(text: str) -> tuple[float, float]:
-    """Parse `1.2,1.9`, the limits (rad) of the field of view that a person may choose."""
+    """Parse `1.2,1.9`, the limits in radians of the field of view that a participant may choose."""
     least, most, _ = RANGES["field_of_view"]
     try:
         low, high = map(float, text.split(","))
@@ -50,7 +50,7 @@ def view_limits(text: str) -> tuple[float, float]:
 
 
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
-    """Draw a person. Raises a `ConfigError` if a name is unknown, or a value cannot be drawn."""
+    """Draw a person. Raises a `ConfigError` if a name is unknown or a value cannot be drawn."""
     if not described:
         return _DEFAULT
     return _person(draw(PARAMETERS, described, rng, "a person"))

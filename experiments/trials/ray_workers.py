@@ -1,4 +1,4 @@
-"""A Ray cluster, whose machines share a folder, as the workers of a batch. Ray comes with the extra `ray`."""
+"""Workers on a Ray cluster whose machines share a folder. The extra `ray` installs Ray."""
 
 import functools
 import logging
@@ -18,12 +18,12 @@ from typing import Any
 from experiments.errors import ConfigError
 from experiments.session.signals import SIGNALS
 
-TRIAL_BYTES = 300_000_000  # memory of a trial with compiled kernels
+TRIAL_BYTES = 300_000_000  # memory in bytes used by a trial with compiled kernels
 QUEUED_PER_CORE = 2
-PERIOD_S = 5.0  # time between two checks of the cluster
-HEAD_TIMEOUT_S = 60.0  # how long the head of the cluster may take to restart
+PERIOD_S = 5.0  # interval between checks of the cluster
+HEAD_TIMEOUT_S = 60.0  # how long the head node of the cluster may take to restart
 END_S = 10.0  # how long cancelled calls may take to end
-# By default, Ray ends this process without a message after a minute without the head, and sends usage statistics.
+# By default, Ray sends usage statistics, and ends this process silently after a minute without the head node.
 ENVIRONMENT = {"RAY_gcs_rpc_server_reconnect_timeout_s": "600", "RAY_USAGE_STATS_ENABLED": "0"}
 REMEDY = "install the same versions on all machines, then restart Ray there"
 Versions = tuple[tuple[str, str], ...]
@@ -37,7 +37,7 @@ class LostMachineError(BrokenProcessPool):
 def ray_cluster(
     workers: int | None, modules: Sequence[str], on_note: Callable[[str], None], folder: Path
 ) -> Iterator[Callable[[], AbstractContextManager["_Cluster"]]]:
-    """Connect to the cluster at RAY_ADDRESS, or to a local one, which is started if necessary.
+    """Connect to the cluster at RAY_ADDRESS, or to a local cluster, which is started if necessary.
 
     Raises:
         ConfigError: Ray or a cluster is missing, or a machine cannot run trials of this batch.
@@ -62,13 +62,14 @@ def ray_cluster(
 
 
 def _connect(ray: Any) -> None:
-    """Connect without Ray's signal handlers and messages."""
+    """Connect, without installing Ray's signal handlers or printing its messages."""
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
     # Ray has no option to silence the thread that prints the logs of lost machines.
     ray._private.worker.print_to_stdstream = lambda *_, **__: None
     try:
         if ":" in (address := os.environ.get("RAY_ADDRESS", "")):
-            _reach(address)  # fails at once, while Ray would try for minutes
+            # Fails immediately if the cluster is unreachable, whereas Ray retries for minutes
+            _reach(address)
         ray.init(log_to_driver=False, logging_level=logging.ERROR)
     except (OSError, RuntimeError, ValueError) as error:
         raise ConfigError(f"cannot connect to a Ray cluster: {error}") from error
@@ -83,12 +84,12 @@ def _reach(address: str) -> None:
 
 
 class _Cluster:
-    """The machines of a Ray cluster. A trial takes one core."""
+    """The machines of a Ray cluster. Each trial uses one core."""
 
     def __init__(self, ray: Any, workers: int | None, needed: tuple[Path, Versions]) -> None:
         self._ray, self._workers, self._needed = ray, workers, needed
         self._call = ray.remote(max_retries=0)(_checked)
-        self._running: dict[Future[Any], Any] = {}  # Ray's reference of each call
+        self._running: dict[Future[Any], Any] = {}
         self._ended = threading.Event()
         self._machines, self._cores = self._count()
 
@@ -107,14 +108,14 @@ class _Cluster:
 
     def _finish(self, result: Future[Any], done: Future[Any]) -> None:
         self._running.pop(result, None)
-        with suppress(InvalidStateError):  # the cluster is lost
+        with suppress(InvalidStateError):  # the cluster has been lost
             if error := done.exception():
                 result.set_exception(_translated(error))
             else:
                 result.set_result(done.result())
 
     def prepare(self, on_note: Callable[[str], None]) -> None:
-        """Check all machines, and load numeric code in one process on each before others do."""
+        """Check all machines. On each, load the numeric code in one process before the others start."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy as On
 
         from experiments.trials.design import counted
@@ -160,7 +161,6 @@ class _Cluster:
         return dict(cores.keys()), sum(cores.values())
 
     def _watch(self) -> None:
-        """Update the number of cores until `end`. Fail all calls if the head of the cluster stops answering."""
         address = self._ray.get_runtime_context().gcs_address
         answered = time.monotonic()
         while time.monotonic() - answered < HEAD_TIMEOUT_S:
@@ -180,7 +180,7 @@ class _Cluster:
 
 @functools.cache
 def _check_machine(folder: Path, versions: Versions) -> None:
-    """Check, once per process, that this machine has the versions of the driver and shares the work folder."""
+    """Check, once per process, that this machine runs the same versions as the driver and shares the work folder."""
     from experiments.trials.fingerprint import changes, code_versions
 
     expected, name = dict(versions), platform.node()
@@ -201,13 +201,12 @@ def _check_machine(folder: Path, versions: Versions) -> None:
 
 
 def _checked(folder: Path, versions: Versions, fn: Callable[..., Any], *args: Any) -> Any:
-    """Check the machine, which may have joined the cluster later, and call a function."""
     _check_machine(folder, versions)
     return fn(*args)
 
 
 def _translated(error: BaseException) -> BaseException:
-    """Return the error that a pool of processes would raise."""
+    """Return the error that a process pool would raise."""
     from ray import exceptions
 
     if isinstance(error, exceptions.NodeDiedError | exceptions.TaskUnschedulableError):

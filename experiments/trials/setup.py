@@ -1,4 +1,4 @@
-"""Sets up a trial: its person, its episode, and a session that is ready to run."""
+"""The setup of a trial: its person, its episode, and a session that is ready to run."""
 
 import hashlib
 from pathlib import Path
@@ -33,16 +33,16 @@ from planner.route import TaskState
 from planner.service import Mode, Planner
 from planner.solver_source import SolverSource
 
-_SESSION = 77  # makes the session's random numbers independent of the house's with the same seed
-_LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # purposes of random numbers in a session
-PREPARATION_S = 20.0  # longest wall time for proving the plan before the clock of a live trial starts
+_SESSION = 77  # keeps the random numbers of the session independent of those of a house with the same seed
+_LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # random streams of a session
+PREPARATION_S = 20.0  # maximum wall time for proving the first plan of a live trial before its clock starts
 
 
 def draw_person(config: TrialConfig) -> PersonParameters:
-    """Draw the participant's parameters by the person's seed.
+    """Draw the parameters of the participant's body with the person seed.
 
-    Values without a distribution in `config.person` use those of the attribute `person` of the participant's factory, a
-    mapping as for `Distributions.of`, or else the defaults.
+    Values without a distribution in `config.person` follow the attribute `person` of the participant's factory, a
+    mapping as for `Distributions.of`. Values missing from both are the defaults.
     """
     factory = participant(config.user)
     try:
@@ -54,7 +54,7 @@ def draw_person(config: TrialConfig) -> PersonParameters:
 
 
 def draw_behaviour(config: TrialConfig) -> dict[str, float]:
-    """Draw the parameters of the participant model by the person's seed. They are empty if it has none."""
+    """Draw the parameters of the participant model with the person seed. The result is empty if it has none."""
     parameters = getattr(participant(config.user), "behaviour", {})
     rng = _session_rng(config.person_seed, _BEHAVIOUR)
     values = draw(parameters, config.behaviour, rng, f"participant {config.user!r}")
@@ -64,7 +64,7 @@ def draw_behaviour(config: TrialConfig) -> dict[str, float]:
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
-    """Sample the episode of a trial, or read it from its file."""
+    """Sample the episode of a trial, or read it from a file."""
     if config.episode is None:
         return house.sample_episode(objects=config.objects, seed=config.house_seed, points=config.points)
     episode = Episode.load(Path(config.episode))
@@ -120,7 +120,7 @@ def prepare_session(
     user: Participant | None = None,
     journal: Journal | None = None,
 ) -> tuple[Session, World]:
-    """Make the world, the assistant and the participant of a trial, ready to run.
+    """Make the world, the assistant and the participant of a trial, and a session that is ready to run.
 
     Args:
         config: The settings.

@@ -1,6 +1,6 @@
-"""Shards: shares of a design for the tasks of an array job.
+"""Shards: parts of a design, one for each task of an array job.
 
-A shard reads and runs only its own trials and writes no tables, so any number of shards can work in one folder at the
+A shard reads and runs only its own trials and writes no tables, so several shards can work in the same folder at the
 same time.
 """
 
@@ -17,7 +17,7 @@ from experiments.trials.trial_config import TrialConfig
 
 @dataclass(frozen=True)
 class Shard:
-    """One of `count` shares of a design, counted from 1."""
+    """One of `count` parts of a design. Numbers start at 1."""
 
     number: int
     count: int
@@ -37,7 +37,7 @@ class Shard:
 
     @property
     def label(self) -> str:
-        """Part of the names of files that only this shard uses."""
+        """Suffix for the names of files that only this shard uses."""
         return f"{self.number}-of-{self.count}."
 
     def of(self, design: Design) -> Design:
@@ -53,10 +53,11 @@ class Shard:
 
 
 def shard_numbers(trials: Sequence[TrialConfig], count: int) -> list[int]:
-    """Return the shard of each trial, from 1 to `count`.
+    """Return the shard number of each trial, from 1 to `count`.
 
-    The result depends only on the number of trials and their houses. Shards get whole houses where possible, because
-    making a house takes longer than many trials. Trials of a house are shuffled, so that shards take similar times.
+    The result depends only on the number of trials and their houses. A shard gets all trials of a house if possible,
+    because making a house takes longer than many trials. The trials of a house are shuffled, so that the shards take
+    similar times.
     """
     houses = {house: k for k, house in enumerate(dict.fromkeys(trial.house for trial in trials))}
     order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _shuffle_key(k)))

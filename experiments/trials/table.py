@@ -1,4 +1,4 @@
-"""A table of many trials, as Parquet and CSV, and the meaning of its columns."""
+"""Tables of trials as Parquet and CSV, with the meaning of their columns."""
 
 import dataclasses
 import inspect
@@ -24,8 +24,9 @@ from mjsim.values.person_parameters import PersonParameters
 
 NAME = "trials"
 _TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # columns that identify a trial
-_WRITTEN = b"mjsim.columns"  # metadata with the column types, because the footer of Parquet has no checksum
-Columns = dict[str, tuple[str, str]]  # type and description, by name
+# Key of the column types in the metadata, because the footer of Parquet has no checksum
+_WRITTEN = b"mjsim.columns"
+Columns = dict[str, tuple[str, str]]  # type and description of each column
 _QUANTITIES = {
     "penetration_m": "penetration depth of objects or the body",
     "trunk_penetration_m": "penetration depth of the trunk and the house",
@@ -45,16 +46,16 @@ _NAMES = {"NoneType": "null", "VisitKind": "str", "Status": "str", "Refusal": "s
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
     """Write `trials.parquet` and `trials.csv` atomically. Return their paths in this order.
 
-    Columns are the union of the rows' keys in order of first appearance.
+    The columns are the union of the rows' keys, in order of first appearance.
     """
     columns = list(dict.fromkeys(key for row in rows for key in row))
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
     written = table.replace_schema_metadata({_WRITTEN: json.dumps(_types(table.schema))})
-    # pyarrow gets open files because it rejects paths that are not UTF-8 or that look like URLs.
+    # Pass open files to pyarrow, which rejects paths that are not UTF-8 or that look like URLs.
     with replacing(parquet) as temporary, temporary.open("wb") as file:
         pa.parquet.write_table(written, file, write_page_checksum=True)
-    # CSV leaves out empty columns, which have no type.
+    # Columns without values have no type, so the CSV file omits them.
     present = [c for c in columns if table[c].null_count < len(rows)]
     with replacing(csv) as temporary, temporary.open("wb") as file:
         pa.csv.write_csv(table.select(present), file)
@@ -62,7 +63,7 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a Parquet file, which has each trial once."""
+    """Read the rows of a Parquet file. Each trial must occur only once."""
     try:
         check_input(path)
         with path.open("rb") as file:
@@ -74,8 +75,8 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     seen: dict[tuple[Any, ...], int] = {}
     for k, row in enumerate(rows):
         if row.get("fingerprint") is None and row.get("person_seed") is None:
-            continue  # the row has no identity
-        # Several people may play the same trial, with different results.
+            continue  # the row does not identify a trial
+        # Several participants may play the same trial with different results, so all columns identify their rows.
         names = _TRIAL if is_simulated(row.get("user")) else sorted(row)
         first = seen.setdefault(tuple(str(row.get(name)) for name in names), k)
         if first != k:
@@ -91,7 +92,7 @@ def _types(schema: pa.Schema) -> dict[str, str]:
 
 
 def _check_columns(schema: pa.Schema) -> None:
-    """Raise a `ValueError` if a column was renamed or converted. Columns may be added or left out."""
+    """Raise a `ValueError` if a column was renamed or converted. Columns may be added or removed."""
     found = _types(schema)
     written = json.loads((schema.metadata or {}).get(_WRITTEN, "{}"))
     renamed = sorted(found.keys() - written) if written.keys() - found else []
@@ -103,7 +104,7 @@ def _check_columns(schema: pa.Schema) -> None:
 
 
 def trial_columns() -> Columns:
-    """Return type and description of the columns of a table of trials, in order."""
+    """Return the type and the description of each column in a table of trials, in order."""
     hints = typing.get_type_hints(TrialConfig)
     found: Columns = {
         name: (_type_name(hints[name]), str(about.description))
@@ -133,7 +134,10 @@ def trial_columns() -> Columns:
 
 
 def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
-    """Return type and description of a class's fields, without inherited ones. Its docstring must describe them all."""
+    """Return the type and the description of each field that a class defines itself.
+
+    The docstring of the class must describe all these fields.
+    """
     texts, hints = _attributes(kind), typing.get_type_hints(kind)
     names = (
         [field.name for field in dataclasses.fields(kind)]

@@ -11,11 +11,11 @@ from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
 TRAINING_LIMIT_S = 3600.0  # time limit for simulated participants
 HUMAN_TRAINING_LIMIT_S = 24 * 3600.0
-_TRAINING_SEED = 7  # makes the house of the training differ from that of the task
+_TRAINING_SEED = 7  # distinguishes the house seed of the training from that of the task
 
 
 def training_config(config: TrialConfig) -> TrialConfig:
-    """Return the training of a trial: one object in the same house, at another place than in the task."""
+    """Return the training of a trial: one object in the same house, at a different location than in the task."""
     seed = int(np.random.SeedSequence([config.house_seed, _TRAINING_SEED]).generate_state(1)[0])
     return replace(
         config,

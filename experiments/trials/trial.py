@@ -1,4 +1,4 @@
-"""Runs one trial and records it in a run directory."""
+"""Runs a trial and records it in a run directory."""
 
 import dataclasses
 import os
@@ -60,18 +60,18 @@ def run_trial(
         out: Run directory.
         film: Settings of the film, or None for no video.
         topdown: Draw the floor plan.
-        replace: Allow `out` to hold an earlier run.
+        replace: Allow an earlier run in `out`, which is replaced.
         scratch: Parent of the working folder (default: that of `out`).
         house: The house that `config` names, if it is loaded already.
         on_progress: Called after every action.
-        on_warning: Called with errors that do not affect the record: no video, no floor plan.
+        on_warning: Called with errors that do not affect the record, such as a failed video or floor plan.
 
     Returns:
         The content of `metrics.json`.
 
     Raises:
-        ExperimentError, MjsimError, PlannerError, HudError: The settings or the run directory are not usable, or
-            participant or condition failed.
+        ExperimentError, MjsimError, PlannerError, HudError: The settings or the run directory cannot be used, or
+            the participant or the condition failed.
         PhysicsError: The physics failed.
         Stopped: A signal arrived after the session had ended.
     """
@@ -107,7 +107,7 @@ def run_trial(
 
 
 def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
-    """Add the floor plan to a run directory. Return an error message, or None."""
+    """Draw the floor plan of a run directory. Return an error message, or None."""
     if not record.plans:
         return None
     try:
@@ -131,14 +131,15 @@ def _kept(error: Exception, out: Path) -> Exception:
 
 @dataclass(frozen=True, eq=False)
 class _SessionResult:
-    """A session that has ended: its record, the error that ended it, and its film, if any."""
-
     record: Record
     error: Exception | None
     film: "TrialFilm | None"
 
     def save(self, folder: Path, out: Path, wall: float) -> dict[str, Any]:
-        """Write the run directory that will appear at `out`. Raises the error if there is no record to keep."""
+        """Write the run directory, which is moved to `out`.
+
+        Raises the session's error if there is no record to keep.
+        """
         if self.error is not None and not self.record.steps:
             raise self.error
         if self.film is None:

@@ -1,4 +1,4 @@
-"""The settings of a trial, from which options, design files, the start event, columns and docs/data.md are made."""
+"""The settings of a trial, from which options, design files, start events and table columns are derived."""
 
 import math
 import typing
@@ -18,7 +18,7 @@ from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solvers import DEFAULT_SOLVER
 
-SECONDS_PER_OBJECT = 150.0  # several times what the slowest participant, `searcher`, needs
+SECONDS_PER_OBJECT = 150.0  # several times as long as the slowest participant, `searcher`, needs
 SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
 DRAWN_BY = ("auto", "browser", "server")
@@ -26,17 +26,20 @@ MAX_SEED = 2**63 - 1  # largest integer in tables
 
 
 def _about(description: str, **extra: Any) -> msgspec.Meta:
-    """Describe a setting. `extra` has `metavar` and `choices` of its option, and `path` if the setting is a path."""
+    """Describe a setting.
+
+    `extra` contains the `metavar` and `choices` of its option, and `path` if the setting is a path.
+    """
     return msgspec.Meta(description=description, extra=extra)
 
 
-_AS_SEED = cast(int, None)  # filled in from `seed`
+_AS_SEED = cast(int, None)  # default value, replaced by that of `seed`
 
 
 class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Settings that determine a trial. Equal settings give equal records.
 
-    The field `seed` sets those of the three seeds that are not given, and is None afterwards.
+    The field `seed` sets each of the three other seeds that is not given, and is None afterwards.
 
     Raises:
         ConfigError: A value is invalid.
@@ -170,7 +173,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
-        """Make a configuration from `settings`, or from a part of them."""
+        """Make a configuration from `settings`. Missing settings have their default values."""
         try:
             return msgspec.convert(settings, cls, dec_hook=lambda kind, given: kind.of(given))
         except msgspec.ValidationError as error:
@@ -230,16 +233,16 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def view_limits(self) -> tuple[float, float] | None:
-        """Limits (rad) of the field of view that a person may choose, or None without a choice."""
+        """Limits in radians of the field of view that a participant may choose, or None if it is fixed."""
         return None if self.field_of_view_range is None else view_limits(self.field_of_view_range)
 
     @property
     def limit(self) -> float:
-        """Simulated time after which the trial ends, s."""
+        """Simulated time in seconds after which the trial ends."""
         return self.time_limit if self.time_limit is not None else 60.0 + SECONDS_PER_OBJECT * self.objects
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings by name, with the time limit filled in, JSON-ready."""
+        """Return all settings by name as JSON values. The time limit is filled in."""
         values = {name: getattr(self, name) for name in SETTINGS}
         return {
             **values,

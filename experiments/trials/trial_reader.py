@@ -1,7 +1,8 @@
-"""Reads the trials of a batch folder, each of them once.
+"""Reads the trials of a batch folder, each of them only once.
 
-Rows are cached in OUT/.rows.jsonl.gz, or in another file for each shard, with the size and modification time of their
-files. A trial is read again if these, or the code of mjsim, have changed. The caches may be deleted at any time.
+Rows are cached in OUT/.rows.jsonl.gz, or in a separate file for each shard, with the sizes and modification times of
+the files from which they were computed. A trial is read again if these or the code of mjsim have changed. The caches
+may be deleted at any time.
 """
 
 import dataclasses
@@ -27,7 +28,7 @@ ROWS = ".rows.jsonl.gz"
 UNSTAMPED: Stamp = ()
 POOL_FROM = 500  # number of unread trials from which worker processes save time
 
-OnRead = Callable[[int, int], None]  # called with the numbers of trials read and to be read
+OnRead = Callable[[int, int], None]  # called with the number of trials read so far and the total number
 
 
 class _CachedRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
@@ -49,10 +50,10 @@ class TrialReader:
 
     Args:
         out: The folder.
-        workers: Number of processes that read.
-        on_read: Called after each trial that is read.
-        names: Names of the only trials to read, for a shard, or None for all.
-        label: Label of a shard, which is in the names of its cache and archives, so that no two shards share them.
+        workers: Number of processes that read trials.
+        on_read: Called after each trial is read.
+        names: Names of the trials that a shard reads, or None for all trials.
+        label: Label of a shard. The names of the shard's cache and archives contain it, so shards share no files.
     """
 
     def __init__(
@@ -72,11 +73,11 @@ class TrialReader:
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
-        """Add a trial that was read elsewhere. Its stamp is `UNSTAMPED` if it was packed after that."""
+        """Add a trial that was read elsewhere. Its stamp is `UNSTAMPED` if it has been packed since then."""
         self._known[trial.path.name] = trial
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
-        """Return the trials by name, and error messages of those that are not usable."""
+        """Return the trials by name, and an error message for each trial that cannot be used."""
         paths = self._paths()
         self._known = {
             path.name: trial for path in paths if (trial := self._unchanged(path, stamp_of(path))) is not None
@@ -155,7 +156,7 @@ def _load(file: Path) -> Iterable[_CachedRow]:
 
 
 def _read(path: Path) -> StoredTrial | str:
-    """Read a trial. Return an error message if it is not usable."""
+    """Read a trial. Return an error message if it cannot be used."""
     listed = path.parent.with_name(path.name) if path.parent.suffix == PACKED else path
     stamp = stamp_of(path)
     try:

@@ -1,6 +1,7 @@
-"""Compiles all kernels ahead of their first use; later processes load them from disk.
+"""Compiles all kernels before their first use, so that later processes load them from disk.
 
-Run this once after installing: `python -m experiments.trials.warmup`. It takes a minute, or seconds if all is compiled.
+Run this once after installing: `python -m experiments.trials.warmup`. It takes a minute, or a few seconds if all
+kernels are compiled already.
 """
 
 import contextlib
@@ -28,11 +29,11 @@ from planner.exact.warm_start import NOTHING_KNOWN
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import regrets
 
-TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity and simulated time of short trials, s
+TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity and simulated time in seconds of each short trial
 
 
 def compile_kernels(house: House | None = None) -> None:
-    """Run every kernel once, with arguments of the types that it gets later."""
+    """Run every kernel once, with arguments of the types used in trials."""
     house = house or House.load()
     plan()
     act(house)
@@ -40,13 +41,13 @@ def compile_kernels(house: House | None = None) -> None:
 
 
 def plan() -> None:
-    """Solve a problem by the full table and by search, with regrets, then again from a warm start."""
+    """Solve a problem with the full table and by search, with regrets, then again from a warm start."""
     places = np.random.default_rng(0).random((16, 2))
     distances = np.linalg.norm(places[:, None] - places[None], axis=2)
-    for resolution in (1e-4, None):  # 32-bit tables, then 64-bit tables
+    for resolution in (1e-4, None):
         shipments = tuple(Shipment(4 + k, 1 + k % 3) for k in range(12))
         tour = RoutingProblem(distances, 0, shipments, (), 2, resolution=resolution)
-        for table_bytes in (ExactSolver.table_bytes, 0):  # by the full table, then by search
+        for table_bytes in (ExactSolver.table_bytes, 0):
             ExactSolver(table_bytes=table_bytes).solve(tour)
             regrets(tour, ExactSolver(table_bytes=table_bytes))
         searching = ExactSolver(table_bytes=0)
@@ -77,7 +78,7 @@ def play(house: House) -> None:
 
 
 def _before_a_receptacle(house: House) -> Scene:
-    """Compose a person who faces a receptacle, with an object for it half a metre behind."""
+    """Compose a person who faces a receptacle, with an object for the receptacle half a metre behind the person."""
     key, receptacle = next(iter(house.receptacles.items()))
     x, y = receptacle.approach.tolist()
     heading = math.atan2(receptacle.center[1] - y, receptacle.center[0] - x)
@@ -122,5 +123,5 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
 
 
 def announce_compiling(may_print: Callable[[], bool] = lambda: True) -> None:
-    """Print one line to standard error when a kernel is compiled from now on, if `may_print()` allows it."""
+    """Print a notice to standard error the first time a kernel is compiled, if `may_print()` allows it."""
     register("numba:compile", _Notice(may_print))

@@ -1,4 +1,4 @@
-"""Executors of a batch: processes of this machine, which end with their parent, or a Ray cluster."""
+"""Workers of a batch: processes on this machine, which end with their parent, or a Ray cluster."""
 
 import functools
 import multiprocessing
@@ -19,14 +19,15 @@ QUEUED_PER_WORKER = 2  # few, so that Ctrl-C takes effect soon
 
 
 class _Pool(ProcessPoolExecutor):
-    """A pool whose processes block signals, so that only the parent stops a batch."""
+    """A pool whose processes block signals, so that only the parent process can stop a batch."""
 
     @property
     def room(self) -> int:
         return int(self._max_workers * QUEUED_PER_WORKER)  # type: ignore[attr-defined]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        with signals_postponed() as signals:  # another thread may receive a signal that this one blocks
+        # Another thread may still receive a signal that is blocked in this one
+        with signals_postponed() as signals:
             before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             try:
                 future = super().submit(fn, *args, **kwargs)
@@ -39,7 +40,7 @@ class _Pool(ProcessPoolExecutor):
 @contextmanager
 def worker_pool(count: int | None = None) -> Iterator[_Pool]:
     """Start worker processes, by default one per core. They end at once if the block raises or this process dies."""
-    # Spawned, not forked: a forked GL context or thread pool does not work.
+    # Processes are spawned, because GL contexts and thread pools do not survive a fork.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
     pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(end_of_work, context.Semaphore(1)))
@@ -53,7 +54,6 @@ def worker_pool(count: int | None = None) -> Iterator[_Pool]:
 
 
 def _begin(end_of_work: Connection, may_print: Semaphore) -> None:
-    """Initialize a worker. Only one of them announces that kernels are compiled."""
     from experiments.trials.warmup import announce_compiling  # imported late because numba loads slowly
 
     announce_compiling(lambda: may_print.acquire(block=False))
@@ -91,8 +91,8 @@ class Executor(Protocol):
 PROCESSES, RAY = "processes", "ray"
 Pools = Callable[
     [], AbstractContextManager[Executor]
-]  # makes a new executor each time, for use after a crash
-# Arguments: number of workers or None, user modules, callback for notes, and work folder of the batch
+]  # makes a new executor each time, so that a batch can continue after a crash
+# Arguments: number of workers or None, user modules, callback for messages, and work folder of the batch
 EXECUTORS: Mapping[str, Callable[..., AbstractContextManager[Pools]]] = {
     PROCESSES: lambda workers, *_: nullcontext(functools.partial(worker_pool, workers)),
     RAY: ray_cluster,

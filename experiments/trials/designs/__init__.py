@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent
 
 
 def study_path(name: str) -> Path:
-    """Return the file of a study, which exists: a path, or the name of a study in this package (`paper`)."""
+    """Return the path of a study file. `name` is a path, or the name of a study in this package (`paper`)."""
     own, packaged = Path(name), FOLDER / f"{name}.toml"
     if not own.is_file() and not packaged.is_file():
         raise ConfigError(
@@ -24,7 +24,7 @@ def study_path(name: str) -> Path:
 
 
 def read_study(path: Path, people: int | None = None) -> Design:
-    """Read the simulated participants of a study file, alternating between cells. `people` limits their number.
+    """Read the simulated participants of a study file, alternating between its cells. `people` limits their number.
 
     Raises:
         ConfigError: The file, the number, or a trial for a person is invalid.
@@ -47,7 +47,6 @@ def read_study(path: Path, people: int | None = None) -> Design:
 
 
 def _in_turn(groups: Iterable[list[TrialConfig]]) -> list[TrialConfig]:
-    """Return the first of each group, then the second of each, and so on."""
     return [trial for turn in itertools.zip_longest(*groups) for trial in turn if trial is not None]
 
 

@@ -1,1 +1,1 @@
-"""Simulates recorded runs again, compares every control step, and films them in other views."""
+"""Replays of recorded runs, which are simulated again, compared with the record, and filmed in other views."""

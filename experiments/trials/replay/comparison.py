@@ -28,16 +28,16 @@ from experiments.session.assistant import WORLD_EVENTS
 from experiments.session.familiarise import watch_flythrough
 from experiments.trials.replay.replayer import Replayer
 
-# Events that a replay computes again. Plans and regrets are taken from the log without a new search, so only the hashes
-# of the log protect them.
+# Events that a replay recomputes. Plans and regrets come from the log, because a replay does not search for them again.
+# Only the hashes of the log protect them.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
 REGRETS = frozenset({"regret_m", "suggested_regret_m"})
-SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # checked by simulating the run again
-DERIVED = (records.PLAN, records.METRICS)  # computed from these files
+SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # verified by simulating the run again
+DERIVED = (records.PLAN, records.METRICS)  # computed from the files above
 
 
 def simulated_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
-    """Yield differences between a finished replay and the states, poses, checkpoints and events of the record."""
+    """Compare the states, poses, checkpoints and events of a finished replay with the record. Yield the mismatches."""
     if replayer.mismatch is not None:
         yield replayer.mismatch
     replayed = replayer.replayed()
@@ -66,7 +66,6 @@ def _compare_trajectory(replayer: Replayer, replayed: Record) -> Iterator[Mismat
 
 
 def _first_difference(replayed: NDArray[Any], recorded: NDArray[Any]) -> int | None:
-    """Return the index of the first row that differs in any bit, or None. Extra rows at the end are ignored."""
     rows = enumerate(zip(replayed, recorded, strict=False))
     return next((i for i, (a, b) in rows if a.tobytes() != b.tobytes()), None)
 
@@ -122,7 +121,7 @@ def _describe(event: Event) -> str:
 
 
 def phase_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
-    """Yield differences in the phases before the task of a simulated participant, and in the bins that it saw.
+    """Compare the phases before a simulated participant's task, and the bins seen in them. Yield the mismatches.
 
     The training has its own run directory, which is replayed separately.
     """
@@ -158,7 +157,7 @@ def _mismatch(message: str) -> Mismatch:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a replay for one file, with a text that says what was checked or what is wrong."""
+    """Result of a replay for one file, with a text that describes the check or the fault."""
 
     file: str
     verified: bool
@@ -178,7 +177,7 @@ def verdicts(
         record: Its record.
         mismatches: All differences.
         first: First control step that was simulated again.
-        end: Control step after the last one.
+        end: Control step after the last one that was simulated again.
     """
     wrong: dict[str, str] = {}
     for mismatch in mismatches:

@@ -17,18 +17,17 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-# Simulated time, s -> camera pose
+# Maps simulated time in seconds to a camera pose
 CameraPath = Callable[[float], CameraPose]
 Bounds = tuple[float, float, float, float]
 
-_TOP_DOWN_FOV = math.radians(
-    20.0
-)  # narrow, so that the camera is far away and walls hide little of the floor
+_TOP_DOWN_FOV = math.radians(20.0)
 _FREE_FOV = math.radians(50.0)
-_MARGIN = 1.12  # extra camera distance, because the tops of walls are nearer than the floor
+# Factor on the camera distance, because the tops of walls are nearer to the camera than the floor
+_MARGIN = 1.12
 _ORBIT_PERIOD_S = 90.0
 _ELEVATION = math.radians(52.0)
-_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that no object in a house has
+_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # not used by any object in a house
 _HEAD_COLOUR: Rgba = (0.93, 0.74, 0.22, 1.0)
 
 
@@ -39,10 +38,10 @@ def camera_path(
 
     Args:
         camera: `top-down` or `free`.
-        bounds: Bounds of the floor: x_min, y_min, x_max, y_max, m.
+        bounds: Bounds of the floor in metres: x_min, y_min, x_max, y_max.
         aspect: Width of the frames divided by their height.
-        eye: Position of a free camera, m, or None to circle the house.
-        target: Target of a free camera, m, or None for the middle of the floor.
+        eye: Position of a free camera in metres, or None to circle the house.
+        target: Point at which a free camera looks, in metres, or None for the middle of the floor.
     """
     x_min, y_min, x_max, y_max = bounds
     middle = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
@@ -69,7 +68,7 @@ def camera_path(
 
 
 class ExternalViewer:
-    """A viewer that films a session from outside, without ceilings. Use it as a context manager.
+    """A viewer that films a session from outside, without showing ceilings. Use it as a context manager.
 
     Args:
         scene: The scene to render.
@@ -93,7 +92,7 @@ class ExternalViewer:
         return None
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Film one frame with the house, the person, and the world-locked markers of the HUD."""
+        """Film one frame with the house, the person, and the markers that the HUD places in the world."""
         markers = [*hud_state.markers, *figure(observation, self._person)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 
@@ -110,7 +109,7 @@ class ExternalViewer:
 
 
 def figure(observation: Observation, person: PersonParameters) -> tuple[Marker, ...]:
-    """Return markers for the person: a body, a head, and a nose that shows the heading."""
+    """Return markers that represent the person: a body, a head, and a nose that points along the heading."""
     x, y = (float(v) for v in observation.position)
     c, s = math.cos(observation.heading), math.sin(observation.heading)
     height, radius = person.eye_height, person.body_radius

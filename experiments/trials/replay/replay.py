@@ -22,7 +22,7 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
-MAX_WIDTH = 1280  # maximum width (px) of the view in a film with the shape of the person's page
+MAX_WIDTH = 1280  # maximum width of the view in pixels, in a film shaped like the participant's page
 
 Point = tuple[float, float, float]
 
@@ -33,11 +33,11 @@ class ReplayFilm:
 
     Attributes:
         path: Video file to write.
-        config: Frame size and render profile. With None, frames have the shape of the person's page if there was
-            one, else the default size.
+        config: Frame size and render profile. If it is None, frames are shaped like the participant's page, or have the
+            default size if there was no page.
         camera: `first-person` (with the HUD), `top-down`, or `free`.
-        eye: Position of a free camera, m, or None to circle the house.
-        target: Target of a free camera, m, or None for the middle of the floor.
+        eye: Position of a free camera in metres, or None to circle the house.
+        target: Point at which a free camera looks, in metres, or None for the middle of the floor.
 
     Raises:
         ConfigError: The camera is unknown or cannot be moved.
@@ -64,11 +64,11 @@ class ReplayReport:
     Attributes:
         first: Control step at which the replay started.
         steps: Number of verified control steps.
-        ended: Why the run ended.
-        failure: Error of the physics that ended run and replay, or None.
-        differences: Versions and models that differ from those of the recording, without effect on the result.
+        ended: Reason why the run ended.
+        failure: Physics error that ended both the run and the replay, or None.
+        differences: Versions and models that differ from those of the recording but did not change the result.
         frames_sha256: Hash of the filmed frames, or None.
-        as_filmed: Whether these frames equal those of the run's video bit for bit, or None without both films.
+        as_filmed: True if these frames equal those of the run's video bit for bit. None unless both were filmed.
     """
 
     first: int
@@ -98,27 +98,27 @@ def replay(
 
     Args:
         directory: Run directory.
-        start: Simulated time, s. The replay starts at the last checkpoint at or before it.
+        start: Simulated time in seconds. The replay starts at the last checkpoint at or before it.
         film: Settings of the film, or None.
-        watch: Makes a viewer of the replay in place of a film, or None.
-        assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are the
-            recorded ones in any case.
+        watch: Makes a viewer that replaces the film, or None.
+        assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are always
+            the recorded ones.
         house: The house of the run, if it is loaded already.
-        catalogue: Path of the house's catalogue, if it was moved. Its content must be the recorded one.
+        catalogue: Path of the house's catalogue, if it was moved. Its content must not have changed.
         language: Language of the texts in the film.
-        on_progress: Called with the numbers of replayed and of recorded control steps.
+        on_progress: Called with the number of control steps replayed so far and the total number.
 
     Raises:
         RecordError: `directory` is not a run directory.
-        ReplayError: The run cannot be replayed, or differs from the record.
-        ConfigError, MjsimError, HudError: The house, the condition or the film is not usable.
+        ReplayError: The run cannot be replayed, or it differs from the record.
+        ConfigError, MjsimError, HudError: The house, the condition or the film cannot be used.
     """
     record = read_run(directory)
     if faults := damage(record):
         faults += checksum_mismatches(directory, record)
         raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
     duration = float(record.trajectory["time"][-1])
-    if start > round(duration, 6):  # as times in the log
+    if start > round(duration, 6):  # times in the log are rounded to 6 digits
         raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
     house = (house or _house_of(directory, record, catalogue)).in_language(language)
     shown = assistance or str(record.start["assistance"])
@@ -149,7 +149,7 @@ def replay(
 
 
 def _mismatches(replayer: Replayer) -> list[Mismatch]:
-    """Return all mismatches of a replay and of files, by step. Checksums come last, being the least specific."""
+    """Return all mismatches of a replay, sorted by step. Those of checksums come last, being the least specific."""
     directory, record = replayer.directory, replayer.record
     simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
     found = sorted(simulated, key=lambda mismatch: mismatch.step)

@@ -1,4 +1,4 @@
-"""Simulates the session of a recorded run again, with the plans of its log."""
+"""Simulates the session of a recorded run again, with the plans from its log."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,19 +32,19 @@ class Replayer:
 
     Args:
         directory: The run directory.
-        record: Its undamaged record.
+        record: Its record, which must be undamaged.
         house: The house of the run.
-        start: Simulated time, s. The replay starts at the last checkpoint at or before it.
+        start: Simulated time in seconds. The replay starts at the last checkpoint at or before it.
         assistance: Assistance condition whose HUD is shown.
 
     Attributes:
         first: Control step at which the replay starts.
-        mismatch: Why the replay stopped before the end of the record, or None.
+        mismatch: Mismatch that stopped the replay before the end of the record, or None.
         differences: Versions and models that differ from those of the recording.
-        failure: Error of the physics in the replay, or None.
+        failure: Physics error in the replay, or None.
 
     Raises:
-        ReplayError: This version cannot replay the record.
+        ReplayError: This version of mjsim cannot replay the record.
     """
 
     def __init__(
@@ -83,12 +83,12 @@ class Replayer:
             self.failure = str(error)
 
     def replayed(self) -> Record:
-        """Return the record of the replay from step `first` on. Its log also has the earlier events."""
+        """Return the record of the replay from step `first` on. Its log also contains the earlier events."""
         return self._written.record()
 
     @property
     def logged_before(self) -> int:
-        """Number of events in the log of the replay that were not simulated."""
+        """Number of events in the replay's log that were copied from the record rather than simulated."""
         return self.record.events_before(self.first) if self.first else 0
 
     def _restored_session(self, viewer: Viewer | None) -> Session:
@@ -113,7 +113,6 @@ class Replayer:
         return session
 
     def _repeat(self, session: Session, step: int) -> bool:
-        """Repeat a control step, or the end of the session. Return True if there is more to repeat."""
         record, is_last = self.record, step == self.record.steps - 1
         if (reason := session.end_reason) is not None:
             session.end(reason)
@@ -124,9 +123,7 @@ class Replayer:
             action = record.action(step)
         except RecordError as error:
             return self._stop(step, str(error))
-        if (
-            is_last and record.reason != PHYSICS_ERROR
-        ):  # the run was interrupted in this step, so only the state is known
+        if is_last and record.reason != PHYSICS_ERROR:
             seen = self._written.pass_checkpoint(self._world, self._world.observation())
             self._written.append(seen, self._world.health_sample, self._world.state_hash(), Steps(action))
         else:
@@ -141,8 +138,6 @@ class Replayer:
 
 
 class _NoParticipant:
-    """Placeholder for the participant of a replay, which repeats recorded actions."""
-
     needs: frozenset[str] = frozenset()
 
     def act(self, percept: Percept) -> Never:
@@ -156,7 +151,7 @@ def mismatch_error(
     differences: tuple[str, ...] = (),
     verdicts: tuple[object, ...] = (),
 ) -> ReplayError:
-    """Return a one-line error with the first bad step, the fault and possible reasons."""
+    """Return a one-line error that names the first mismatch and its possible causes."""
     timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
     where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
     reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
@@ -177,11 +172,11 @@ def _differences(then: Event, now: Mapping[str, Any]) -> list[str]:
 
 
 class LogSource(PlanSource):
-    """Plans of a log, each at its logged time, in place of new plans.
+    """Provides the plans of a log at their logged times, instead of new plans.
 
     Args:
         plans: The `plan` events of the log, in order.
-        clock: Returns the simulated time, s.
+        clock: Returns the simulated time in seconds.
     """
 
     def __init__(self, plans: Sequence[Event], clock: Callable[[], float] = lambda: 0.0) -> None:
@@ -189,22 +184,22 @@ class LogSource(PlanSource):
         self._plans = list(plans)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """The visits that are not done, or None if a plan was logged now."""
+        """The remaining visits, or None if a plan was logged at the current time."""
         return None if self._is_due else tuple(v for v in route.visits if _is_open(v, state))
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:  # noqa: ARG002 - both are logged
-        """The plan that was logged now. Every run logs one at the start."""
+        """The plan logged at the current time. Every run logs a plan at the start."""
         if not self._is_due:
             raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
         return _route(self._plans.pop(0), state)
 
     @property
     def pending(self) -> bool:
-        """True if a better plan for the same task was logged now."""
+        """True if a better plan for the same task was logged at the current time."""
         return self._is_due and bool(self._plans[0].get("improved", False))
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """The better plan that was logged now, or None."""
+        """The better plan logged at the current time, or None."""
         return self.plan(state, route, shown=True) if self.pending else None
 
     @property
