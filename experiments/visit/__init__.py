@@ -1,4 +1,4 @@
-"""Visits of participants: their plan, phases, server and database."""
+"""Visits of participants to a study: plan, phases, server and database."""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
-"""Visit folders. Each holds the settings, journals and runs of one participant's trials.
+"""Visit folders. Each contains the settings, journals and runs of one participant's trials.
 
-A visit's folder is named after the SHA-256 of the token in the participant's link. Only the database records the
-participant's progress.
+The folder's name is the SHA-256 of the token in the participant's link. The participant's progress is only in the
+database.
 """
 
 import shutil
@@ -19,11 +19,11 @@ from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import JOURNALS, VISIT
 from mjsim.support.files import write_text_atomically
 
-VISITS = "visits"  # name of the folder of visits, within a study's folder
+VISITS = "visits"  # subfolder of a study's folder that contains all visit folders
 
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A phase that has ended, with the fields of a `phase_ended` event. Only a training has a `reason`."""
+    """A phase that has ended, with the fields of a `phase_ended` event. Only training phases have a `reason`."""
 
     phase: str
     duration_s: float
@@ -32,18 +32,18 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """Content of `visit.json`, which is written once."""
+    """Contents of `visit.json`, which is written once and never changed."""
 
     phase: str  # phase in which the folder was created
-    phases: list[str]  # played phases, in order
+    phases: list[str]  # phases with trials, in order
     trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
-    ended: list[Ended] = []  # phases that ended before the first trial
-    version: int = 1  # format version
+    ended: list[Ended] = []  # phases that ended before the first trial began
+    version: int = 1
 
 
 @dataclass(frozen=True)
 class VisitFolder:
-    """Folder of one visit."""
+    """The folder of one visit."""
 
     path: Path
     stored: Stored
@@ -58,7 +58,7 @@ class VisitFolder:
         return self.path / JOURNALS / phase
 
     def is_over(self, phase: str) -> bool:
-        """Return True if the run directory of a phase has been written."""
+        """Return True if the trial of a phase has ended and its run directory has been written."""
         return (self.run(phase) / records.METRICS).is_file()
 
     def metrics(self, phase: str) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class VisitFolder:
         return found
 
     def before(self, phase: str) -> list[dict[str, Any]]:
-        """Return the fields of all `phase_ended` events before the task. For other phases, there are none."""
+        """Return the fields of all `phase_ended` events before the task. The list is empty for other phases."""
         if phase != TASK:
             return []
         ended = [one for one in self.stored.ended if one.phase != TRAINING]
@@ -82,7 +82,7 @@ class VisitFolder:
 
 
 class VisitFolders:
-    """Folders of all visits."""
+    """The folders of all visits."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
@@ -111,7 +111,7 @@ class VisitFolders:
         return VisitFolder(folder, stored)
 
     def remove(self, name: str) -> None:
-        """Delete a visit with its journals and runs."""
+        """Delete the folder of a visit, including its journals and runs."""
         shutil.rmtree(self.path / name, ignore_errors=True)
         sync_folder(self.path)
 
@@ -119,7 +119,7 @@ class VisitFolders:
         """Return the folder of a visit, or None if there is none.
 
         Raises:
-            RecordError: Its `visit.json` is damaged.
+            RecordError: The folder's `visit.json` is damaged.
         """
         path = self.path / name / VISIT
         try:

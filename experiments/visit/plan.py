@@ -1,4 +1,4 @@
-"""The plan of a visit, which a server follows to take participants through all phases."""
+"""Visit plans, which determine the phases through which a server takes participants."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,21 +26,21 @@ class Device(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
     latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
-    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # smallest window, in pixels
+    width: Annotated[int, msgspec.Meta(ge=0)] = 800  # minimum width of the window, in pixels
     height: Annotated[int, msgspec.Meta(ge=0)] = 500
     keyboard: bool = True
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Timeouts and numbers of attempts."""
+    """Timeouts of participants, and limits on failed checks."""
 
-    idle: Seconds = 1800.0  # inactivity after which a trial releases its slot, in seconds
-    abandoned_after: Seconds = 1800.0  # inactivity after which the place in a cell is released, in seconds
-    timed_out_after: Seconds = 14400.0  # inactivity after which the participation ends, in seconds
+    idle: Seconds = 1800.0  # inactivity after which a trial's slot is released, in seconds
+    abandoned_after: Seconds = 1800.0  # inactivity after which a place in a cell is released, in seconds
+    timed_out_after: Seconds = 14400.0  # inactivity after which a participant is timed out, in seconds
     attempts: Count = 3  # number of attempts allowed at the comprehension check
-    # number of wrong answers allowed in the survey's attention checks; None disables screening by them
+    # number of wrong answers allowed in the survey's attention checks; if None, they do not screen out anyone
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # days from the last activity until identifying data are deleted
+    keep_days: Count | None = None  # number of days after the last activity when identifying data is deleted
 
     def __post_init__(self) -> None:
         if self.timed_out_after < self.abandoned_after:
@@ -52,20 +52,20 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 @dataclass(frozen=True)
 class VisitPlan:
-    """Plan of all visits of a study, or of `mjsim play`.
+    """A plan for all visits to a study or to `mjsim play`.
 
     Attributes:
         name: Name of the study in the database.
         language: Language tag of the pages.
-        phases: Names of the phases, in order. A visit is finished when it reaches the last one.
+        phases: Names of the phases, in order. A visit is finished once it reaches the last one.
         story: Text of the story, with blank lines between paragraphs.
-        minimum: Minimum duration by phase, in seconds. Infinite for a trial that the participant cannot end early.
-        optional: Phases that may be skipped.
-        minutes: Expected duration of a visit.
+        minimum: Minimum duration of each phase, in seconds. It is infinite for trials that cannot be ended early.
+        optional: Names of the phases that participants may skip.
+        minutes: Expected duration of a visit, in minutes.
         cells: Cells of the design. Each participant is assigned a place in one of them.
-        trials: Returns the settings of the trials of an assignment, by phase.
+        trials: Function that returns the settings of an assignment's trials, by phase.
         headset: True if trials can be played with a VR headset.
-        floor_plan: True if the run of the task gets a floor plan with the paths walked.
+        floor_plan: True if a floor plan with the paths walked is added to the run of the task.
         rehearsal: True if all participants are simulated.
     """
 

@@ -1,4 +1,4 @@
-"""Progress of visits through their phases."""
+"""Progress of participants through the phases of a visit."""
 
 import asyncio
 import dataclasses
@@ -24,18 +24,18 @@ from experiments.visit.store.values import utc_now
 from experiments.web.server.player import LiveTrial
 
 LOG = logging.getLogger("mjsim.study")
-FULL = "full"  # reason recorded for a phase that ended because no place was left
-ATTEMPTS = "attempts"  # name of the answer that counts attempts at a phase
+FULL = "full"  # recorded as the reason if a phase ends because all cells are full
+ATTEMPTS = "attempts"  # name of the answer that stores the number of attempts at a phase
 
 
 @dataclass(frozen=True)
 class PhaseState:
-    """Current state of a visit.
+    """The current state of a visit.
 
     Attributes:
         phase: Current phase, or None if the participation has ended.
-        number: Number of the phase, from 1.
-        wait: Time until the phase may be ended, in seconds.
+        number: Number of the current phase, counted from 1.
+        wait: Time until the participant may end the phase, in seconds.
     """
 
     person: PersonRow
@@ -70,17 +70,17 @@ class Procedure:
         return PhaseState(person, self.phases[number], number + 1, visitor, wait)
 
     async def times(self, person: PersonRow) -> tuple[float, float]:
-        """Return the time since the phase was first shown and the time until it may end, in seconds."""
+        """Return the time since the current phase was first shown and the time until it may end, both in seconds."""
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
         minimum = self.plan.minimum.get(person.phase, 0.0)
-        # If the clock was set back, `passed` is negative, and the participant need not wait.
+        # If `passed` is negative, the clock was set back, and the participant need not wait.
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
     async def submit(self, now: PhaseState, phase: str, sent: FormData) -> Again | None:
         """Handle a submitted form.
 
-        Return an error message, or None if it was accepted or belongs to an earlier page.
+        Return None if the form was accepted or belongs to an earlier page.
         """
         current = now.phase
         if current is None or phase != current.name or isinstance(current, TrialPhase):
@@ -103,7 +103,7 @@ class Procedure:
         return None
 
     async def save(self, now: PhaseState, phase: str, sent: FormData) -> None:
-        """Store the answers of a form that has not been submitted yet."""
+        """Save the answers in a form that has not been submitted yet."""
         current = now.phase
         if current is None or phase != current.name or not hasattr(current, "drafts"):
             return
@@ -130,12 +130,12 @@ class Procedure:
             await asyncio.to_thread(self.folders.remove, person.token_hash)
 
     async def room(self) -> int:
-        """Return the number of free places that are not yet claimed by participants in earlier phases."""
+        """Return the number of free places that participants in earlier phases do not need."""
         wanted = [cell.wanted for cell in self.plan.cells]
         return await self.store.room(wanted, self.names[0], self._away)
 
     async def turn_away(self, person: PersonRow) -> PersonRow:
-        """End a participation for which there is no place."""
+        """End the visit of a participant for whom no place is free."""
         here = person.phase
         await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
         return await self.store.person(person.id)
@@ -154,9 +154,9 @@ class Procedure:
         return person
 
     async def recover(self, before: datetime.datetime | None = None) -> None:
-        """Record ended trials that the database lacks, for all participants or those inactive since `before`.
+        """Record trials that have ended but are missing in the database, skipping damaged folders.
 
-        A damaged folder is logged and skipped.
+        This is done for the participants inactive since `before`, or for all of them.
         """
         for person in await self.store.people():
             if before is None or person.seen < before:
@@ -166,7 +166,7 @@ class Procedure:
                     LOG.error("person %d: %s", person.id, error)
 
     async def adopt(self) -> None:
-        """Add participants to the database for visit folders older than the database of `mjsim play`."""
+        """Add the participants of existing visit folders to a new database of `mjsim play`."""
         for name in await asyncio.to_thread(self.folders.names):
             try:
                 folder = self.folders.find(name)
@@ -180,7 +180,6 @@ class Procedure:
                 await self.store.arrive(self.plan.recruiter.platform, None, {}, folder.path.name, here)
 
     async def _leave_missing_phase(self, person: PersonRow) -> PersonRow:
-        """Advance a participant whose phase the plan lacks, such as a film that the server no longer has."""
         order = (*PHASES, RESULT)
         later = order[order.index(person.phase) + 1 :] if person.phase in order else ()
         following = next((name for name in later if name in self.names), None)
@@ -199,7 +198,7 @@ class Procedure:
         return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
 
     async def _after_earlier_visit(self, person: PersonRow, place: Assignment) -> Assignment:
-        """Return `place`, but with the house seed after that of the participant's earlier visit, if any."""
+        """Return `place`, with the next house seed if the participant has completed an earlier visit."""
         earlier = (await self.store.identity(person.id)).get(AFTER)
         folder = self.folders.find(earlier) if earlier else None
         if folder is None or not folder.is_over(TASK):
@@ -222,7 +221,7 @@ class Procedure:
 
 
 class BrowserPlayer:
-    """A participant of a procedure who plays in a browser."""
+    """A participant who plays the trials of a visit in a browser."""
 
     def __init__(self, procedure: Procedure, person: PersonRow) -> None:
         self.key = person.token_hash
@@ -248,5 +247,5 @@ class BrowserPlayer:
             texts=procedure.plan.texts["hud"].words,
         )
 
-    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002 - the folder shows which trials are over
+    async def over(self, trial: LiveTrial) -> None:  # noqa: ARG002
         await self._procedure.record_trials(await self._procedure.store.person(self._id))

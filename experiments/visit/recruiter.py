@@ -1,4 +1,4 @@
-"""The interface of recruitment platforms: arrivals, and the link that leads back to the platform."""
+"""Interface of recruitment platforms for arriving and departing participants."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,17 +6,17 @@ from typing import Literal, Protocol
 
 from experiments.visit.tokens import TOKEN, token_hash
 
-AFTER = "after"  # query parameter with the token of an earlier visit
+AFTER = "after"  # query parameter for the token of an earlier visit
 Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_out"]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A person who may take part.
+    """A person who may take part in the study.
 
     Attributes:
-        key: The platform's id of the person, by which a second visit is recognized, or None.
-        identity: All ids needed for payment. They never leave the store.
+        key: The person's id on the platform, by which returning participants are recognized, or None.
+        identity: All ids needed for payment. They are never exported.
     """
 
     key: str | None = None
@@ -25,23 +25,23 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Preview:
-    """A person who looks at the study before accepting it."""
+    """A person who views the study on the platform before accepting it."""
 
 
 @dataclass(frozen=True)
 class InvalidLink:
-    """A link that is not valid for the platform, and the reason."""
+    """A link that the platform cannot have created, and the reason why."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class WayBack:
-    """How the last page sends the participant back to the platform.
+    """The way in which the last page sends a participant back to the platform.
 
     Attributes:
         fields: Fields of a form that is posted to `url`, or None for a plain link.
-        gives_back: True if the participant must return the task on the platform's page.
+        gives_back: True if the participant must return the task on the platform's own page.
     """
 
     code: str = ""
@@ -55,10 +55,10 @@ class Recruiter(Protocol):
     """A recruitment platform.
 
     Attributes:
-        platform: Name in the study file.
-        parameters: Query parameters of its links, which the welcome page passes on.
-        has_time_limit: True if the platform limits the duration of a participation.
-        embedded_by: Sites that may embed the study in a frame and receive its last form.
+        platform: Name of the platform in the study file.
+        parameters: Query parameters of the platform's links. The welcome page passes them on.
+        has_time_limit: True if the platform limits the duration of visits.
+        embedded_by: Origins of pages that may embed the study in a frame and receive its last form.
     """
 
     platform: str
@@ -67,20 +67,20 @@ class Recruiter(Protocol):
     embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Check the query of the link with which a person arrives."""
+        """Check the query parameters of the link with which a person arrives."""
         ...
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """Return how a participant with this final status gets back to the platform."""
+        """Return how a participant with the final status `how` gets back to the platform."""
         ...
 
 
 class OpenLink:
-    """An open link. Everyone may take part, and gets a personal link for returning.
+    """An open link, with which anyone may take part. Each participant gets a personal link for returning.
 
     Args:
-        platform: `link`, or `lab`, where the last page leads to the first one for the next participant.
-        repeats: True if a link for playing again contains the token of the earlier visit.
+        platform: `link`, or `lab` if the last page should lead to the first one for the next participant.
+        repeats: True if links for playing again contain the token of the earlier visit.
     """
 
     has_time_limit = False
@@ -94,6 +94,6 @@ class OpenLink:
         earlier = query.get(AFTER, "") if AFTER in self.parameters else ""
         return Candidate(identity={AFTER: token_hash(earlier)} if TOKEN.fullmatch(earlier) else {})
 
-    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002 - there are no ids
+    def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:  # noqa: ARG002
         code = self._code if how == "finished" else ""
         return WayBack(code, "/", label="next_person") if self.platform == "lab" else WayBack(code)

@@ -1,4 +1,4 @@
-"""Tokens of personal links, and keys that recognize a platform's participants."""
+"""Tokens of personal links, and keys for recognizing the participants of a platform."""
 
 import base64
 import hashlib
@@ -14,22 +14,22 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """Return the SHA-256 of a token in hexadecimal. Only this hash is stored."""
+    """Return the SHA-256 of a token in hexadecimal. The token itself is never stored."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
 class Keys:
-    """Keys and tokens derived from a study's secret."""
+    """Derives keys and tokens from a study's secret."""
 
     def __init__(self, secret: bytes, study: str) -> None:
         self._secret, self._study = secret, study
 
     def person(self, platform_id: str) -> str:
-        """Return the key of a platform's participant in hexadecimal."""
+        """Return the key for a participant's platform id, in hexadecimal."""
         return self._digest(f"key:{platform_id}").hex()
 
     def token(self, platform_id: str) -> str:
-        """Return the token of a platform's participant, the same at each arrival."""
+        """Return the token for a participant's platform id. It is the same at each arrival."""
         return base64.urlsafe_b64encode(self._digest(f"token:{platform_id}")).decode().rstrip("=")
 
     def _digest(self, text: str) -> bytes:

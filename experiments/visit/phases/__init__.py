@@ -35,7 +35,7 @@ KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
 
 
 def phases_of(plan: VisitPlan) -> Sequence[Phase]:
-    """Create the phases of a plan, in order. A custom phase has the name of its factory, `package.module:attribute`.
+    """Create the phases of a plan, in order. A custom phase is named after its factory, `package.module:attribute`.
 
     Raises:
         ConfigError: A phase cannot be loaded or created.
@@ -48,7 +48,7 @@ def _phase(name: str, plan: VisitPlan) -> Phase:
         return KINDS[name](plan)
     try:
         phase = pkgutil.resolve_name(name)(plan)
-    except Exception as error:  # user code may raise any exception
+    except Exception as error:  # custom phases may raise any exception
         raise ConfigError(f"cannot make phase {name!r}: {type(error).__name__}: {error}") from error
     if not isinstance(phase, Phase):
         raise ConfigError(f"phase {name!r} is {phase!r}, which has not all of name, page and read")

@@ -1,4 +1,4 @@
-"""The device check: WebGL 2, frame rate, connection, keyboard and window size."""
+"""Device check of WebGL 2, frame rate, connection, keyboard and window size."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from experiments.visit.phases.base import Again, Done, FormData, FormPhase, Visi
 from experiments.visit.plan import Device
 
 MEASURES = ("frames_per_s", "latency_ms", "width", "height", "pixel_ratio")
-MAX_RENDERER = 200  # maximum length of the renderer's name, in characters
+MAX_RENDERER = 200  # maximum length of the WebGL renderer's name, in characters
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class _Measured:
     renderer: str
 
     def faults(self, needed: Device, draws: bool) -> list[str]:
-        """Return the names of the messages about unmet requirements.
+        """Return the names of the texts about unmet requirements.
 
-        The frame rate counts only if the browser `draws`, rather than the server.
+        The frame rate is only checked if the browser `draws` the scene, rather than the server.
         """
         values = self.values
         found = [
@@ -35,12 +35,12 @@ class _Measured:
 
 
 class DeviceCheck(FormPhase):
-    """A page that measures the participant's computer and submits the result."""
+    """A page that tests the participant's computer and submits the measurements."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"keyboard": self._plan.device.keyboard}
 
-    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002 - the form suffices
+    def read(self, visitor: Visitor, sent: FormData) -> Done | Again:  # noqa: ARG002
         measured = _measured(sent)
         if measured is None:
             return Again(self._plan.texts["common"]["needs_script"])

@@ -1,1 +1,1 @@
-"""The visit server: pages and WebSockets for participants."""
+"""Server of the pages and WebSockets that participants use."""

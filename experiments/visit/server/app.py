@@ -1,4 +1,4 @@
-"""The application of the visit server."""
+"""Web application through which participants visit a study."""
 
 import asyncio
 import logging
@@ -32,19 +32,19 @@ from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 FILM_HEADERS = {"Cache-Control": "private, max-age=86400"}
-MAX_FORM = 64 * 1024  # maximum size of a form, in bytes
+MAX_FORM = 64 * 1024  # maximum size of a submitted form, in bytes
 
 
 @dataclass(frozen=True)
 class ServerOptions:
-    """Options of a server that are not part of the plan.
+    """Options of a server that do not depend on the plan.
 
     Attributes:
-        secret: Key for deriving the tokens of participants with a platform id.
+        secret: Key from which the tokens of participants with a platform id are derived.
         proxies: Proxies whose X-Forwarded-For header is trusted.
         host: Name of this host if several share a database, or None.
-        workers: Number of concurrent trials, or None to measure the machine's capacity.
-        background: Tasks that run as long as the server.
+        workers: Maximum number of concurrent trials, or None to measure the machine's capacity.
+        background: Tasks that run while the server runs.
     """
 
     secret: bytes = b""
@@ -56,11 +56,11 @@ class ServerOptions:
 
 
 class _ElsewhereError(Exception):
-    """The participant's visit is on another host."""
+    """The participant's visit is handled by another host."""
 
 
 class VisitServer:
-    """Pages and WebSockets of all visits."""
+    """Serves the pages and WebSockets of all visits."""
 
     def __init__(self, procedure: Procedure, pool: WorkerPool, options: ServerOptions) -> None:
         self._procedure, self._options, self._pool = procedure, options, pool
@@ -75,7 +75,7 @@ class VisitServer:
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
-        """Return the application for a server that listens at `host`. `public` is its URL behind a proxy."""
+        """Create the application for a server that listens on `host`. `public` is its URL behind a proxy, if any."""
         return Starlette(
             routes=[
                 Route("/", self._arrivals.welcome),
@@ -127,7 +127,7 @@ class VisitServer:
             await self.sessions.release()
             await self._pool.close()
             if self._host is not None:
-                with suppress(StoreError):  # the lease expires soon in any case
+                with suppress(StoreError):  # not critical, since the lease expires soon
                     await self._host.leave()
             await self._store.close()
 
@@ -145,7 +145,7 @@ class VisitServer:
 
     async def _save(self, request: Request) -> Response:
         person, form = await self._person(request), await sent_form(request)
-        async with self._lock(person):  # so that an older answer cannot replace a newer one
+        async with self._lock(person):  # keeps an older answer from replacing a newer one
             now = await self._procedure.now(person, request.url.path)
             await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
@@ -162,7 +162,9 @@ class VisitServer:
             raise HTTPException(404)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
-            self.sessions.limit.release(person.token_hash)  # the visit may have a slot without a session
+            self.sessions.limit.release(
+                person.token_hash
+            )  # a visit can have a slot before its session starts
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -186,7 +188,9 @@ class VisitServer:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         if person is not None and self._host is not None and not await self._host.has(person):
-            await socket.send_denial_response(Response(status_code=404))  # makes the proxy try the next host
+            await socket.send_denial_response(
+                Response(status_code=404)
+            )  # causes the proxy to try the next host
             return
         if person is None:
             await socket.close(1008)
@@ -206,13 +210,15 @@ class VisitServer:
 
     async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person
-        begun = self._procedure.folders.find(person.token_hash)  # reads a small file, faster than in a thread
+        begun = self._procedure.folders.find(
+            person.token_hash
+        )  # reading a small file is faster without a thread
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))
         if (queued := self._trials.queued(person.token_hash)) is not None:
             if begun:
-                await self._store.beat(person.id)  # waiting counts as activity; `assign` records it otherwise
+                await self._store.beat(person.id)  # waiting in the queue counts as activity
             return self._pages.queue(request, now, queued)
         if isinstance(here, Assignment):
             here = await self._procedure.begin_playing(person, here)
@@ -229,7 +235,7 @@ class VisitServer:
         return self._pages.message(request, "unknown", 404)
 
     async def _elsewhere(self, request: Request, _: Exception) -> Response:
-        """Answer with 404, so that a proxy tries the next host. Without a proxy, the participant sees this page."""
+        """Respond with status 404, so that a proxy tries the next host. Without a proxy, participants see this page."""
         return self._pages.message(request, "paused", 404)
 
     async def _person(self, request: Request) -> PersonRow:
@@ -242,5 +248,5 @@ class VisitServer:
         return person
 
     def _lock(self, person: PersonRow) -> asyncio.Lock:
-        """Return a lock that keeps two pages of a participant from changing the phase concurrently."""
+        """Return the lock that keeps two pages of a participant from changing the phase at the same time."""
         return self._locks.setdefault(person.token_hash, asyncio.Lock())

@@ -1,4 +1,4 @@
-"""Background tasks of the visit server: timeouts of absent participants, and heartbeats of a host."""
+"""Background tasks that time out absent participants and send a host's heartbeats."""
 
 import asyncio
 import datetime
@@ -14,21 +14,21 @@ from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
 LOG = logging.getLogger("mjsim.study")
-HEARTBEAT_S = 10.0  # period of heartbeats to the database
-SWEEP_S = 60.0  # period of searching for absent participants
-CLOCK_SET_S = 30.0  # larger deviations mean that the clock was set or the machine slept
+HEARTBEAT_S = 10.0  # time between two heartbeats to the database
+SWEEP_S = 60.0  # time between two searches for absent participants
+CLOCK_SET_S = 30.0  # if two clocks deviate by more, the clock was set or the machine was suspended
 
 
 class HostOfVisits:
-    """This host, if several hosts share a database. `name` is unique among them."""
+    """This host, as one of several that share a database. `name` must be unique among them."""
 
     def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
         self._name, self._store, self._folders = name, store, folders
-        self._until = 0.0  # when the lease expires, by the monotonic clock
+        self._until = 0.0  # time at which the lease expires, by the monotonic clock
         self._new = False
 
     async def keep(self, sessions: Sessions) -> None:
-        """Send heartbeats until cancelled. End all sessions if the database has received none for too long."""
+        """Send heartbeats until cancelled. End all sessions if no heartbeat has reached the database for too long."""
         while True:
             began = time.monotonic()
             try:
@@ -41,7 +41,7 @@ class HostOfVisits:
             await asyncio.sleep(HEARTBEAT_S)
 
     async def has(self, person: PersonRow) -> bool:
-        """Return True if this host has the visit, claiming it if possible. Any host serves the phases before trials."""
+        """Claim a visit if possible. Return True if this host may serve it, as any host may before the trials begin."""
         if person.host is None and person.phase not in PLAYED:
             return True
         if time.monotonic() > self._until:
@@ -52,26 +52,28 @@ class HostOfVisits:
         return await self._store.claim(person.id, self._name, new=self._new, journal=journal)
 
     async def leave(self) -> None:
-        """Record that this host runs no more sessions."""
+        """Record that this host no longer runs sessions."""
         await self._store.greet(self._name, leaves=True)
 
 
 async def end_absent(procedure: Procedure) -> None:
-    """Time out absent participants until cancelled. Downtime of this server does not count as absence."""
+    """Time out absent participants until cancelled. Absence is not counted while the server is down."""
     away = procedure.plan.limits.timed_out_after
     since = time.monotonic()
     ahead = time.time() - since
     while True:
         await asyncio.sleep(SWEEP_S)
         now = time.monotonic()
-        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # restart, since activity is timed by that clock
+        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # wait again, since activity is timed by this clock
             since, ahead = now, time.time() - now
         if now - since < away:
             continue
         try:
             before = utc_now() - datetime.timedelta(seconds=away)
-            await procedure.recover(before)  # their trials may have ended without being recorded
+            await procedure.recover(
+                before
+            )  # trials of absent participants may have ended without being recorded
             if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
-        except StoreError as error:  # try again at the next sweep
+        except StoreError as error:  # the next sweep tries again
             LOG.warning("%s", error)

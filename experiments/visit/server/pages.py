@@ -1,4 +1,4 @@
-"""Rendering of phases, last pages and messages."""
+"""Render phases, last pages and messages as HTML pages."""
 
 import re
 from collections.abc import Mapping
@@ -17,13 +17,13 @@ from experiments.web.client_files import page
 
 
 class VisitPages:
-    """Renders the pages of a plan with its texts."""
+    """Renders pages with the texts of a plan."""
 
     def __init__(self, plan: VisitPlan) -> None:
         self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
 
     def show(self, request: Request, template: str, status: int = 200, **values: Any) -> Response:
-        """Render a template with the common texts."""
+        """Render a template with the texts that all pages share."""
         section: Any = values.get("section")
         if "paragraphs" not in values:
             values["paragraphs"] = section.paragraphs()
@@ -31,20 +31,20 @@ class VisitPages:
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
-        """Show the message whose text has this name."""
+        """Show a page with the message that has this name in the texts."""
         words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
-        """Show a message, by the name of its text, to a person who is not admitted to the study."""
+        """Show a message to a person who is not admitted to the study. `name` is the name of the text."""
         remembers = self._recruiter.platform == "link"
         return self._last(request, "welcome", name, "withdrawn", "closed", remembers=remembers)
 
     def phase(
         self, request: Request, now: PhaseState, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
-        """Show the participant's current phase, unless it is a trial."""
+        """Show the participant's current phase, which must not be a trial."""
         if now.phase is None:
             return self.left(request, now.person)
         shown = now.phase.page(now.visitor, refused)
@@ -56,7 +56,7 @@ class VisitPages:
         return self.show(request, shown.template, **values, back=back, finished=True)
 
     def queue(self, request: Request, now: PhaseState, queued: Queued) -> Response:
-        """Show the queue page, which reloads itself."""
+        """Show the queue page, which reloads itself periodically."""
         section = self._plan.texts["queue"]
         values = {"place": str(queued.position), "wait": str(max(1, round(queued.wait / 60.0)))}
         texts = [*section.paragraphs(), *section.paragraphs("time_limit")[: self._recruiter.has_time_limit]]
@@ -80,7 +80,7 @@ class VisitPages:
         }
 
     def left(self, request: Request, person: PersonRow) -> Response:
-        """Show the last page of a participant who did not finish."""
+        """Show the last page to a participant who did not finish."""
         names: Mapping[str, tuple[str, str, Leaving]] = {
             "no_consent": ("consent", "declined", "no_consent"),
             "withdrawn": ("withdrawal", "left", "withdrawn"),

@@ -1,4 +1,4 @@
-"""Trials of participants: their pages and WebSockets."""
+"""Serve the pages and WebSockets of participants' trials."""
 
 import asyncio
 import logging
@@ -26,22 +26,22 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Capacity, Sessions, usable_cores
 
 LOG = logging.getLogger("mjsim.study")
-BEAT_PERIOD = 60.0  # how often a participant's activity is recorded, in seconds
-SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # maximum numbers of open sockets
-REAL_TIME_EVERY = 20  # in a rehearsal, one in this many participants plays in real time
-NEVER = 1e9  # stands for infinity in HTML, in seconds
+BEAT_PERIOD = 60.0  # period at which a participant's activity is recorded, in seconds
+SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # maximum numbers of open WebSockets
+REAL_TIME_EVERY = 20  # one out of this many participants plays in real time during a rehearsal
+NEVER = 1e9  # replaces infinite durations in HTML, in seconds
 REFRESH = 10.0, 30.0  # shortest and longest polling period of the queue page, in seconds
 PATIENCE = 2.5  # number of missed polling periods after which a page loses its position in the queue
 
 
 @dataclass(frozen=True)
 class Queued:
-    """Position of a visit in the queue.
+    """A visit's position in the queue.
 
     Attributes:
-        position: Position, from 1.
+        position: Position in the queue, counted from 1.
         wait: Expected waiting time, in seconds.
-        refresh: Time until the page polls again, in seconds.
+        refresh: Time until the page reloads itself, in seconds.
     """
 
     position: int
@@ -50,10 +50,10 @@ class Queued:
 
 
 class Trials:
-    """Trials under way on this server.
+    """The trials that currently run on this server.
 
     Args:
-        workers: Number of concurrent trials, or None to measure the machine's capacity.
+        workers: Maximum number of concurrent trials, or None to measure the machine's capacity.
     """
 
     def __init__(
@@ -63,11 +63,13 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(pool, self._limit, self._plan.limits.idle, meter, capacity)
-        self._default_wait = 60.0 * self._plan.minutes  # assumed until trials have ended, in seconds
-        self._sockets: Counter[str] = Counter()  # open sockets, by participant and by address
+        self._default_wait = (
+            60.0 * self._plan.minutes
+        )  # estimated wait until the first trials have ended, in seconds
+        self._sockets: Counter[str] = Counter()  # number of open WebSockets, by participant and by address
 
     def queued(self, visit: str) -> Queued | None:
-        """Return the position of a visit in the queue, or None if its trial may run."""
+        """Return the position of a visit in the queue, or None if its trial may start."""
         wait = self._limit.expected_wait(self._limit.waiting + 1, self._default_wait)
         refresh = min(max(REFRESH[0], wait / 10.0), REFRESH[1])
         position = self._limit.ask(visit, PATIENCE * refresh)
@@ -76,7 +78,7 @@ class Trials:
         return Queued(position, self._limit.expected_wait(position, self._default_wait), refresh)
 
     def page(self, request: Request, now: PhaseState, folder: VisitFolder) -> Response:
-        """Show the page of the next or current trial."""
+        """Show the page of the current or next trial."""
         phase = now.person.phase
         settings = folder.settings(phase)
         by_hand = self._plan.minimum.get(TASK, 0.0) < math.inf
@@ -110,13 +112,13 @@ class Trials:
             await BrowserSocket(socket).serve(session)
         finally:
             self._sockets.subtract(sockets)
-            self._sockets += Counter()  # removes zero counts
+            self._sockets += Counter()  # drops entries that are zero
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        # All participants may share one address, and a reloaded page briefly has two sockets.
+        # All participants may have the same address, and a page briefly has two WebSockets when it is reloaded.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address
@@ -125,6 +127,6 @@ class Trials:
         while True:
             try:
                 await self._store.beat(person.id)
-            except StoreError as error:  # try again next time
+            except StoreError as error:  # the activity is recorded the next time
                 LOG.warning("%s", error)
             await asyncio.sleep(BEAT_PERIOD)

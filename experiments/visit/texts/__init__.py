@@ -1,4 +1,4 @@
-"""Texts for participants, from `experiments/texts`. Each language has a file of texts and a story."""
+"""Texts for participants. For each language, `experiments/texts` has a file of texts and a story."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Texts of a page by name, and the items of its form."""
+    """Texts of a page, by name, and the items of its form."""
 
     words: dict[str, str]
     items: tuple[Item, ...] = ()
@@ -38,7 +38,7 @@ Texts = Mapping[str, Section]
 
 
 def words_of(texts: Texts) -> Mapping[str, Mapping[str, str]]:
-    """Return texts by section and name, without items of forms."""
+    """Return all texts by section and name, without the items of forms."""
     return {name: section.words for name, section in texts.items()}
 
 
@@ -47,12 +47,12 @@ def languages() -> tuple[str, ...]:
 
 
 def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> Texts:
-    """Return the texts of a language. A study's own file may replace some of them.
+    """Read the texts of a language. A study's own file may replace some of them.
 
     Args:
-        language: Language tag. If there is no file for it, `path` must contain all texts.
-        path: The study's own file, or None. If a section has items, they replace all original ones.
-        values: Values of the placeholders `{name}`.
+        language: Language tag. If the project has no file for the language, `path` must contain all texts.
+        path: The study's own file, or None. The items of a section replace all its default items.
+        values: Values of placeholders such as `{name}`, by name.
 
     Raises:
         ConfigError: A file cannot be read, or has an unknown section, text or placeholder.
@@ -127,7 +127,6 @@ def _section(
 
 
 def _filled(text: str, values: Mapping[str, str], english: str, where: str) -> str:
-    """Replace placeholders with the study's values. Placeholders that are filled in later stay."""
     places = _PLACE.findall(english)
     later = {*places, *(name.capitalize() for name in places if name.islower())} - set(values)
 

@@ -1,21 +1,22 @@
-"""Items of forms, as described in the files of texts."""
+"""Items of forms, as defined in the files of texts."""
 
 from typing import Annotated, Any, Literal
 
 import msgspec
 
 Kind = Literal["scale", "choice", "several", "number", "line", "text"]
-MAX_LINE, MAX_TEXT = 200, 2000  # maximum length of an answer, in characters
+MAX_LINE, MAX_TEXT = 200, 2000  # maximum lengths of answers, in characters
 NAME = r"^[a-z][a-z0-9_]{0,39}$"
 
 
 class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A question with its kind of answer.
+    """A question in a form.
 
     Attributes:
-        name: Name of the item, from which those of table columns are formed.
-        kind: `scale` (a point from 1), `choice` and `several` (of `choices`), `number` (an integer), `line` or `text`.
-        right: The right answer of an attention or comprehension check. For a scale, the number of the point.
+        name: Name of the item, from which the names of table columns are formed.
+        kind: Type of the answer: `scale` (a point from 1), `choice` or `several` (of `choices`), `number` (an integer),
+            `line` or `text`.
+        right: Right answer of an attention or comprehension check. For a scale, this is the number of the point.
     """
 
     name: Annotated[str, msgspec.Meta(pattern=NAME)]
@@ -39,11 +40,11 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"item {self.name!r} has low {self.low} above high {self.high}")
 
     def is_wrong(self, answer: Any) -> bool:
-        """Return True if the item has a right answer and `answer` is a different one."""
+        """Return True if the item has a right answer and `answer` differs from it."""
         return self.right is not None and answer != self.right
 
     def example(self) -> str:
-        """Return a valid answer as the text of a form field: the right answer, if the item has one."""
+        """Return a valid answer as the text of a form field. It is the right answer if the item has one."""
         if self.right is not None:
             return str(self.right)
         match self.kind:
