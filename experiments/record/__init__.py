@@ -1,1 +1,1 @@
-"""The record of a session: written while it runs, then exported, read, verified and measured."""
+"""Records of sessions: writing, export, reading, verification and metrics."""

@@ -1,4 +1,4 @@
-"""Packed trials: SQLite archives of run directories, in the schema that `sqlite3 -A` reads.
+"""Packed trials: SQLite archives of run directories, with the schema that `sqlite3 -A` reads.
 
 Each worker process writes its own archive under a hidden name and holds SQLite's exclusive lock until it ends. An
 archive without a lock is finished, and `adopt` renames it to its final name.
@@ -22,7 +22,7 @@ from experiments.record.files import CHECKSUMS, read_checksums, sha256_of
 from experiments.record.run_directory import PACKED, is_run
 from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 
-WAIT_S = 60.0  # lock timeout when another process is writing to the archive
+WAIT_S = 60.0  # how long to wait for another process that is writing to the archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
 _DAMAGED = "if it is damaged, move it away: its trials are run again"
 _OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # 0 is the character after the slash
@@ -34,11 +34,11 @@ def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
         host = re.sub(r"[^\w.-]", "", socket.gethostname(), flags=re.ASCII)
         path = folder / f".{prefix}-{host}-{os.getpid()}-{secrets.token_hex(4)}{PACKED}"
         database = _connect(path, "rwc")
-        # The journal is synced and kept, not deleted, so a committed run survives a power cut.
+        # The journal is synced and kept, not deleted, so that a committed run survives a power failure.
         database.executescript(
             f"PRAGMA auto_vacuum=FULL; PRAGMA locking_mode=EXCLUSIVE; PRAGMA synchronous=FULL; {_SCHEMA};"
         )
-        if path.exists():  # if missing, another process renamed it before it was locked
+        if path.exists():  # otherwise another process renamed it before it was locked
             return database
         database.close()
 
@@ -59,7 +59,7 @@ def pack(run: Path, database: sqlite3.Connection) -> None:
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
-    """Give finished archives their final names. Return the number of archives still being written.
+    """Rename finished archives to their final names. Return the number of archives still being written.
 
     A run that a killed writer did not commit is rolled back.
     """
@@ -70,7 +70,7 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
                 database.execute(_SCHEMA)
                 database.execute("BEGIN EXCLUSIVE")
                 empty = database.execute("SELECT 1 FROM sqlar").fetchone() is None
-                if path.exists():  # if missing, another process renamed it first
+                if path.exists():  # otherwise another process renamed it first
                     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
                     path.unlink() if empty else path.rename(path.with_name(path.name[1:]))
         except sqlite3.Error as error:
@@ -84,7 +84,7 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
 def run_paths(folder: Path, prefix: str = "") -> list[Path]:
     """List the runs in a batch's `trials` folder by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
 
-    A run directory takes precedence over a packed run of the same name. Only archives whose names begin with `prefix`
+    A run directory takes precedence over a packed run with the same name. Only archives whose names begin with `prefix`
     are read.
 
     Raises:
@@ -104,7 +104,10 @@ def packed_names(archive: Path) -> set[str]:
 
 @contextmanager
 def opened_run(path: Path) -> Iterator[Path]:
-    """Yield a run directory, unpacked to a temporary folder if it is packed. Raises `RecordError` like `unpack`."""
+    """Yield a run directory. A packed run is unpacked to a temporary folder.
+
+    Raises `RecordError` if the run cannot be unpacked.
+    """
     archive = None if is_run(path) else archive_of(path)
     if archive is None:
         yield path
@@ -115,7 +118,7 @@ def opened_run(path: Path) -> Iterator[Path]:
 
 
 def unpack(archive: Path, name: str, folder: Path) -> None:
-    """Write a packed run to `folder/name`, and compare the files with their checksums."""
+    """Write a packed run to `folder/name`, and verify the checksums of its files."""
     directories = set[Path]()
     with _opened(archive) as database:
         members = f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}"  # nosec B608 - a constant
@@ -148,7 +151,7 @@ def read_file(path: Path, file: str) -> bytes:
 
 
 def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None]:
-    """Replace packed runs by run directories in `folder`. Yield None for each, or a message if it is damaged."""
+    """Replace packed runs in `folder` by run directories. Yield None for each run, or a message if it is damaged."""
     for archive, paths in itertools.groupby(sorted(runs), lambda path: path.parent):
         done = set()
         for path in paths:
@@ -162,7 +165,7 @@ def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None
                 continue
             done.add(path.name)
             yield None
-        os.sync()  # before the packed runs are deleted
+        os.sync()  # the files must be on disk before the packed runs are deleted
         discard(folder, done)
 
 
@@ -178,7 +181,7 @@ def discard(folder: Path, names: Collection[str], target: Path | None = None, pr
                     new = target / f"{archive.stem}-{secrets.token_hex(4)}{PACKED}"
                     database.execute("ATTACH ? AS target", (f"{new.absolute().as_uri()}?mode=rwc",))
                     database.execute(_SCHEMA.replace("sqlar", "target.sqlar", 1))
-                with database:  # one transaction for both archives
+                with database:  # a single transaction for both archives
                     if target is not None:
                         insert = f"INSERT INTO target.sqlar SELECT * FROM main.sqlar {_OF_RUN}"  # nosec B608
                         database.executemany(insert, gone)

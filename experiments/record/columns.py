@@ -1,4 +1,4 @@
-"""The columns of a record: a row per control step in `trajectory.npz`, hashes and checkpoints in `recording.npz`."""
+"""The columns of a record: those of `trajectory.npz`, with a row per control step, and those of `recording.npz`."""
 
 import hashlib
 import math
@@ -17,18 +17,19 @@ from mjsim.world.state import WorldState
 
 OBJECTS = -1  # stands for the number of objects in the shapes below
 
-# Column -> type and shape of a row. Row t holds the state before action t.
+# Type and shape of each column in a row. Row t contains the state before action t.
 TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
-    "time": ("f8", ()),  # s
-    "position": ("f8", (2,)),  # m
-    "heading": ("f8", ()),  # rad
-    "pitch": ("f8", ()),  # rad
-    "hands": ("i2", (2,)),  # object index, or -1
-    "object_position": ("f8", (OBJECTS, 3)),  # m
-    "object_quaternion": ("f8", (OBJECTS, 4)),  # wxyz
+    "time": ("f8", ()),  # in seconds
+    "position": ("f8", (2,)),  # in metres
+    "heading": ("f8", ()),  # in radians
+    "pitch": ("f8", ()),  # in radians
+    "hands": ("i2", (2,)),  # index of the object in each hand, or -1
+    "object_position": ("f8", (OBJECTS, 3)),  # in metres
+    "object_quaternion": ("f8", (OBJECTS, 4)),  # in the order w, x, y, z
     "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
-    # Kind (0 move, 1 pick, 2 place), object index or -1, speeds forward and left (m/s), turning and looking (rad/s).
-    # With n objects, index n + i denotes entry i of `unknown_objects`: names in actions that match no object.
+    # Type of action (0 move, 1 pick, 2 place), object index or -1, speeds forward and to the left (m/s), and angular
+    # speeds of turning and looking (rad/s). With n objects, index n + i refers to entry i of `unknown_objects`, which
+    # lists the names in actions that match no object.
     "action": ("f8", (6,)),
     # Fields of `HealthSample`, NaN if not measured
     "penetration_m": ("f8", ()),
@@ -42,8 +43,8 @@ _WRITTEN = {"state_hash": ("u8", ()), "logged": ("i8", ())}
 HEALTH = ("penetration_m", "trunk_penetration_m", "weld_error_m", "weld_error_rad", "settle_s")
 STATUSES = (ObjectStatus.LOOSE, ObjectStatus.CARRIED, ObjectStatus.DELIVERED)
 
-# Arrays of `recording.npz`. `state_hash` and `action_hash` have a row per control step. `log_size` and `log_hash`
-# describe the log before each control step, and have an extra row for its end.
+# Arrays of `recording.npz`. `state_hash` and `action_hash` have one row per control step. `log_size` and `log_hash`
+# describe the log before each control step, and have one more row for its end.
 RECORDING_LAYOUT: dict[str, Layout] = {
     "state_hash": ("u8", (None,)),
     "action_hash": ("u8", (None,)),
@@ -57,7 +58,7 @@ RECORDING_LAYOUT: dict[str, Layout] = {
 
 
 def trajectory_layout(objects: int) -> dict[str, Layout]:
-    """Return type and shape of each array in `trajectory.npz`."""
+    """Return the type and the shape of each array in `trajectory.npz`."""
     rows: dict[str, Layout] = {
         name: (kind, (None, *row_shape(row, objects))) for name, (kind, row) in TRAJECTORY_COLUMNS.items()
     }
@@ -69,7 +70,6 @@ def row_shape(shape: tuple[int, ...], objects: int) -> tuple[int, ...]:
 
 
 def row_type(objects: int) -> np.dtype[Any]:
-    """Return the row type of a record that is being written."""
     columns = {**TRAJECTORY_COLUMNS, **_WRITTEN}
     return np.dtype([(name, kind, row_shape(row, objects)) for name, (kind, row) in columns.items()])
 
@@ -88,7 +88,7 @@ def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """Return `hash64` of each row of actions (T, 6), shape (T,)."""
+    """Return `hash64` of each row of `actions`, which has shape (T, 6)."""
     content, size, sha1 = actions.tobytes(), actions.itemsize * 6, hashlib.sha1
     rows = (content[i : i + size] for i in range(0, len(content), size))
     digests = [sha1(row, usedforsecurity=False).digest()[:8] for row in rows]
@@ -96,7 +96,7 @@ def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArray[Any]]:
-    """Return the checkpoint arrays of `recording.npz` for states by control step."""
+    """Return the checkpoint arrays of `recording.npz`. `checkpoints` maps control steps to states."""
     states = list(checkpoints.values())
     return {
         "checkpoint_step": np.array(list(checkpoints), np.int64),
@@ -107,11 +107,11 @@ def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArra
 
 
 def decode_action(row: NDArray[Any], names: Sequence[str]) -> StepAction:
-    """Decode a row (6,) of the action column.
+    """Decode a row of the action column, shape (6,).
 
     Args:
         row: The row.
-        names: Names of the objects, then the `unknown_objects`.
+        names: Names of the objects, followed by the `unknown_objects`.
 
     Raises:
         RecordError: The row is not a valid action.

@@ -1,4 +1,4 @@
-"""Types of the events about the task, and `check_event` for the lines of `events.jsonl`.
+"""Types of task events, and `check_event`, which validates the lines of `events.jsonl`.
 
 docs/data.md is generated from the types in this module and `session_events`.
 """
@@ -17,15 +17,16 @@ VisitPair = tuple[VisitKind, str]
 
 
 class PlanEvent(LoggedEvent, frozen=True):
-    """The assistant made a plan: the first, one after a deviation, or an improvement.
+    """The assistant made a plan: the first plan, a plan after a deviation, or an improvement of the current plan.
 
     Attributes:
-        cost_m: Length of the planned tour from the person's position, from place to place, m.
-        lower_bound_m: Lower bound on the length of any tour between these places, m.
+        cost_m: Length of the planned tour in metres, from the person's position along the locations of its visits.
+        lower_bound_m: Lower bound in metres on the length of any tour along these locations.
         status: `optimal` if the planner proved it, else `feasible`.
         visits: The tour as pairs of action and object.
-        improved: Whether this plan replaces a longer one for the same state of the task.
-        reach_bound_m: In the first plan: lower bound on walking at maximum reach, m (docs/metrics.md).
+        improved: True if this plan replaces a longer one for the same state of the task.
+        reach_bound_m: Only in the first plan: lower bound in metres on the walking distance at maximum reach
+            (docs/metrics.md).
     """
 
     cost_m: Metres
@@ -41,9 +42,9 @@ class AttemptEvent(LoggedEvent, frozen=True):
 
     Attributes:
         action: `pick` or `place`.
-        object: The object; null if none was named and none was in reach.
-        applied: Whether the motion started.
-        refusal: Why the motion did not start, or null.
+        object: The object; null if no object was named and none was in reach.
+        applied: True if the motion started.
+        refusal: Reason why the motion did not start, or null.
     """
 
     action: VisitKind
@@ -59,16 +60,16 @@ class VisitEvent(LoggedEvent, frozen=True):
         kind: `pick` or `place`.
         object: The object.
         suggested: The suggested visit, or null.
-        deviated: Whether the visit differs from the suggested one.
+        deviated: True if the visit differs from the suggested one.
         alternatives: Number of other feasible visits.
         tied_alternatives: Number of alternatives that place another object into the suggested visit's bin.
-        tied: Whether the visit deviates only in which object goes into that bin first.
-        position: Where the person stood, m.
-        geodesic_m: Shortest walk from where the person stood at the previous visit, m.
-        location_m: Planner's distance from the place of the previous visit to the place of this one, m.
-        regret_m: Extra length of the remaining task compared with the best visit, m; null if unknown, absent in trials
-            without regrets.
-        suggested_regret_m: Regret of the suggested visit, m.
+        tied: True if the visit deviates only in which object goes into that bin first.
+        position: Position of the person in metres.
+        geodesic_m: Shortest walk in metres from the person's position at the previous visit.
+        location_m: Planner's distance in metres between the locations of the previous visit and this one.
+        regret_m: Extra length of the remaining task in metres compared with the best visit; null if unknown, absent in
+            trials without regrets.
+        suggested_regret_m: Regret of the suggested visit in metres.
     """
 
     kind: VisitKind
@@ -142,7 +143,7 @@ _DECODER: msgspec.json.Decoder[LoggedEvent] = msgspec.json.Decoder(Union[(*TYPES
 
 
 def check_event(line: bytes) -> None:
-    """Raise a `RecordError` if a line of a log is not an event with the fields of its kind."""
+    """Raise a `RecordError` if a line of a log is not an event with the fields of its type."""
     try:
         _DECODER.decode(line)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

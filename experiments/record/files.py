@@ -1,4 +1,4 @@
-"""Arrays, JSON and checksums on disk, written atomically. Errors name the file."""
+"""Reads and atomically writes arrays, JSON and checksums. Errors name the file."""
 
 import hashlib
 import json
@@ -15,16 +15,16 @@ from experiments.errors import RecordError
 from mjsim.support.files import check_input, read_bytes, read_text, replacing, write_text_atomically
 from mjsim.support.files import read_json as strict_json
 
-# Data type (a NumPy name or `TEXT`) and shape of an array. None stands for any length.
+# Data type (a NumPy name or `TEXT`) and shape of an array. A dimension that is None can have any length.
 Layout = tuple[str, tuple[int | None, ...]]
 TEXT = "U"
-_LEVEL = 3  # compression level
+_LEVEL = 3
 
 
 def read_arrays(
     path: Path, layouts: Mapping[str, Layout] | None = None, *, only: Collection[str] | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Read the arrays of an NPZ file, by name.
+    """Read arrays from an NPZ file. Return them by name.
 
     Args:
         path: The file.
@@ -40,7 +40,7 @@ def read_arrays(
             arrays = {name: archive[name] for name in only or archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
-    except Exception as error:  # zipfile and NumPy raise a dozen types on damaged files
+    except Exception as error:  # zipfile and NumPy raise a dozen error types for damaged files
         raise RecordError(f"{path} is truncated or damaged: {error}") from error
     bad = sorted(
         n for n, layout in (layouts or {}).items() if n not in arrays or not _fits(arrays[n], layout)
@@ -63,8 +63,8 @@ def _fits(array: NDArray[Any], layout: Layout) -> bool:
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool = False) -> None:
     """Write arrays to a compressed NPZ file, atomically.
 
-    Compared with `np.savez_compressed`, files are a tenth larger but take half the time. `small` selects LZMA, which
-    takes ten times as long for files that are a quarter smaller.
+    Compared with `np.savez_compressed`, writing takes half the time, but files are a tenth larger. With `small`, LZMA
+    makes files a quarter smaller, but writing takes ten times as long.
     """
     method = zipfile.ZIP_LZMA if small else zipfile.ZIP_DEFLATED
     with (
@@ -77,7 +77,7 @@ def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool =
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write indented JSON, atomically."""
+    """Write a value as indented JSON, atomically."""
     write_text_atomically(path, json.dumps(value, indent=2) + "\n")
 
 
@@ -104,7 +104,7 @@ def write_checksums(folder: Path, names: Iterable[str]) -> None:
 
 
 def read_checksums(folder: Path) -> dict[str, str]:
-    """Read `SHA256SUMS` as SHA-256 by file name. Raises a `RecordError` if the file is missing or damaged."""
+    """Read `SHA256SUMS` as a map from file names to hashes. Raises a `RecordError` if it is missing or damaged."""
     path = folder / CHECKSUMS
     try:
         lines = read_bytes(path).decode("ascii").split("\n")

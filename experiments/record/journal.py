@@ -1,6 +1,6 @@
 """The journal of a session: its record, appended to a file while the session runs.
 
-The file has a header and entries, each with its length and checksum. What `sync` has flushed survives a crash of the
+The file has a header and entries, each with its length and checksum. After `sync`, the entries survive a crash of the
 process or the machine. An incomplete last entry is dropped when the journal is opened again.
 """
 
@@ -20,10 +20,10 @@ from experiments.errors import RecordError
 
 JOURNAL = "journal.bin"  # file in the folder of a session
 MAGIC = b"mjsim journal 2\n"
-MAX_ENTRY = 64 * 1024 * 1024  # bytes
+MAX_ENTRY = 64 * 1024 * 1024  # in bytes
 LOCK_TIMEOUT_S = 10.0  # how long to wait for another process to close the journal
 _OTHER_VERSION = "another version of mjsim; use that version to continue the session"
-_HEAD = struct.Struct("<II")  # length in bytes and CRC-32 of the entry that follows
+_HEAD = struct.Struct("<II")  # length in bytes and CRC-32 of the next entry
 
 
 class Header(msgspec.Struct, frozen=True, tag="Header"):
@@ -39,7 +39,7 @@ class Header(msgspec.Struct, frozen=True, tag="Header"):
 
 
 class Checkpoint(msgspec.Struct, frozen=True):
-    """A state from which to continue: number of the next control step, physics (float64), other state as JSON."""
+    """A state from which to continue: the next control step, the physics state (float64), and other state as JSON."""
 
     step: int
     physics: bytes
@@ -47,12 +47,12 @@ class Checkpoint(msgspec.Struct, frozen=True):
 
 
 class JournalEntry(msgspec.Struct, frozen=True, tag="Entry"):
-    """A part of the recording, since the previous entry.
+    """Part of a record, added after the previous entry.
 
     Attributes:
         rows: Control steps, of type `columns.row_type`.
         events: New lines of the log.
-        unknown: All names in actions so far that match no object.
+        unknown: Names used in actions so far that match no object.
         checkpoints: New checkpoints.
         participant: State of the participant.
     """
@@ -69,10 +69,10 @@ _DECODER: msgspec.msgpack.Decoder[Header | JournalEntry] = msgspec.msgpack.Decod
 
 
 class Journal:
-    """A journal file open for appending, by one process at a time. A missing file is created.
+    """A journal file open for appending by one process at a time. A missing file is created.
 
     Attributes:
-        entries: The entries that were in the file when it was opened. Readers may clear this to free memory.
+        entries: The entries that were in the file when it was opened. Readers may clear this list to free memory.
 
     Raises:
         RecordError: The file is not a journal, or another process keeps it open.
@@ -97,7 +97,7 @@ class Journal:
             raise
 
     def append(self, entry: Header | JournalEntry) -> None:
-        """Append an entry, which is durable once `sync` returns. On an OSError the file is left unchanged."""
+        """Append an entry, which is durable once `sync` returns. After an OSError the file is unchanged."""
         end, content = self.size, _encode(entry)
         try:
             _write(self._file, _HEAD.pack(len(content), zlib.crc32(content)) + content)
@@ -110,7 +110,6 @@ class Journal:
         return os.fstat(self._file).st_size
 
     def sync(self) -> None:
-        """Flush all appended entries to disk."""
         os.fdatasync(self._file)
 
     def close(self) -> None:
@@ -130,7 +129,7 @@ def read_entries(path: Path) -> tuple[Header | JournalEntry, ...]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Fsync a file, or the names in a folder."""
+    """Flush a file to disk or, for a folder, the names of its files."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -159,7 +158,7 @@ def _intact(content: bytes, path: Path) -> tuple[tuple[Header | JournalEntry, ..
 
 
 def _lock(file: int, path: Path) -> None:
-    """Lock the file. Wait if another process has it open, such as a worker that is still ending after its server."""
+    """Lock the file. Wait if another process has it open, such as a worker that is still shutting down."""
     until = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:

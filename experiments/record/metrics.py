@@ -1,4 +1,4 @@
-"""The objective measures of a trial, computed from event log and trajectory (PAPER section 6, docs/metrics.md)."""
+"""Objective measures of a trial, computed from its event log and trajectory (PAPER section 6, docs/metrics.md)."""
 
 import statistics
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,14 @@ from experiments.record.records import PARTICIPANT, PHASE_ENDED, Event
 from mjsim.values.actions import EventKind
 from mjsim.values.motion_parameters import GROUPS
 
-REGRETFUL_M = 0.01  # smaller regrets are ties
+REGRETFUL_M = 0.01  # a smaller regret counts as a tie
 COSTLY_M = 0.1  # `nd_regret_10cm` counts deviations with a larger regret
-# Fields of the start event that describe the record, not the settings of the trial
+# Fields of the start event that describe the record rather than the settings of the trial
 PROVENANCE = {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order"}
 PROVENANCE |= {"person", "behaviour"}
-# Fields of `metrics.json` that cannot be computed from log and trajectory. Only the file's checksum protects them.
+# Fields of `metrics.json` that log and trajectory do not determine. Only the checksum of the file protects them.
 CIRCUMSTANCES = ("frames_sha256", "renderer", "wall_s")
-# Metric -> kind of event that it counts
+# Type of event that each metric counts
 COUNTED = {
     "ejections": EventKind.EJECTED,
     "tunnellings": EventKind.TUNNELLED,
@@ -34,7 +34,7 @@ class Metrics:
     """Objective measures of one trial, defined in docs/metrics.md.
 
     Attributes:
-        ended: Why the trial ended.
+        ended: Reason why the trial ended.
         delivered: Number of objects in their receptacle at the end.
         visits: Number of successful picks and places.
         nd_strict_2n: Visits that differ from the suggested one, over twice the number of objects; None, as are the
@@ -47,24 +47,25 @@ class Metrics:
         ipl_locations: The paper's inverse path length: distances between the places of consecutive visits (objects and
             bins) over the distance walked. It can exceed 1.
         ipl_stand: Shortest walks between the positions at consecutive visits over the distance walked; at most 1.
-        task_distance_m: Distance walked, m.
-        completion_time_s: Time until the last delivery, or until the end if objects are left, s.
+        task_distance_m: Distance walked in metres.
+        completion_time_s: Time in seconds until the last delivery, or until the end if objects are left.
         completion_over_familiarisation: Completion time over the duration of the fly-through; None without a
             fly-through.
-        planned_distance_m: Length of the first plan, from place to place, m. Reaching for objects saves some of it.
-        reach_bound_m: Lower bound on walking at maximum reach, m; None if nothing was planned.
+        planned_distance_m: Length of the first plan in metres, from location to location. Reaching for objects makes
+            the walk shorter.
+        reach_bound_m: Lower bound in metres on the walking distance at maximum reach; None if nothing was planned.
         replans: Number of plans that replaced the previous one because the task no longer matched it.
         refusals: Number of infeasible attempts.
         failures: Number of picks and places that started but failed in the physics, and of objects lost from a hand.
-        mean_regret_m: Mean regret of the visits, m: how much longer each makes the remaining task compared with the
-            best visit at that moment; None if no regret is known.
-        total_regret_m: Sum of these regrets, m: the extra walk caused by the order of visits; None if no regret is
-            known.
+        mean_regret_m: Mean regret of the visits in metres. The regret of a visit is the extra length of the remaining
+            task compared with the best visit at that moment; None if no regret is known.
+        total_regret_m: Sum of these regrets in metres, which is the extra walk caused by the order of visits; None if
+            no regret is known.
         regretful_visits: Visits with a regret above 1 cm; None if no regret is known. The others are optimal or tied.
         unjudged_visits: Visits with unknown regret, because the planner could not prove it or it was not computed.
-        mean_suggestion_gap_m: Mean regret of the suggested visits, m; None if none is known. It measures the planner as
-            `mean_regret_m` measures the person.
-        max_suggestion_gap_m: Largest regret of a suggested visit, m; None if none is known.
+        mean_suggestion_gap_m: Mean regret of the suggested visits in metres; None if none is known. It measures the
+            planner as `mean_regret_m` measures the person.
+        max_suggestion_gap_m: Largest regret of a suggested visit in metres; None if none is known.
     """
 
     ended: str | None
@@ -97,7 +98,7 @@ def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict
 
     Args:
         events: The event log in order, from `start` to `end`.
-        arrays: The trajectory, columns as in `TRAJECTORY_COLUMNS`, with at least one row.
+        arrays: The trajectory, with the columns in `TRAJECTORY_COLUMNS` and at least one row.
     """
     settings = {name: value for name, value in events[0].items() if name not in PROVENANCE}
     ending = {name: events[-1][name] for name in ("signal", "error") if name in events[-1]}
@@ -117,8 +118,8 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
     """Compute the metrics of a trial.
 
     Args:
-        events: The event log in order. Its `end` is at the moment of the last delivery, if that ended the trial.
-        positions: Floor position at every control step, m, shape (T, 2).
+        events: The event log in order. If the last delivery ended the trial, its `end` has the time of the delivery.
+        positions: Floor position in metres at every control step, shape (T, 2).
     """
     visits = [e for e in events if e["event"] == "visit"]
     plans = [e for e in events if e["event"] == "plan"]
@@ -154,7 +155,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 
 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
-    """Return the participant's parameters, without the groups, as columns such as `person_walking_speed`."""
+    """Return the person's parameters, without the groups, as columns such as `person_walking_speed`."""
     logged: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
     body = {f"person_{name}": value for name, value in logged["person"].items() if name not in GROUPS}
     model = logged.get("behaviour") or {}
@@ -209,15 +210,15 @@ def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dic
 def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict[str, float | int]:
     """Summarize the health of the physics in a trial (docs/metrics.md).
 
-    Weld errors are sampled while a hand carries something, settling times once per release, penetration at every
-    control step. Without samples, a value is 0.
+    Weld errors are sampled while a hand carries something, settling times once per release, and penetration at every
+    control step. A value without samples is 0.
 
     Args:
         events: The event log.
-        arrays: The trajectory, columns as in `TRAJECTORY_COLUMNS`.
+        arrays: The trajectory, with the columns in `TRAJECTORY_COLUMNS`.
 
     Returns:
-        Rows of `metrics.json`: maximum, 99th percentile and mean of each quantity, and counts of faults.
+        Rows of `metrics.json`: maximum, 99th percentile and mean of each quantity, and the number of faults.
     """
     summary: dict[str, float | int] = {}
     for name in HEALTH:
@@ -236,19 +237,19 @@ def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Displays:
-    """How well a person saw a trial: medians over its `display` events, logged every 5 s.
+    """Quality of the display during a trial: medians over its `display` events, which are logged every 5 s.
 
     Attributes:
         drawn_by_browser: Share of these events in which the browser drew the view. Otherwise it showed server frames.
         display_renderer: Most frequent renderer.
-        display_width: Width of the view, CSS px.
-        display_height: Height of the view, CSS px.
+        display_width: Width of the view in CSS pixels.
+        display_height: Height of the view in CSS pixels.
         display_pixel_ratio: Screen pixels per CSS pixel.
         display_frames_per_s: Frames shown per second.
-        display_frame_ms_95: 95th percentile of the time between two frames, ms.
-        display_latency_ms: Time from an input to the frame that shows it, ms; None if nothing was pressed.
+        display_frame_ms_95: 95th percentile of the time between two frames in milliseconds.
+        display_latency_ms: Time in milliseconds from an input to the frame that shows it; None if nothing was pressed.
         display_dropped: Share of the received frames that were not shown.
-        display_field_of_view: Horizontal field of view, rad; None if the person could not choose it.
+        display_field_of_view: Horizontal field of view in radians; None if the person could not choose it.
     """
 
     drawn_by_browser: float

@@ -5,14 +5,14 @@ from collections.abc import Iterable
 from experiments.errors import ConfigError
 
 STORY, FLYTHROUGH, TRAINING, TASK = PHASES = ("story", "flythrough", "training", "task")
-HUMAN = "human"  # participant name of a person
+HUMAN = "human"  # participant name of a human
 REHEARSAL = "rehearsal"  # participant name in `mjsim study rehearse`
 REHEARSED = "Rehearsed, with answers drawn at random"
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
 def phases_of(text: str) -> tuple[str, ...]:
-    """Parse a list of phases in their order, with the task, such as `flythrough,task`."""
+    """Parse a list of phases in order, including the task, such as `flythrough,task`."""
     names = tuple(part.strip() for part in text.split(","))
     unknown = [name for name in names if name not in PHASES]
     if unknown:
@@ -30,7 +30,7 @@ def is_simulated(user: object) -> bool:
 
 
 def origin_of(users: Iterable[object]) -> str:
-    """Return the origin of trials by participants of these names, such as `Simulated` or `Recorded from people`."""
+    """Return the origin of trials by these participants, such as `Simulated` or `Recorded from people`."""
     users = set(users)
     if users == {REHEARSAL}:
         return REHEARSED
@@ -42,11 +42,11 @@ ALL_DELIVERED = "all delivered"
 TIME_LIMIT = "time limit"
 INTERRUPTED = "interrupted"
 PHYSICS_ERROR = "physics error"
-ERROR = "error"  # any other error, such as in a custom participant
+ERROR = "error"  # any other error, such as an error in a custom participant
 
 COMPLETE = (ALL_DELIVERED, TIME_LIMIT)
 BROKEN_OFF = (INTERRUPTED, ERROR)  # the last recorded control step may be incomplete
 
 
-class LeaveSession(BaseException):  # not an Exception, so handlers of errors do not catch it
+class LeaveSession(BaseException):  # not an Exception, so that error handlers do not catch it
     """Raised by a participant or a viewer to leave a session early. This is not a failure."""

@@ -37,7 +37,7 @@ from mjsim.world.state import WorldState
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """The record of a session: the four files of a run directory from which all others follow.
+    """The record of a session: the four files of a run directory from which all others can be computed.
 
     Attributes:
         log: Content of `events.jsonl`.
@@ -89,7 +89,7 @@ class Record:
 
     @cached_property
     def person(self) -> PersonParameters:
-        """The participant's parameters, drawn values included."""
+        """Parameters of the participant's body, including drawn values."""
         try:
             logged = next(event for event in self.events if event["event"] == records.PARTICIPANT)
             return PersonParameters.from_dict(logged["person"])
@@ -104,7 +104,7 @@ class Record:
 
     @property
     def reason(self) -> str | None:
-        """Why the session ended, or None if it has not ended."""
+        """Reason why the session ended, or None if it has not ended."""
         return str(self.end.get("reason")) if self.end["event"] == "end" else None
 
     @cached_property
@@ -112,12 +112,15 @@ class Record:
         return tuple(placed.name for placed in self.episode.objects)
 
     def action(self, step: int) -> StepAction:
-        """Return the action of a control step. Raises `RecordError` if the row is invalid."""
+        """Return the action of a control step. Raises `RecordError` if its row is invalid."""
         unknown = map(str, self.trajectory["unknown_objects"])
         return decode_action(self.trajectory["action"][step], [*self.names, *unknown])
 
     def observation(self, step: int) -> Observation:
-        """Return the state before a control step, with nominal eye height and velocity (unused by the assistant)."""
+        """Return the state before a control step.
+
+        Eye height and velocity are not recorded and have nominal values. The assistant does not use them.
+        """
         row = {name: column[step] for name, column in self.trajectory.items() if name in TRAJECTORY_COLUMNS}
         left, right = (None if i < 0 else self.names[i] for i in row["hands"])
         return Observation(
@@ -137,7 +140,7 @@ class Record:
 
     @property
     def checkpoint_steps(self) -> list[int]:
-        """Control steps before which there is a checkpoint, ascending."""
+        """Control steps before which there is a checkpoint, in ascending order."""
         return [int(step) for step in self.recording["checkpoint_step"]]
 
     def checkpoint(self, step: int) -> WorldState:
@@ -153,7 +156,7 @@ class Record:
 
 
 def same_record(one: Record, other: Record) -> bool:
-    """Compare two records bit for bit, ignoring the state of the participant."""
+    """Compare two records bit for bit, except for the state of the participant."""
 
     def content(record: Record) -> list[Any]:
         arrays = [*record.trajectory.items(), *record.recording.items()]
@@ -179,7 +182,7 @@ def assemble(
         "action_hash": action_hashes(trajectory["action"]),
         "log_size": log_size,
         "log_hash": log_hash,
-        # An interrupted session can have a checkpoint whose control step is missing.
+        # An interrupted session can have a checkpoint whose control step was not recorded.
         **checkpoint_arrays({step: state for step, state in checkpoints.items() if step < len(rows)}),
     }
     names = {"unknown_objects": np.array(unknown, np.str_)}
@@ -187,7 +190,7 @@ def assemble(
 
 
 def read_journal(entries: Sequence[Header | JournalEntry]) -> Record:
-    """Build the record of a journal, which may be of an unfinished session but not empty."""
+    """Build a record from a journal. The session may be unfinished, but the journal must not be empty."""
     if not entries or not isinstance(entries[0], Header):
         raise RecordError("the journal is empty")
     episode, log = Episode.from_json(entries[0].episode), EventLog()

@@ -1,4 +1,4 @@
-"""The event log of a session, and the names of the files of a run directory."""
+"""The event log of a session, and the names of the files in a run directory."""
 
 import hashlib
 import json
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.support.files import read_text
 
-# Each version added: 2 state hashes, 3 health of the physics, 4 typed checkpoints, 5 distances between places, ties
-# and gaps of suggestions, 6 the participant, 7 groups of a person's values.
+# Version 2 added state hashes, 3 the health of the physics, 4 typed checkpoints, 5 distances between places, ties and
+# gaps of suggestions, 6 the participant, and 7 groups of person parameters.
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
@@ -25,7 +25,7 @@ FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = 
     "topdown.png",
     "video.mp4",
 )
-PARTICIPANT = "participant"  # event with the person's parameters
+PARTICIPANT = "participant"  # event with the parameters of the participant's body
 PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events of phases before the task
 TRAINING = "training"  # run directory of the training, inside that of the task
 
@@ -40,11 +40,14 @@ class EventLog:
         self._lines: list[dict[str, Any]] = []
 
     def append(self, time: float, event: str, **fields: Any) -> None:
-        """Log `event` at simulated `time` in seconds, with JSON-ready fields. Raises like `fill`."""
+        """Log an event at a simulated time in seconds. The fields must be JSON values.
+
+        Raises a `RecordError` if a field is not valid JSON, such as NaN.
+        """
         self.fill(self.reserve(), time, event, **fields)
 
     def fill(self, line: dict[str, Any], time: float, event: str, **fields: Any) -> None:
-        """Fill in a reserved line. Raises a `RecordError` if a value is not valid JSON, such as NaN."""
+        """Fill in a reserved line. Raises a `RecordError` if a field is not valid JSON, such as NaN."""
         entry = {"t": round(time, 6), "event": event, **fields}
         try:
             json.dumps(entry, allow_nan=False)
@@ -53,7 +56,7 @@ class EventLog:
         line.update(entry)
 
     def reserve(self) -> dict[str, Any]:
-        """Reserve a line for an event that is filled in later. A line that stays empty is not written."""
+        """Reserve a line for an event that is filled in later. A line that remains empty is not written."""
         self._lines.append({})
         return self._lines[-1]
 
@@ -63,23 +66,23 @@ class EventLog:
 
     @property
     def content(self) -> bytes:
-        """All filled-in lines as JSON, in ASCII."""
+        """All filled-in lines as JSON, encoded in ASCII."""
         return b"".join(map(_encoded, self._lines))
 
     @property
     def entries(self) -> int:
-        """Number of lines, reserved ones included."""
+        """Number of lines, including reserved ones."""
         return len(self._lines)
 
     @property
     def event_counts(self) -> NDArray[np.int64]:
-        """Cumulative number of filled-in lines: value k counts those among the first k lines, shape (entries + 1,)."""
+        """Number of filled-in lines among the first k lines, for each k from 0 to `entries`, shape (entries + 1,)."""
         return np.cumsum([0, *map(bool, self._lines)])
 
     def at(self, entries: list[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
-        """Return size and hash of the log cut off after each number of lines in `entries`, both of shape (n,).
+        """Return the size in bytes and the hash of the log after each number of lines in `entries`, both of shape (n,).
 
-        Sizes are in bytes, hashes are the first 64 bits of SHA-1.
+        The hash is the first 64 bits of SHA-1.
         """
         texts = [b"", *map(_encoded, self._lines)]
         digest, hashes = hashlib.sha1(usedforsecurity=False), list[bytes]()
@@ -90,7 +93,6 @@ class EventLog:
         return sizes[entries], np.frombuffer(b"".join(hashes), "<u8").astype(np.uint64)[entries]
 
     def restore(self, events: Sequence[Event]) -> None:
-        """Replace the logged events."""
         self._lines = [dict(event) for event in events]
 
 
@@ -99,7 +101,7 @@ def _encoded(line: Event) -> bytes:
 
 
 def read_events(path: Path) -> list[Event]:
-    """Read an event log. Raises a `RecordError` if the file is missing, or a line is not JSON."""
+    """Read an event log. Raises a `RecordError` if the file is missing or a line is not JSON."""
     try:
         lines = read_text(path).splitlines()
     except OSError as error:

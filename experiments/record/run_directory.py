@@ -1,4 +1,4 @@
-"""Output paths of commands: existing files are kept, and a run directory is complete or absent."""
+"""Output paths of commands. Existing files are kept, and a run directory is either complete or absent."""
 
 import os
 import shutil
@@ -12,12 +12,13 @@ from experiments.record import records
 from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
-SHOWN_NAMES = 3  # number of existing files that an error names
-SAMPLE = 100  # number of inspected folders of a batch; inspecting all is slow on a network file system
-TRIALS = "trials"  # folder of runs in the folder of a batch
+SHOWN_NAMES = 3  # maximum number of existing files named in an error
+# Number of folders inspected in a batch, because inspecting all is slow on a network file system
+SAMPLE = 100
+TRIALS = "trials"  # subfolder of a batch that contains its runs
 PACKED = ".sqlar"  # suffix of an archive of runs
 VISIT = "visit.json"  # file in the folder of each visit of `mjsim play`
-JOURNALS = "journals"  # folder of journals in the folder of a visit
+JOURNALS = "journals"  # subfolder of a visit that contains its journals
 
 
 def is_run(directory: Path) -> bool:
@@ -25,7 +26,7 @@ def is_run(directory: Path) -> bool:
 
 
 def is_batch(directory: Path) -> bool:
-    """Return True if `directory` is the folder of a batch. Only a sample of its runs is inspected."""
+    """Return True if `directory` is a batch folder. Only a sample of its runs is inspected."""
     trials = directory / TRIALS
     if not trials.is_dir():
         return False
@@ -45,15 +46,15 @@ def visit_folders(directory: Path) -> list[Path]:
 
 
 def check_run_directory(path: Path, *, replace: bool = False) -> Path:
-    """Check that a run may be written to `path`, and return the path with links resolved.
+    """Check that a run may be written to `path`. Return the path with links resolved.
 
     Args:
         path: The path.
-        replace: Allow `path` to hold an earlier run.
+        replace: Allow an earlier run in `path`.
 
     Raises:
-        RecordError: Something is in the way. The message says what to do.
-        OSError: The path is not usable: too long, below a file, or not readable.
+        RecordError: `path` contains something else. The message explains what to do.
+        OSError: The path cannot be used: it is too long, below a file, or not readable.
     """
     place = _place(path)
     if not place.exists():
@@ -83,7 +84,7 @@ def check_batch_folder(path: Path) -> None:
     """Check that a batch may be written to `path`, or added to an existing one.
 
     Raises:
-        RecordError: Something else is in the way.
+        RecordError: `path` contains something else.
         OSError: The folder cannot be written.
     """
     place = _place(path)
@@ -101,7 +102,7 @@ def check_file(path: Path, *, replace: bool = False) -> None:
     """Check that a file may be written to `path`.
 
     Raises:
-        RecordError: Something is in the way.
+        RecordError: `path` exists and cannot be replaced.
         OSError: The folder of the file cannot be written.
     """
     place = _place(path)
@@ -120,11 +121,11 @@ def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = N
 
     Args:
         path: Path of the run directory.
-        replace: Allow `path` to hold an earlier run.
+        replace: Allow an earlier run in `path`, which is replaced.
         scratch: Parent of the working folder (default: that of `path`).
 
     Raises:
-        RecordError: Something is in the way. If it appeared during the run, the run is kept next to it.
+        RecordError: `path` exists and cannot be replaced. If it appeared during the run, the run is saved next to it.
         OSError: The folder cannot be written.
     """
     place = check_run_directory(path, replace=replace)
@@ -138,9 +139,9 @@ def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = N
 
 
 def add_files(folder: Path, path: Path) -> None:
-    """Add the files of a working folder to a run directory and update its checksums, atomically.
+    """Atomically add the files of a working folder to a run directory, and update its checksums.
 
-    Afterwards the working folder holds the previous run directory.
+    Afterwards the working folder contains the previous run directory.
     """
     place = Path(os.path.realpath(path))
     shutil.copytree(place, folder, copy_function=link_or_copy, dirs_exist_ok=True)
@@ -149,7 +150,7 @@ def add_files(folder: Path, path: Path) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """Return `path`, or if it exists, `path` with the first free number appended."""
+    """Return `path` or, if it exists, `path` followed by the first free number."""
     number, free = 1, path
     while os.path.lexists(free):
         number += 1
@@ -171,7 +172,7 @@ def _move(folder: Path, place: Path, *, replace: bool) -> None:
 
 
 def link_or_copy(source: str, target: str) -> None:
-    """Hard-link a file, or copy it if the file system has no links."""
+    """Hard-link a file, or copy it if the file system does not support links."""
     try:
         os.link(source, target)
     except OSError:
@@ -180,7 +181,7 @@ def link_or_copy(source: str, target: str) -> None:
 
 @contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    """Create `folder` and its parents. Remove those that are empty afterwards."""
+    """Create `folder` and its parents. Afterwards, remove those that are empty."""
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -188,17 +189,17 @@ def _folder(folder: Path) -> Iterator[None]:
         yield
     finally:
         for parent in made:
-            with suppress(OSError):  # not empty
+            with suppress(OSError):
                 parent.rmdir()
 
 
 def _place(path: Path) -> Path:
-    """Resolve the links of a path. Raises `RecordError` for a dangling link, `OSError` if the path is not usable."""
+    """Resolve the links of a path. Raises `RecordError` for a dangling link, `OSError` for an unusable path."""
     if path.is_symlink() and not path.exists():
         raise RecordError(f"{path} is a dangling symbolic link; remove it or choose another --out")
     place = Path(os.path.realpath(path))
     with suppress(FileNotFoundError, NotADirectoryError):
-        place.stat()  # from Python 3.14 on, `exists` is False for a name that is too long
+        place.stat()  # from Python 3.14 on, `exists` returns False for a name that is too long
     return place
 
 
@@ -210,7 +211,7 @@ def _existing(folder: Path) -> Path:
 
 def _check_writable(folder: Path) -> None:
     try:
-        with tempfile.TemporaryFile(dir=folder):  # an unnamed file cannot be left behind
+        with tempfile.TemporaryFile(dir=folder):  # unnamed, so that it cannot be left behind
             pass
     except OSError as error:
         raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error

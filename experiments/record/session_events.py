@@ -1,4 +1,4 @@
-"""Types of the events about a session: its start and end, phases, clock and display."""
+"""Types of session events: start and end, phases, clock and display."""
 
 from typing import Annotated, Literal
 
@@ -18,14 +18,14 @@ class LoggedEvent(
     """A line of the log.
 
     Attributes:
-        t: Simulated time, s.
+        t: Simulated time in seconds.
     """
 
     t: Seconds
 
 
 class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
-    """First line: what was run. It also holds the settings of the trial, as in `metrics.json`.
+    """First line of the log. It also contains the settings of the trial, as in `metrics.json`.
 
     Attributes:
         format: Version of the log format.
@@ -33,15 +33,15 @@ class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
         model: Fingerprint of the compiled house with its objects, without purely visual parts.
         world: Options of the world: timestep, capacity, grip, fidelity.
         fingerprint: Hash of the settings and of `inputs`.
-        inputs: Hashes or versions of what else the trial depends on: house, code, libraries.
+        inputs: Hashes or versions of the trial's other dependencies: house, code, libraries.
         episode_sha256: SHA-256 of `episode.json`.
         order: Object names in the participant's random order.
         objects: Number of misplaced objects.
         assistance: Assistance condition.
         house: House name, or path of its catalogue.
-        time_limit: Simulated time after which the trial ends, s.
+        time_limit: Simulated time in seconds after which the trial ends.
         rooms: Number of rooms; None in older records.
-        area_m2: Floor area of the rooms, m2; None in older records.
+        area_m2: Floor area of the rooms in square metres; None in older records.
     """
 
     format: int
@@ -61,7 +61,7 @@ class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
 
 
 class ParticipantEvent(LoggedEvent, frozen=True):
-    """Second line: the participant.
+    """Second line of the log, which describes the participant.
 
     Attributes:
         user: Name of the participant model.
@@ -76,7 +76,7 @@ class ParticipantEvent(LoggedEvent, frozen=True):
 
 
 class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
-    """A pre-task phase started. The task clock stays at 0. Tasks without such phases have no such event.
+    """Start of a phase before the task. The task clock remains at 0.
 
     Attributes:
         phase: `story`, `flythrough` or `training`.
@@ -86,13 +86,13 @@ class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
 
 
 class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
-    """A pre-task phase ended.
+    """End of a phase before the task.
 
     Attributes:
         phase: As in `phase_begun`.
-        duration_s: Time spent reading, watching, or training, s.
-        bins: In a simulated participant's fly-through: time at which each receptacle came into view, s.
-        reason: Why the training ended, as in `end`. Its record is in the run directory `training`.
+        duration_s: Time in seconds spent reading, watching, or training.
+        bins: In a simulated participant's fly-through: time in seconds at which each receptacle came into view.
+        reason: Reason why the training ended, as in `end`. Its record is in the run directory `training`.
         attempts: Attempts at the questions about the story. Only in logs from before version 0.3.
     """
 
@@ -104,11 +104,11 @@ class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
 
 
 class StartedEvent(LoggedEvent, frozen=True):
-    """The person started the clock. The task is hidden until then.
+    """The participant started the clock. The task is hidden until then.
 
     Attributes:
-        waited_s: How long the session had waited for the start, in seconds of wall time.
-        wall: Unix time, s.
+        waited_s: Wall time in seconds for which the session had waited for the start.
+        wall: Unix time in seconds.
     """
 
     waited_s: float
@@ -121,7 +121,7 @@ class PauseEvent(LoggedEvent, frozen=True):
     Attributes:
         reason: `hidden` (the tab), `disconnected`, `silent` (no heartbeat from the page for 1 s), `restarted` (the
             worker process died), `asked` or `taken over`.
-        wall: Unix time, s.
+        wall: Unix time in seconds.
     """
 
     reason: Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
@@ -132,7 +132,7 @@ class ResumeEvent(LoggedEvent, frozen=True):
     """The clock was resumed.
 
     Attributes:
-        wall: Unix time, s.
+        wall: Unix time in seconds.
     """
 
     wall: float
@@ -142,8 +142,8 @@ class BlurEvent(LoggedEvent, frozen=True):
     """The page lost or regained the keyboard focus.
 
     Attributes:
-        away: Whether it lost the focus.
-        wall: Unix time, s.
+        away: True if the page lost the focus.
+        wall: Unix time in seconds.
     """
 
     away: bool
@@ -154,9 +154,9 @@ class OverrunEvent(LoggedEvent, frozen=True):
     """A control step was late because the machine was busy or inputs did not arrive.
 
     Attributes:
-        seconds: Delay, in seconds of wall time.
-        skipped: Whether the clock was set to the present because the process had been suspended.
-        missing: Whether the step ran without inputs that the page had promised. Logged only for the first such step in
+        seconds: Delay in seconds of wall time.
+        skipped: True if the clock was set to the present because the process had been suspended.
+        missing: True if the step ran without inputs that the page had announced. Logged only for the first such step in
             a row.
     """
 
@@ -166,22 +166,22 @@ class OverrunEvent(LoggedEvent, frozen=True):
 
 
 class DisplayEvent(LoggedEvent, frozen=True):
-    """How well the person saw the session in the last 5 s, as measured by the page.
+    """Quality of the display over the last 5 s, as measured by the page.
 
     Attributes:
-        draw: Whether the browser drew the view or showed frames of the server.
+        draw: Whether the browser drew the view or showed frames from the server.
         renderer: Name of the renderer.
-        width: Width of the view, CSS px.
-        height: Height of the view, CSS px.
+        width: Width of the view in CSS pixels.
+        height: Height of the view in CSS pixels.
         pixel_ratio: Screen pixels per CSS pixel.
         frames_per_s: Frames shown per second.
-        frame_ms: Median time between two frames, ms.
-        frame_ms_95: 95th percentile of the time between two frames, ms.
+        frame_ms: Median time between two frames in milliseconds.
+        frame_ms_95: 95th percentile of the time between two frames in milliseconds.
         latency_ms: Median time, in ms, from an input to the frame that shows it or, if the browser draws, to the
             server's state that includes it; null if nothing was pressed.
         dropped: Number of received frames that were not shown.
-        wall: Unix time, s.
-        field_of_view: Horizontal field of view, rad; null if the person cannot choose it.
+        wall: Unix time in seconds.
+        field_of_view: Horizontal field of view in radians; null if the person cannot choose it.
     """
 
     draw: Literal["browser", "server"]
@@ -204,7 +204,7 @@ class DrawEvent(LoggedEvent, frozen=True):
     Attributes:
         draw: The new renderer's side.
         reason: Why the other side stopped: `slow` (below 20 frames per second), `context lost`, or the missing feature.
-        wall: Unix time, s.
+        wall: Unix time in seconds.
     """
 
     draw: Literal["browser", "server"]
@@ -213,10 +213,10 @@ class DrawEvent(LoggedEvent, frozen=True):
 
 
 class EndEvent(LoggedEvent, frozen=True):
-    """Last line.
+    """Last line of the log.
 
     Attributes:
-        reason: Why the trial ended.
+        reason: Reason why the trial ended.
         error: Description of the error, if there was one.
         signal: Name of the signal that interrupted the trial, if any.
     """

@@ -21,7 +21,7 @@ from mjsim.world.state import checkpoint_hash
 
 @dataclass(frozen=True)
 class Mismatch:
-    """A difference from the record.
+    """A difference between a record and its verification.
 
     Attributes:
         step: First control step concerned.
@@ -35,7 +35,7 @@ class Mismatch:
 
 
 def damage(record: Record) -> list[Mismatch]:
-    """Check a record against its own lengths and hashes. Return the mismatches, sorted by control step."""
+    """Check the lengths and hashes within a record. Return the mismatches, sorted by control step."""
     checks = (_lengths, _actions, _log, _checkpoints, _lines, _settings)
     return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step)
 
@@ -48,7 +48,7 @@ def derived_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
 
 
 def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
-    """Yield files of a run that are missing, added or changed."""
+    """Yield a mismatch for each file of a run that is missing, added or changed."""
     last = record.steps - 1
     try:
         sums = read_checksums(directory)
@@ -167,7 +167,7 @@ def _settings(record: Record) -> Iterator[Mismatch]:
 def _derived(
     directory: Path, record: Record, name: str, fault: Callable[[Any], str | None]
 ) -> Iterator[Mismatch]:
-    """Compare a JSON file with its expected content. Missing files are left to the checksums."""
+    """Compare a JSON file with its expected content. A missing file is reported by `checksum_mismatches`."""
     if not (directory / name).exists():
         return
     try:

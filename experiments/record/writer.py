@@ -1,4 +1,4 @@
-"""Writes the record of a running session, and the run directory of a finished one."""
+"""Writes the record of a running session, and the run directory of a finished session."""
 
 import dataclasses
 import json
@@ -28,25 +28,25 @@ from mjsim.world.health.monitor import HealthSample
 from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
 from mjsim.world.world import World
 
-FIRST_CAPACITY = 4096  # rows allocated at first; doubled when full
+FIRST_CAPACITY = 4096  # number of rows allocated at first, doubled when full
 NOTHING_FILMED = "none: nothing was filmed"  # value of `renderer` in a run without a film
 
 
 class RecordWriter:
     """The record of a running session.
 
-    A session takes a checkpoint at the first control step at which the world is not busy, at least `CHECKPOINT_PERIOD`
-    after the previous one. A replay takes them at the steps of the original run.
+    A session takes a checkpoint at the first control step at which the world is not busy and `CHECKPOINT_PERIOD` has
+    passed since the previous checkpoint. A replay takes checkpoints at the same steps as the original run.
 
     Args:
         episode: The disorganized house.
         log: The event log.
-        journal: Receives new data at each `commit`, or None to keep everything in memory.
-        checkpoints: Control steps at which to take a checkpoint, or None for the rule above.
+        journal: Receives new data at each `commit`, or None to keep all data in memory.
+        checkpoints: Control steps at which to take checkpoints, or None for the rule above.
 
     Attributes:
         step: Number of the next control step.
-        time: Simulated time of the previous control step, s.
+        time: Simulated time of the previous control step in seconds.
         checkpoints: New checkpoints, by control step.
     """
 
@@ -70,7 +70,7 @@ class RecordWriter:
         self._status: tuple[tuple[ObjectStatus, ...], list[int]] = ((), [])
 
     def restore(self, record: Record, step: int) -> None:
-        """Continue a record at a control step. Earlier events are kept in the log, earlier rows are not."""
+        """Continue a record at a control step. The log keeps its earlier events, but earlier rows are not kept."""
         self.log.restore(record.events[: record.events_before(step)])
         self.step, self._length, self._committed = step, 0, self.log.entries
         self._last_checkpoint = max((k for k in record.checkpoint_steps if k <= step), default=0)
@@ -78,7 +78,7 @@ class RecordWriter:
         self.checkpoints.clear()
 
     def append(self, before: Observation, health: HealthSample, state_hash: int, steps: Steps) -> None:
-        """Add control steps during which no hand picks up or releases anything.
+        """Add control steps in which no hand picks up or releases an object.
 
         Args:
             before: State before the first step.
@@ -108,15 +108,15 @@ class RecordWriter:
         self._length, self.step = (
             end,
             self.step + len(steps),
-        )  # set last, so an interruption leaves only whole rows
+        )  # set last, so that an interruption leaves only complete rows
 
     @property
     def last_state_hash(self) -> int:
-        """Hash of the state before the control step added last."""
+        """Hash of the state before the most recent control step."""
         return int(self._columns["state_hash"][self._length - 1])
 
     def pass_checkpoint(self, world: World, now: Observation) -> Observation:
-        """If a checkpoint is due, take it and restore the world from it. Return the new observation, else `now`."""
+        """Take a checkpoint if one is due, and restore the world from it. Return the new observation, or else `now`."""
         if not self._due(world, now.busy):
             return now
         state = self.checkpoints[self.step] = world.state()
@@ -124,7 +124,7 @@ class RecordWriter:
         return world.restore(state)
 
     def steps_to_checkpoint(self, world: World) -> int:
-        """Return the number of control steps until a checkpoint can be due, at least 1."""
+        """Return a lower bound, at least 1, on the number of control steps until a checkpoint is due."""
         return max(1, self._last_checkpoint + _period(world) - self.step)
 
     def commit(self, participant: Any = None) -> None:
@@ -146,7 +146,7 @@ class RecordWriter:
         self.checkpoints.clear()
 
     def record(self) -> Record:
-        """Return the record so far, without data already in the journal."""
+        """Return the record so far. Data already in the journal are not included."""
         return assemble(self._episode, self._rows[: self._length], self.log, self._unknown, self.checkpoints)
 
     def _due(self, world: World, busy: bool) -> bool:
@@ -185,7 +185,7 @@ def _period(world: World) -> int:
 
 
 def provenance(world: World) -> dict[str, Any]:
-    """Return versions, compiled model and world options on which a run depends, JSON-ready."""
+    """Return as JSON values the versions, the compiled model and the world options on which a run depends."""
     return {
         "versions": engine_versions(),
         "model": model_fingerprint(world.scene.counterpart(visuals=False).model),
@@ -208,13 +208,13 @@ def save_record(
         folder: Working folder, which becomes the run directory.
         out: Path of the run directory.
         record: The record.
-        wall: Wall time of the trial, s.
+        wall: Wall time of the trial in seconds.
         frames_sha256: Hash of the filmed frames, or None.
         renderer: Renderer of these frames.
 
     Raises:
-        RecordError: The folder cannot be written. The message says where the record was saved instead.
-        OSError: The folder cannot be written, but the session's journal still holds the record.
+        RecordError: The folder cannot be written. The message names the path where the record was saved instead.
+        OSError: The folder cannot be written, but the session's journal still contains the record.
     """
     metrics = {
         **measure(record.events, record.trajectory),
@@ -225,7 +225,7 @@ def save_record(
     try:
         _write(folder, record, metrics)
     except OSError as error:
-        if record.participant is not None:  # the record came from a journal, which still has it
+        if record.participant is not None:  # the record was read from a journal, which still contains it
             raise
         shutil.rmtree(folder, ignore_errors=True)
         metrics["frames_sha256"] = None
@@ -238,7 +238,7 @@ def _write(folder: Path, record: Record, metrics: dict[str, Any]) -> None:
     record.episode.save(folder / records.EPISODE)
     with replacing(folder / records.EVENTS) as path:
         path.write_bytes(record.log)
-    # Sessions with people are long. Short trials of a batch are not worth the slower compression.
+    # Sessions of human participants are long enough to justify the slower compression, unlike short trials of a batch.
     played = record.participant is not None
     save_arrays(folder / records.TRAJECTORY, record.trajectory, small=played)
     save_arrays(folder / records.RECORDING, record.recording, small=played)
