@@ -1,4 +1,4 @@
-"""Import of objects from mesh files, houses from other simulators, and episodes (docs/import.md).
+"""Importers for objects in mesh files, houses from other simulators, and episodes (docs/import.md).
 
 Needs the extra `import`.
 """
@@ -11,7 +11,7 @@ EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "P
 
 
 def require_extra() -> None:
-    """Raise `AssetError` if a library of the extra is missing. Otherwise, some would fail only late, inside trimesh."""
+    """Raise `AssetError` if a library of the extra is missing. Otherwise, some would fail later, inside trimesh."""
     if missing := [name for name in EXTRA if find_spec(name) is None]:
         raise AssetError(
             f"importing needs {', '.join(missing)}: pip install 'mjsim[import]' adds what is missing"

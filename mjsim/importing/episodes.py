@@ -1,4 +1,4 @@
-"""Reader of rearrangement episodes of other benchmarks: misplaced objects, and their distance from their goals.
+"""Reader for rearrangement episodes of other benchmarks: misplaced objects and their distances from their goals.
 
 RoomR (AI2-THOR rearrangement) has poses at the start and at the goal. Housekeep has each object's receptacle and the
 receptacles where it belongs.
@@ -21,21 +21,23 @@ import numpy as np
 from mjsim.support.files import MAX_INPUT, read_bytes
 from mjsim.values.errors import EpisodeError, brief
 
-MOVED = 0.05  # distance above which an object counts as moved, m; RoomR's poses vary by less between runs
-HOUSE = 60.0  # largest plausible distance, m; objects that fell out of the scene are farther away
+# Distance in metres above which an object counts as moved; RoomR poses vary by less between runs.
+MOVED = 0.05
+HOUSE = 60.0  # largest plausible distance in metres; objects that fell out of the scene are farther away
 IN_PLACE, MISPLACED, OPENED = "in place", "misplaced", "opened"
 
 
 @dataclass(frozen=True)
 class EpisodeObject:
-    """An object of an episode."""
+    """An object in an imported episode."""
 
     scene: str
     episode: str
     name: str
     kind: str
     state: str  # `in place`, `misplaced`, or `opened` for a drawer or door
-    distance: float | None = None  # horizontal distance to the goal, m; None if not misplaced or unknown
+    # Horizontal distance to the goal in metres; None if not misplaced or unknown.
+    distance: float | None = None
 
 
 class _Point(msgspec.Struct):
@@ -172,7 +174,7 @@ def _housekeep_objects(episode: _Housekeep) -> Iterator[EpisodeObject]:
             if not where.any() or where @ right:
                 yield EpisodeObject(scene, number, name, kind, IN_PLACE)
                 continue
-            offsets = (receptacles[right > 0] - position)[:, [0, 2]]  # y is up
+            offsets = (receptacles[right > 0] - position)[:, [0, 2]]  # the y axis points up
             nearest = _distance(float(np.hypot(*offsets.T).min())) if len(offsets) else None
             yield EpisodeObject(scene, number, name, kind, MISPLACED, nearest)
     except ValueError as error:
@@ -186,5 +188,5 @@ def _distance(metres: float) -> float | None:
 
 
 def kind_of(name: str) -> str:
-    """A kind in words: `ButterKnife` and `butter_knife` give `butter knife`."""
+    """Return an object's type in words. For example, `ButterKnife` and `butter_knife` give `butter knife`."""
     return " ".join(re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)).lower()

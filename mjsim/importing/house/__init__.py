@@ -1,1 +1,1 @@
-"""Import of houses from scenes of other simulators (docs/import.md)."""
+"""Importer for houses from scenes of other simulators (docs/import.md)."""

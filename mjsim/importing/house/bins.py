@@ -1,4 +1,4 @@
-"""Placement of bins in an imported house: backs to a wall, with free floor in front, and without blocking a way."""
+"""Placement of bins in an imported house: back to a wall, free floor in front, and no way blocked."""
 
 import math
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ from mjsim.importing.house.floor_grid import BODY, CELL, FloorGrid, Mask, cleara
 from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
-AREA = 5.0  # walkable floor per bin, in m^2
-_STAND = 0.8  # depth of free floor in front of a bin, in metres
-_ASIDE = 0.05  # free width at the sides, in metres
-_WALL = 0.15  # maximum distance to the wall behind, in metres
-_WIDE = 0.4  # body radius for which the floor must stay connected, in metres
+AREA = 5.0  # walkable floor required per bin, in square metres
+_STAND = 0.8  # depth of the free floor in front of a bin, in metres
+_ASIDE = 0.05  # free width on each side of a bin, in metres
+_WALL = 0.15  # maximum distance between a bin and the wall behind it, in metres
+_WIDE = 0.4  # body radius in metres for which the floor must stay connected
 _TRIES = 300  # maximum number of poses tried for a bin in each room
-_LOST = 1.0  # walkable floor that may be lost beyond the bin and its surroundings, in m^2
-# Bins, the most important first, and the kinds of room in which people would look for them.
+_LOST = 1.0  # walkable floor that may be lost beyond a bin and its surroundings, in square metres
+# Bins by descending priority, and the room types in which people would look for them.
 _HOMES = {
     "dish_bin": ("kitchen", "living_kitchen", "dining_room"),
     "toy_box": ("bedroom", "living_room"),
@@ -32,20 +32,20 @@ _HOMES = {
     "office_box": ("office", "bedroom", "living_room"),
     "bookshelf": ("living_room", "living_kitchen", "office"),
 }
-# Yaw of a bin, and the direction in which its back then faces.
+# Possible yaw angles of a bin, and for each the direction of its back.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
 
 
-Span = tuple[int, int]  # first cell and end cell, which is not included
+Span = tuple[int, int]  # first cell, and end cell (exclusive)
 
 
 @dataclass(frozen=True)
 class _Size:
-    """Size and position of a receptacle in its own frame, m."""
+    """Size and position of a receptacle in its own frame, in metres."""
 
     width: float
     depth: float
-    middle: tuple[float, float]  # of its base
+    middle: tuple[float, float]  # middle of the base
 
 
 def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue, seed: int = 0) -> tuple[Bin, ...]:
@@ -80,7 +80,7 @@ def _size(receptacle: Receptacle) -> _Size:
 def _placed(
     grid: FloorGrid, rooms: Rooms, key: str, size: _Size, taken: Sequence[str], rng: np.random.Generator
 ) -> tuple[Bin, FloorGrid] | None:
-    """Place a bin. Return it with the new grid, or None if it does not fit.
+    """Place a bin, and return it with the updated grid. Return None if the bin does not fit.
 
     Prefer a room where people would look for it, then a room with few bins.
     """
@@ -104,19 +104,17 @@ def _placed(
 
 @dataclass(frozen=True)
 class _Choice:
-    """A possible bin on the grid: its cells, and the cells in front of it."""
-
     cells: tuple[slice, slice]
     before: tuple[slice, slice]
     yaw: float
-    back: tuple[int, int]  # direction of its back
+    back: tuple[int, int]  # direction of the bin's back
 
 
 def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator) -> list[_Choice]:
-    """Poses in a room with the back to a wall, in random order."""
     free = grid.free & room
     standing = grid.walkable & room
-    walls = (grid.walls & ~grid.doors) | ~grid.indoors  # the shell closes off the outside
+    # The outer shell is added later, so cells outside count as walls.
+    walls = (grid.walls & ~grid.doors) | ~grid.indoors
     ahead = round(_STAND / CELL)
     found: list[_Choice] = []
     for yaw, back in _TURNS:
@@ -136,25 +134,24 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
 
 
 def _last(span: Span, way: int) -> Span:
-    """The last cell of a span in direction `way` (1 or -1). If `way` is 0, the whole span."""
+    """Return the last cell of a span in direction `way` (1 or -1), or the whole span if `way` is 0."""
     start, stop = span
     return {1: (stop - 1, stop), 0: span, -1: (start, start + 1)}[way]
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """The first `cells` cells beyond a span in direction `way` (1 or -1). If `way` is 0, the span itself."""
+    """Return the first `cells` cells beyond a span in direction `way` (1 or -1), or the span itself if `way` is 0."""
     start, stop = span
     return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
 
 
 def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
-    """Convert spans relative to `place` into slices of the grid."""
     x, y = (slice(at + start, at + stop) for at, (start, stop) in zip(place, spans, strict=True))
     return x, y
 
 
 def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> FloorGrid | None:
-    """The grid with a bin; None if the bin would be in the way."""
+    """Return the grid with a bin added, or None if the bin would block a way."""
     blocked = grid.blocked.copy()
     blocked[choice.cells] = True
     after = replace(grid, blocked=blocked)
@@ -170,13 +167,13 @@ def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> Fl
 
 
 def _parts(grid: FloorGrid, radius: float) -> int:
-    """Number of connected parts of the floor above 0.2 m^2 for a body with this radius, in metres."""
+    """Count the connected parts of the floor above 0.2 m^2 for a body with this radius, in metres."""
     parts, _ = label(clearance(grid.free) > radius)
     return int((np.bincount(parts.ravel())[1:] * CELL**2 > 0.2).sum())
 
 
 def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float, float]:
-    """Pose of the receptacle's frame: x, y, m, and yaw, rad. Its back is flush with its cells."""
+    """Return the pose of the receptacle's frame: x and y in metres, and yaw in radians."""
     low = grid.origin + CELL * np.array([choice.cells[0].start, choice.cells[1].start])
     high = grid.origin + CELL * np.array([choice.cells[0].stop, choice.cells[1].stop])
     back = np.array(choice.back, float)
@@ -189,7 +186,7 @@ def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """For each cell, count the cells of `mask` in the rectangle that two spans describe relative to it."""
+    """For each cell, count the cells of `mask` in a rectangle given by two spans relative to the cell."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]
@@ -199,11 +196,10 @@ def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
 
 
 def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
-    """Cells for which `mask` is true in the whole rectangle that two spans describe relative to them."""
+    """Return the cells for which `mask` is true in the whole rectangle given by two spans relative to the cell."""
     (a, b), (c, d) = spans
     return np.asarray(_count(mask, spans) == (b - a) * (d - c))
 
 
 def _shifted(mask: Mask, by: tuple[int, int], steps: int) -> Mask:
-    """Cells whose neighbour `steps` cells away in direction `by` is in `mask`."""
     return np.roll(mask, (-by[0] * steps, -by[1] * steps), (0, 1))

@@ -1,4 +1,4 @@
-"""Meshes that an imported house shows: one material each, with their images, within a budget of triangles."""
+"""Meshes that are drawn for an imported house. Each has one material, and their number of triangles is limited."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
@@ -14,27 +14,27 @@ from mjsim.importing.house.floor_grid import Mask
 from mjsim.importing.object.closed_body import is_closed
 from mjsim.importing.object.visual_mesh import VisualMesh, corner_normals
 
-BUDGET = 150_000  # triangles of a house
-_LEAST = 100  # simplification stops at this number of triangles per mesh
-_LEAST_VERTICES = 4  # required by MuJoCo
-_SMALL, _FEW = 0.3, 1000  # size of small things in metres, and their limit of triangles
-CEILING = 2.2  # height above which geoms are omitted from views from above, in metres
-_SAME = 8  # of 255; colours that differ by less are merged
+BUDGET = 150_000  # maximum number of triangles of a house
+_LEAST = 100  # meshes are not simplified below this number of triangles
+_LEAST_VERTICES = 4  # minimum number of vertices that MuJoCo requires
+_SMALL, _FEW = 0.3, 1000  # size limit of small objects in metres, and their maximum number of triangles
+CEILING = 2.2  # height above which top-down views omit geoms, in metres
+_SAME = 8  # colours that differ by less are merged, on a scale from 0 to 255
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnMesh:
-    """A mesh of one material."""
+    """A mesh with a single material."""
 
-    name: str  # name of its piece
+    name: str  # name of the scene piece
     visual: VisualMesh
-    high: bool  # above `CEILING` and over a room, so that top-down views omit it
+    high: bool  # True if the mesh is above `CEILING` and over a room, so that top-down views omit it
 
 
 def make_drawn_meshes(
     pieces: Iterable[ScenePiece], over_floor: Callable[[Floats], Mask]
 ) -> tuple[DrawnMesh, ...]:
-    """Meshes of all visible pieces.
+    """Make meshes of all visible pieces.
 
     `over_floor` returns a mask of the points (k, 2), in metres, that are over rooms and not over walls.
     """
@@ -57,19 +57,18 @@ def make_drawn_meshes(
 
 
 def _over(surface: Surface, over_floor: Callable[[Floats], Mask]) -> Mask:
-    """Mask (n,) of the triangles whose centre, or a point halfway from it to a corner, is over a room."""
+    """Return a mask (n,) of the triangles whose centre, or a point halfway from it to a corner, is over a room."""
     middle = surface.corners.mean(axis=1)[:, :2]
     halfway = (middle[:, None] + surface.corners[:, :, :2]) / 2
     return np.asarray(over_floor(middle) | over_floor(halfway.reshape(-1, 2)).reshape(-1, 3).any(axis=1))
 
 
 def picture_key(mesh: VisualMesh) -> str:
-    """A hash of a mesh's image; empty without one."""
+    """Return a hash of a mesh's image, or an empty string if it has no image."""
     return "" if mesh.picture is None else hashlib.sha256(mesh.picture.tobytes()).hexdigest()[:12]
 
 
 def _by_name(pieces: Iterable[ScenePiece]) -> Iterator[tuple[str, Surface]]:
-    """Yield each name with all visible surfaces of this name joined into one."""
     groups: dict[str, list[Surface]] = {}
     for piece in pieces:
         if piece.seen:
@@ -79,7 +78,6 @@ def _by_name(pieces: Iterable[ScenePiece]) -> Iterator[tuple[str, Surface]]:
 
 
 def _by_material(surface: Surface) -> Iterator[Surface]:
-    """Split a surface into parts, each with one image and one colour."""
     colours = np.round(surface.colours.mean(axis=1) * 255 / _SAME).astype(int)
     keys = np.column_stack((surface.image, colours))
     kinds, number = np.unique(keys, axis=0, return_inverse=True)
@@ -88,7 +86,7 @@ def _by_material(surface: Surface) -> Iterator[Surface]:
 
 
 def _reduced(surface: Surface, count: int) -> Surface:
-    """A surface of one material with at most about `count` triangles.
+    """Simplify a surface of one material to at most about `count` triangles.
 
     Each triangle gets the texture coordinates of the nearest triangle that it replaces.
     """

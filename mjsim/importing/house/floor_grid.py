@@ -1,4 +1,4 @@
-"""The floor of a scene as a grid: obstacles, walls, the indoor area, and where a person can walk."""
+"""Floor of a scene as a grid: obstacles, walls, the indoor area, and walkable cells."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,29 +14,30 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.importing.house.solids import Solid
 from mjsim.values.errors import AssetError
 
-CELL = 0.05  # m
-BODY = 0.27  # radius of a person, with a margin, in metres
-_MAX_AREA = 1500.0  # largest walkable area, in m^2
-_BAND = (0.05, 1.8)  # heights at which a person bumps into things, in metres
-_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))  # in metres; a wall is solid in all of these ranges
-_GAP = 0.6  # half width up to which openings in outer walls count as closed, in metres
-_PAD = 2 * _GAP + 0.3  # margin of the grid, in metres
+CELL = 0.05  # cell size in metres
+BODY = 0.27  # radius of a person's body with a safety margin, in metres
+_MAX_AREA = 1500.0  # maximum walkable area, in square metres
+_BAND = (0.05, 1.8)  # range of heights in metres at which a person bumps into things
+# A wall is solid in each of these ranges of height, in metres.
+_WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))
+_GAP = 0.6  # openings in outer walls count as closed up to this half width, in metres
+_PAD = 2 * _GAP + 0.3  # margin of the grid around the scene, in metres
 _DRAWN = 10.0  # additional weight of cells with a drawn floor
-_LEAST_SHARE = 0.15  # walls that enclose less of the floor are a closet in an otherwise open house
-_MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in m^2
+_LEAST_SHARE = 0.15  # walls that enclose a smaller share of the floor are taken for a closet in an open house
+_MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in square metres
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class FloorGrid:
-    """Grids of the floor. The first axis is x, and all masks have the shape (nx, ny)."""
+    """Grids of the floor. The first axis is x, and all masks have shape (nx, ny)."""
 
-    origin: Floats  # lower corner of cell (0, 0), m, (2,)
-    blocked: Mask  # obstacles
-    walls: Mask  # including open doors
-    doors: Mask  # open doors
-    indoors: Mask  # enclosed by the outer walls, including these
+    origin: Floats  # lower corner of cell (0, 0) in metres, shape (2,)
+    blocked: Mask  # cells covered by obstacles
+    walls: Mask  # walls, including open doors
+    doors: Mask
+    indoors: Mask  # area enclosed by the outer walls, including the walls
     floor: Mask  # floor drawn by the source
     enclosed: bool  # False if no outer walls enclose a floor; `indoors` is then a rectangle
 
@@ -46,12 +47,12 @@ class FloorGrid:
 
     @cached_property
     def clearance(self) -> Floats:
-        """Distance from each cell to the nearest obstacle, m."""
+        """Distance from each cell to the nearest obstacle, in metres."""
         return clearance(self.free)
 
     @cached_property
     def walkable(self) -> Mask:
-        """Cells where a person's centre can be: the largest connected part. Cells with a drawn floor count most."""
+        """Largest connected part of the floor where a person's centre can be. Cells with a drawn floor weigh more."""
         parts, count = label(self.clearance > BODY)
         if not count:
             return np.zeros_like(self.free)
@@ -60,17 +61,17 @@ class FloorGrid:
 
     @property
     def area(self) -> float:
-        """Area of the walkable floor, m^2."""
+        """Area of the walkable floor, in square metres."""
         return float(self.walkable.sum()) * CELL**2
 
     def cell(self, point: Sequence[float] | Floats) -> tuple[int, int]:
-        """Cell that contains a point (x, y), m, or the nearest one if it is off the grid."""
+        """Return the cell at a point (x, y) in metres, or the nearest cell if the point is outside the grid."""
         found = np.floor((np.asarray(point)[:2] - self.origin) / CELL).astype(int)
         x, y = np.clip(found, 0, np.array(self.free.shape) - 1).tolist()
         return x, y
 
     def on(self, mask: Mask, points: Floats) -> Mask:
-        """Mask (k,) of the points (k, 2), m, that are on cells of a mask."""
+        """Return a mask (k,) of the points (k, 2), in metres, whose cells are in `mask`."""
         cells = np.clip(np.floor((points - self.origin) / CELL).astype(int), 0, np.array(mask.shape) - 1)
         return np.asarray(mask[cells[:, 0], cells[:, 1]])
 
@@ -101,10 +102,10 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
-    standing = _box(shape, origin, solids)  # a ground plane reaches far beyond the house
+    standing = _box(shape, origin, solids)  # needed because a ground plane extends far beyond the house
     for count in (len(_WALL), len(_WALL) - 1):  # first with walls up to eye level, then with lower ones
         walls = np.logical_and.reduce(levels[:count]) | shut
-        # Low parts count as closed, too, because of windows with sills.
+        # Treat low openings as closed, so that a window with a sill is not taken for a door.
         indoors = _enclosed(walls | levels[0])
         grid = FloorGrid(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
         whole = replace(grid, indoors=_rectangle(drawn), enclosed=False)
@@ -113,7 +114,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
             break
     else:
         grid = whole
-    if not grid.walls.any():  # no wall is that high, so use everything that people bump into
+    if not grid.walls.any():  # no wall is high enough, so use everything that people bump into
         grid = replace(grid, walls=levels[0] | shut)
     if grid.area > _MAX_AREA:
         raise AssetError(
@@ -128,7 +129,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
 
 
 def too_large(sides: Floats) -> AssetError:
-    """The error for a scene with these sides (2,), m. It names the unit in which the scene would be a house."""
+    """Make an error about a scene with sides (2,) in metres. It names a unit in which the scene could be a house."""
     unit = unit_of(float(sides.max()))
     advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
     return AssetError(f"spans {_metres(sides)}, and houses have at most {MAX_SIDE:g} m; {advice}")
@@ -139,13 +140,13 @@ def _metres(sides: Floats) -> str:
 
 
 def clearance(free: Mask) -> Floats:
-    """Distance from each cell to the nearest cell that is not free, or to the border, m."""
+    """Return the distance in metres from each cell to the nearest cell that is not free, or to the border."""
     padded = np.pad(free, 1)
     return np.asarray(distance_transform_edt(padded)[1:-1, 1:-1] * CELL)
 
 
 def _enclosed(walls: Mask) -> Mask:
-    """Area enclosed by walls, including the walls. Openings up to twice `_GAP` count as closed."""
+    """Return the area enclosed by walls, including the walls. Openings up to twice `_GAP` count as closed."""
     distance = distance_transform_edt(~walls) * CELL if walls.any() else np.full(walls.shape, np.inf)
     parts, _ = label(distance > _GAP)
     border = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
@@ -157,7 +158,7 @@ def _enclosed(walls: Mask) -> Mask:
 
 
 def _rectangle(floor: Mask) -> Mask:
-    """The bounding rectangle of a floor, or of the whole scene if no floor is drawn."""
+    """Return the bounding rectangle of a floor, or of the whole scene if no floor is drawn."""
     edge = round(_PAD / CELL)
     inside = np.zeros_like(floor)
     x, y = np.nonzero(floor)
@@ -169,7 +170,6 @@ def _rectangle(floor: Mask) -> Mask:
 
 
 def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mask:
-    """The bounding rectangle of all solids."""
     points = np.concatenate([solid.outline for solid in solids] or [np.zeros((1, 2))])
     (xmin, ymin), (xmax, ymax) = points.min(axis=0), points.max(axis=0)
     return _raster(shape, origin, [np.array([[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]])])
@@ -178,7 +178,7 @@ def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mas
 def _at_heights(
     shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid], band: tuple[float, float]
 ) -> Mask:
-    """Cells with a solid between two heights, m."""
+    """Return the cells with a solid in a range of heights, in metres."""
     low, high = band
     return _raster(shape, origin, [s.outline for s in solids if s.low[2] < high and s.high[2] > low])
 

@@ -1,4 +1,4 @@
-"""Import of a house from a scene of another simulator, with a report of all decisions."""
+"""Import of a house from a scene of another simulator, with a report of the decisions made."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -46,15 +46,16 @@ from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError
 
 REPORT, PICTURE = "report.json", "preview.png"
-_FLOOR_SEEN = 0.8  # if the source draws at least this share of the floor, none is added
+_FLOOR_SEEN = 0.8  # no floor is added if the source draws at least this share of it
 _FEW = 4  # minimum number of obstacles in a house without walls
-_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))  # of a door leaf: maximum thickness, ranges of width and height
+# Maximum thickness, range of width and range of height of a door leaf, in metres.
+_DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))
 
 
 def import_house(
     source: Path, out: Path, options: HouseOptions, *, label: str | None = None, force: bool = False
 ) -> tuple[tuple[ImportDecision, ...], CheckReport]:
-    """Import a scene as a house, in a new folder. Return the decisions and the report of the check.
+    """Import a scene as a house into a new folder. Return the decisions, and the report of the check.
 
     Raises:
         AssetError: The scene cannot be read, is not a house or fails the check, or the folder exists. Nothing is
@@ -78,7 +79,7 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
-        if fits < POINTS:  # use fewer than fit, because other samples pack them less densely
+        if fits < POINTS:  # use fewer points than fit, because other random samples may leave larger gaps
             points = max(fits - 2, 1)
             set_points(path, points)
             report = check_house_name(str(path))
@@ -96,20 +97,19 @@ def import_house(
 
 
 def _without(scene: SourceScene) -> str:
-    """Text about missing files, which may be why the import failed."""
     lacking = [note for note in scene.notes if note.choice.endswith(" missing")]
     return "".join(f"{note.choice} ({note.reason}), and what is left " for note in lacking)
 
 
 def _refusal(found: Sequence[Finding]) -> str:
-    """Message about the first error in an imported house, without file names."""
+    """Format the first error of an imported house, without file names."""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     subject = "" if found[0].subject == "house" else f"{found[0].subject} "
     return f"the house made of it cannot be used: {subject}{found[0].message}{more}; correct the source"
 
 
 def read_scene(source: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene by the suffix of its file. Raise `AssetError` if it is unknown or the file cannot be read."""
+    """Read a scene of any supported file type. Raise `AssetError` if the type is unknown or reading fails."""
     if not source.is_file():
         raise AssetError(f"there is no file {source}")
     for endings, read in _READERS:
@@ -211,7 +211,7 @@ def _converted(
 
 
 def _check_span(pieces: Sequence[ScenePiece]) -> None:
-    """Raise `AssetError` if the scene is far larger than a house, since its voxels would not fit into memory."""
+    """Raise `AssetError` if the scene is much larger than a house, because its voxels would not fit into memory."""
     standing = [p.surface.corners.reshape(-1, 3) for p in pieces if p.solid]
     high = [corners for corners in standing if corners[:, 2].max() > LOW and corners[:, 2].min() < HIGH]
     sides = np.ptp(np.concatenate(high)[:, :2], axis=0) if high else np.zeros(2)
@@ -220,7 +220,7 @@ def _check_span(pieces: Sequence[ScenePiece]) -> None:
 
 
 def _is_door(piece: ScenePiece) -> bool:
-    """True if name and shape of a piece are those of a door leaf."""
+    """Return True if a piece has the name and the shape of a door leaf."""
     if not {"door", "doors"} & set(words_of(piece.name)):
         return False
     x, y, height = np.ptp(piece.surface.corners.reshape(-1, 3), axis=0)
@@ -229,7 +229,7 @@ def _is_door(piece: ScenePiece) -> bool:
 
 
 def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
-    """True if both sides of a door are indoors."""
+    """Return True if both sides of a door are indoors."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle, across = (low + high) / 2, int(np.argmin(high - low))
     offset = np.zeros(2)
@@ -238,7 +238,7 @@ def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
 
 
 def _floor(pieces: Sequence[ScenePiece]) -> Floats:
-    """Horizontal corners (n, 3, 2), in metres, of the triangles at floor height."""
+    """Return the triangles at floor height, as horizontal corners (n, 3, 2) in metres."""
     found = [
         p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces if p.seen
     ]
@@ -246,7 +246,7 @@ def _floor(pieces: Sequence[ScenePiece]) -> Floats:
 
 
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
-    """Draw the house from above. Return a note if that fails, such as without OpenGL."""
+    """Draw the house from above. Return a warning if drawing fails, for example because OpenGL is missing."""
     from mjsim.house.compiled.house import compiled_house
     from mjsim.render.pictures import render_house_map
 

@@ -1,4 +1,4 @@
-"""Rooms of an imported house: named by the source or the user, or else separated at narrow passages."""
+"""Rooms of an imported house. They come from the source or the user, or else are separated at narrow passages."""
 
 import re
 import tomllib
@@ -19,15 +19,16 @@ from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
-# Half widths, in metres, of passages that separate rooms. All except the first are only for halls.
+# Half widths, in metres, of passages that separate rooms. Only large floors are divided at all except the first.
 _NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)
-_HALL = 45.0  # floor area above which a room is divided at wider passages, in m^2
-_HALL_PART = 5.0  # such a room is divided only if at least two parts are larger, in m^2
-_MIN_AREA = 1.5  # minimum floor area of a room, m^2; smaller ones are merged with their neighbours
-_MIN_WALK = 0.5  # minimum walkable area of a room, in m^2
+_HALL = 45.0  # floor area in square metres above which a room is divided at wider passages
+_HALL_PART = 5.0  # a room is divided only if at least two parts are larger than this, in square metres
+# Minimum floor area of a room in square metres; smaller rooms are merged with their neighbours.
+_MIN_AREA = 1.5
+_MIN_WALK = 0.5  # minimum walkable area of a room, in square metres
 _COARSE = 2  # side, in cells, of the blocks that make up a room's rectangles
 _LARGE = 0.5  # minimum size of furniture that determines a room's use, in metres
-# Key, label and groups of words. A room gets the first use of which every group has a word in its furniture's names.
+# Key, label and groups of words. A room gets the first use for which its furniture has a word of every group.
 _USES = (
     ("living_kitchen", "Living room with kitchen", ("kitchen fridge refrigerator", "sofa couch")),
     (
@@ -49,13 +50,13 @@ Labels = NDArray[np.int32]
 class Rooms:
     """Rooms on a floor grid."""
 
-    names: tuple[tuple[str, str], ...]  # key and label of room 1, 2, ...
-    labels: Labels  # number of each cell's room, 0 for none, (nx, ny)
-    floor: Mask  # cells of rooms without their walls, (nx, ny)
-    reason: str  # how they were found
+    names: tuple[tuple[str, str], ...]  # key and label of each room, starting with room 1
+    labels: Labels  # room number of each cell, or 0 for none, shape (nx, ny)
+    floor: Mask  # cells of rooms without their walls, shape (nx, ny)
+    reason: str  # explanation of how the rooms were found, for the report
 
     def rectangles(self, grid: FloorGrid) -> list[tuple[str, Floats, Floats]]:
-        """Rectangles that cover the rooms: key, lower and upper corner, m, (2,) each."""
+        """Return rectangles that cover the rooms: room key, lower corner (2,) and upper corner (2,) in metres."""
         found = []
         nx, ny = (np.array(self.labels.shape) // _COARSE).tolist()
         blocks = self.labels[: nx * _COARSE, : ny * _COARSE].reshape(nx, _COARSE, ny, _COARSE)
@@ -68,7 +69,7 @@ class Rooms:
         return found
 
     def shell(self, grid: FloorGrid) -> list[tuple[Floats, Floats]]:
-        """Boxes that close off everything outside the rooms: lower and upper corner, m, (2,) each."""
+        """Return boxes that close off what is outside the rooms: lower corner (2,) and upper corner (2,) in metres."""
         inside = binary_dilation(self.labels > 0)
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
         across, along = (slice(max(at[0] - 4, 0), at[-1] + 5) for at in (rows, columns))
@@ -89,7 +90,7 @@ class _RoomTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
-    """Read rooms from a TOML file. Raise `AssetError` if it has no valid rooms."""
+    """Read rooms from a TOML file. Raise `AssetError` if the file has no valid rooms."""
     try:
         tables = tomllib.loads(read_text(path))
         rooms = msgspec.convert(tables.get("rooms", {}), dict[str, _RoomTable])
@@ -105,7 +106,7 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
 
 
 def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[ScenePiece]) -> Rooms:
-    """Rooms that cover all reachable floor. Raise `AssetError` if given rooms cover none."""
+    """Find rooms that cover all reachable floor. Raise `AssetError` if the given rooms cover none of it."""
     if given:
         seeds, reason = _seeds_of(grid, given), "given"
         names = [(room.key, room.label) for room in given]
@@ -123,7 +124,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
     ]
     if not kept and given:
         raise AssetError("no given room has walkable floor; boxes are in the source's coordinates, in m")
-    if not kept:  # no part is wide enough for a room
+    if not kept:  # no part is large enough to be a room
         seeds, kept, reason = grid.walkable.astype(np.int32), [1], "one room"
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
@@ -135,7 +136,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
 
 
 def _parted(floor: Mask) -> Labels:
-    """Divide a floor without furniture into rooms at narrow passages. Return each cell's room number (nx, ny)."""
+    """Divide a floor without furniture into rooms at narrow passages. Return room numbers, shape (nx, ny)."""
     distance = clearance(floor)
     labels = np.zeros(floor.shape, np.int32)
     waiting = [(floor, 0)]
@@ -143,7 +144,7 @@ def _parted(floor: Mask) -> Labels:
         region, level = waiting.pop()
         seeds, count = label(region & (distance > _NARROW[level]))
         parts = seeds
-        # Grow through wide places first, so that rooms meet where it is narrow.
+        # Grow through wide places first, so that rooms meet at narrow ones.
         for depth in np.arange(_NARROW[level], -CELL, -CELL):
             parts = _grown(parts, region & (distance > depth))
         sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:] * CELL**2
@@ -168,7 +169,7 @@ def _seeds_of(grid: FloorGrid, given: Sequence[NamedRoom]) -> Labels:
 
 
 def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
-    """Grow labels over a region, around corners but not across cells outside it."""
+    """Grow labels over a region, around corners but not across cells outside the region."""
     labels = np.where(region, seeds, 0).astype(np.int32)
     while True:
         fresh = np.where(region & (labels == 0), _spread(labels, cv2.MORPH_CROSS), labels)
@@ -187,7 +188,7 @@ def _within_walls(labels: Labels) -> Labels:
 def _names(
     labels: Labels, count: int, grid: FloorGrid, pieces: Sequence[ScenePiece]
 ) -> list[tuple[str, str]]:
-    """Keys and labels of rooms by their furniture."""
+    """Choose keys and labels of rooms by the furniture in them."""
     words: list[set[str]] = [set() for _ in range(count + 1)]
     for piece in pieces:
         points = piece.surface.corners.reshape(-1, 3)
@@ -205,6 +206,6 @@ def _names(
 
 
 def _spread(labels: Labels, shape: int) -> Labels:
-    """The largest label of each cell and its neighbours."""
-    kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV has no dilation of integers
+    """Return the largest label among each cell and its neighbours."""
+    kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV cannot dilate integers
     return np.asarray(cv2.dilate(labels.astype(np.float32), kernel), np.int32)

@@ -1,4 +1,4 @@
-"""Collision geometry of an imported house: boxes, convex hulls, or boxes of merged voxels, within a budget."""
+"""Collision geometry of an imported house: boxes, convex hulls and boxes of merged voxels, limited in number."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -14,19 +14,21 @@ from mjsim.formats.scene.source_scene import ScenePiece, merged_rectangles
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import _few_vertices
 
-BUDGET = 1500  # colliding geoms
-LOW, HIGH = 0.051, 1.9  # people step over lower solids and pass under higher ones, in metres
-_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)  # voxel sides, in metres; the first one within the budget is used
-_BOX = 0.95  # minimum share of its bounding box that the hull of a box fills
-_CONVEX = 0.85  # minimum share of its hull that a convex mesh fills
-_SMALL = 0.5  # size below which a mesh is replaced by its hull, in metres
-_HANGING = 1.6  # height above which lamps and pictures do not collide, in metres
-# Furniture that begins above this height, in metres, becomes a box. A hull would seem to cover the floor below.
+BUDGET = 1500  # maximum number of colliding geoms
+# People step over solids below this range of heights and pass under those above it, in metres.
+LOW, HIGH = 0.051, 1.9
+# Possible voxel sizes in metres; the first one within the budget is used.
+_PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)
+_BOX = 0.95  # a mesh is a box if its hull fills at least this share of its bounding box
+_CONVEX = 0.85  # a mesh is convex if it fills at least this share of its hull
+_SMALL = 0.5  # a mesh smaller than this is replaced by its hull, in metres
+_HANGING = 1.6  # lamps and pictures above this height do not collide, in metres
+# Furniture that begins above this height, in metres, becomes a box. A hull would seem to cover the floor below it.
 _OVERHEAD = 0.8
-_FURNITURE = 1.5  # maximum side of furniture, in metres; its inside counts as filled
-_ROOM = (2.0, 2.0, 1.8)  # closed meshes larger than this, in metres, are hollow rooms rather than blocks
-_FEW = 30  # maximum number of boxes of voxels for a piece of furniture
-_MAX_PARTS = 60  # maximum number of connected parts of a piece that are treated separately
+_FURNITURE = 1.5  # maximum side of furniture in metres; its inside counts as filled
+_ROOM = (2.0, 2.0, 1.8)  # closed meshes larger than this in metres are hollow rooms rather than blocks
+_FEW = 30  # maximum number of voxel boxes for a piece of furniture
+_MAX_PARTS = 60  # maximum number of connected parts of a piece that are processed one by one
 _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 
 
@@ -34,14 +36,14 @@ _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 class Solid:
     """A convex part that collides."""
 
-    name: str  # name of its piece
-    low: Floats  # lower corner, m, (3,)
-    high: Floats  # upper corner
-    hull: Floats | None = None  # vertices (k, 3), m; None for a box
+    name: str  # name of the scene piece
+    low: Floats  # lower corner in metres, shape (3,)
+    high: Floats  # upper corner in metres, shape (3,)
+    hull: Floats | None = None  # vertices (k, 3) in metres, or None for a box
 
     @property
     def outline(self) -> Floats:
-        """Points (k, 2), m, whose hull is the outline from above."""
+        """Points (k, 2), in metres, whose convex hull is the outline seen from above."""
         if self.hull is not None:
             return self.hull[:, :2]
         (a, b), (c, d) = self.low[:2], self.high[:2]
@@ -50,17 +52,17 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """All collision geometry."""
+    """Collision geometry of a whole house."""
 
     solids: tuple[Solid, ...]
-    boxes: int  # number of boxes
-    hulls: int  # number of hulls
+    boxes: int
+    hulls: int
     voxels: int  # number of boxes of merged voxels
     pitch: float  # side of a voxel, in metres
 
 
 def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
-    """Convex parts of all solid pieces at the heights of a person."""
+    """Make convex parts for all solid pieces at the height of a person."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
     things: dict[str, list[trimesh.Trimesh]] = {}
@@ -86,7 +88,7 @@ def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
 
 
 def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
-    """Connected parts of a piece that a person can bump into."""
+    """Yield the connected parts of a piece that a person can bump into."""
     mesh = piece.surface.mesh()
     count = mesh.body_count
     whole = count == 1 or count > _MAX_PARTS or (_compact(mesh.extents) and not mesh.is_watertight)
@@ -98,19 +100,19 @@ def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Parts of a thing. If furniture has many parts, such as the keys of a keyboard, they are joined."""
+    """Join the parts of a piece of furniture if there are many, such as the keys of a keyboard."""
     if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
         return meshes
     return [trimesh.util.concatenate(meshes)]
 
 
 def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
-    """A box or a hull if the mesh is small or has nearly this shape, otherwise None."""
+    """Return a box or a hull if the mesh is small or has nearly that shape, otherwise None."""
     low, high = mesh.bounds
     extents = high - low
     if (extents > _ROOM).all():
         return None
-    if extents.min() < _THIN:  # a sheet
+    if extents.min() < _THIN:  # a flat sheet
         flat = np.sort(extents)
         filled = mesh.area / 2 / max(flat[1] * flat[2], 1e-9) if not mesh.is_watertight else 1.0
         return _box(name, low, high) if filled > _CONVEX / 2 + 0.05 or flat[2] < _SMALL else None
@@ -129,7 +131,7 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Vertices (k, 3), with copies beside them if all are on a plane or line."""
+    """Return vertices (k, 3). If all are in a plane or on a line, add shifted copies of them."""
     for axis in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][::-1][:2]:
         if np.ptp(points @ axis) < _THIN:
             points = np.concatenate([points - axis * _THIN / 2, points + axis * _THIN / 2])
@@ -137,7 +139,7 @@ def _thickened(points: Floats) -> Floats:
 
 
 def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:
-    """True if a mesh is close to its hull: by volume if it is closed, otherwise by area."""
+    """Return True if a mesh nearly fills its hull. Volumes are compared if it is closed, otherwise areas."""
     if mesh.is_watertight:
         return bool(abs(mesh.volume) > _CONVEX * hull.volume)
     return bool(abs(mesh.area - hull.area) < (1 - _CONVEX) * hull.area and _compact(mesh.extents))
@@ -149,12 +151,12 @@ def _box(name: str, low: Floats, high: Floats) -> Solid:
 
 
 def _compact(extents: Floats) -> bool:
-    """True if the extents are those of furniture, whose inside counts as filled, rather than of walls."""
+    """Return True for extents of furniture, whose inside counts as filled, and False for those of walls."""
     return bool(extents[:2].max() < _FURNITURE)
 
 
 def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
-    """Boxes of voxels with sides of `pitch`. Furniture that would need too many boxes gets larger voxels."""
+    """Return boxes of voxels. Furniture that would need too many boxes gets larger voxels."""
     boxes: list[Solid] = []
     for side in (p for p in _PITCHES if p >= pitch):
         boxes = list(_voxels(name, mesh, side))
@@ -164,12 +166,12 @@ def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
 
 
 def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
-    """Boxes of merged voxels around a surface, each shrunk to the part of the surface in it."""
+    """Yield boxes of merged voxels around a surface, each shrunk to the part of the surface inside it."""
     samples = _samples(np.asarray(mesh.triangles), pitch / 2)
     samples = samples[samples[:, 2] < HIGH + pitch]
     if not len(samples):
         return
-    # The offset keeps faces off cell borders, because walls are often multiples of 5 cm thick.
+    # The offset keeps faces away from cell borders, because walls are often multiples of 5 cm thick.
     origin = samples.min(axis=0) - 0.3 * pitch
     cells = np.floor((samples - origin) / pitch).astype(int)
     grid = np.zeros(cells.max(axis=0) + 1, bool)
@@ -187,7 +189,7 @@ def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
 
 
 def _samples(corners: Floats, step: float) -> Floats:
-    """Points (k, 3) on triangles (n, 3, 3), at most about `step` metres apart."""
+    """Return points (k, 3) on triangles (n, 3, 3) that are at most about `step` metres apart."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first, count = lengths.argmax(axis=1), np.arange(len(corners))
     a, b, c = (corners[count, (first + k) % 3] for k in range(3))
@@ -203,9 +205,9 @@ def _samples(corners: Floats, step: float) -> Floats:
 
 
 def merged_boxes(grid: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int, int], tuple[int, int, int]]]:
-    """Boxes (first cell, end cell) that cover each cell of a grid (nx, ny, nz) once; ends are exclusive.
+    """Yield boxes (first cell, exclusive end cell) that together cover each cell of a grid (nx, ny, nz) once.
 
-    Columns with the same profile are merged into rectangles, so walls and tables give few boxes.
+    Columns with the same profile are merged into rectangles, so that walls and tables give few boxes.
     """
     packed = np.packbits(grid, axis=2)
     profiles, index = np.unique(packed.reshape(-1, packed.shape[2]), axis=0, return_inverse=True)

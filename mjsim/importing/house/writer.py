@@ -1,4 +1,4 @@
-"""Files of an imported house: house.xml, catalogue.toml, meshes and images, the same bytes for the same house."""
+"""Writer for the files of an imported house. The same house gives the same bytes."""
 
 import json
 import re
@@ -24,7 +24,8 @@ MODEL = "house.xml"
 MESHES = "meshes"
 _HEIGHT = 2.5  # height of the boxes that close off the house, in metres
 _DEPTH = 0.1  # thickness of the colliding floor, in metres
-_UNDER = 0.002  # depth of the added floor below z = 0, where it cannot hide rugs and floors of the source
+# Depth of an added floor below z = 0 in metres, so that it does not hide rugs and floors of the source.
+_UNDER = 0.002
 _LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2 0.5 1", 0.3))
 
 
@@ -32,18 +33,18 @@ _LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2
 class ImportedHouse:
     """Contents of an imported house's files."""
 
-    label: str  # shown to participants
+    label: str  # name shown to participants
     source: str  # name of the source file
     solids: Sequence[Solid]
     looks: Sequence[DrawnMesh]
     grid: FloorGrid
     rooms: Rooms
     bins: Sequence[Bin]
-    floor_seen: bool  # the source draws a floor
+    floor_seen: bool  # True if the source draws a floor
 
 
 def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Path:
-    """Write a house into an existing folder, with categories of a catalogue. Return its catalogue file."""
+    """Write a house into an existing folder, with categories of another catalogue. Return the new catalogue's file."""
     (folder / MESHES).mkdir()
     lines = [
         f"<mujoco model={quoteattr(_name(house.label))}>",
@@ -72,7 +73,7 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
 
 
 def set_points(catalogue: Path, points: int) -> None:
-    """Set the number of points in a catalogue that was written before."""
+    """Change the number of drop points in a catalogue file."""
     text = catalogue.read_text(encoding="utf-8")
     catalogue.write_text(text.replace("[house]\n", f"[house]\npoints = {points}\n", 1), encoding="utf-8")
 
@@ -118,7 +119,7 @@ def _lights() -> Iterator[str]:
 
 
 def _structure(house: ImportedHouse) -> Iterator[str]:
-    """The floor, and boxes that close the house."""
+    """Yield the floor, and the boxes that close off the house."""
     corners = np.array([edge for _, *edges in house.rooms.rectangles(house.grid) for edge in edges])
     low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
     (x, y), (a, b) = (low + high) / 2, (high - low) / 2
@@ -161,7 +162,7 @@ def _box(name: str, low: Floats, high: Floats) -> str:
 
 
 def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
-    """Lines of catalogue.toml: the parts of the other catalogue that belong to the bins."""
+    """Yield the lines of catalogue.toml, with the entries of the other catalogue that belong to the bins."""
     bins = {place.key: place for place in house.bins}
     categories = [c for c in catalogue.categories.values() if c.receptacle in bins]
     objects = [key for category in categories for key in category.objects]
@@ -187,7 +188,7 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
 
 
 def _relative(path: Path) -> str:
-    """Path of a model for a catalogue: relative to the package's models if it is one of them."""
+    """Return the path of a model as written in a catalogue. It is relative for models of the package."""
     root = models_root().resolve()
     resolved = path.resolve()
     return str(resolved.relative_to(root)) if resolved.is_relative_to(root) else str(resolved)

@@ -1,1 +1,1 @@
-"""Import of objects from mesh files into a house's catalogue."""
+"""Importer for objects from mesh files into a house's catalogue."""

@@ -1,4 +1,4 @@
-"""Closed bodies of surfaces, and their mass. Holes are filled; pieces that stay open become convex hulls."""
+"""Closed bodies made from surfaces, and their mass. Holes are filled. Pieces that stay open become convex hulls."""
 
 from dataclasses import dataclass
 
@@ -9,30 +9,30 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import MASS
 from mjsim.values.errors import AssetError
 
-MAX_TRIANGLES = 20_000  # finer surfaces are simplified first
+MAX_TRIANGLES = 20_000  # maximum number of triangles of a surface; finer surfaces are simplified first
 MAX_PIECES = 400  # maximum number of pieces of a surface that are closed one by one
 SHEET = 0.001  # thickness given to a flat sheet, in metres
 MIN_MASS, MAX_MASS = MASS
 DENSITY = 400.0  # kg/m^3; lower than wood, higher than cloth and hollow plastic
-_MIN_GYRATION = 0.005  # minimum radius of gyration, in metres, that of a body as wide as the thinnest part
-_GENTLE = 3  # aggression of edge collapses, from 1 to 10; the default is 7
-_FLAT = 1e-5  # m
+_MIN_GYRATION = 0.005  # minimum radius of gyration in metres, that of a body as wide as the thinnest part
+_GENTLE = 3  # how aggressively edges are collapsed, from 1 to 10; the default is 7
+_FLAT = 1e-5  # width in metres up to which points count as lying in a plane
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedBody:
-    """A closed body with the repairs that made it."""
+    """A closed body, with the repairs that were needed to close it."""
 
-    mesh: trimesh.Trimesh  # its surface, m, normals outward; it encloses a positive volume
+    mesh: trimesh.Trimesh  # surface in metres with outward normals; the enclosed volume is positive
     pieces: int  # number of connected pieces of the surface
-    filled: int = 0  # number of pieces with holes that were filled
-    hulled: int = 0  # number of pieces that were replaced by their convex hull
-    flat: bool = False  # a flat sheet that was given a thickness
-    open_share: float = 0.0  # share of the surface's area in pieces that were replaced by hulls
+    filled: int = 0  # number of pieces whose holes were filled
+    hulled: int = 0  # number of pieces replaced by their convex hulls
+    flat: bool = False  # True for a flat sheet that was given a thickness
+    open_share: float = 0.0  # share of the surface's area that belongs to pieces replaced by hulls
 
 
 def close(mesh: trimesh.Trimesh) -> ClosedBody:
-    """Close a surface whose triangles have areas."""
+    """Close a surface. All of its triangles must have an area above 0."""
     sheet = _thickened_sheet(mesh.vertices)
     if sheet is not None:
         return ClosedBody(sheet, 1, flat=True)
@@ -60,7 +60,7 @@ def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
 
 def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """A copy of the mesh with outward normals if it is closed, otherwise None."""
+    """Return a copy of the mesh with outward normals if it is closed, otherwise None."""
     if not (mesh.is_watertight and mesh.is_winding_consistent):
         return None
     whole = mesh.copy()
@@ -73,7 +73,7 @@ def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
 
 
 def _is_hollow(shells: list[trimesh.Trimesh]) -> bool:
-    """True if all shells except one are cavities inside it."""
+    """Return True if all shells except one are cavities inside it."""
     outer = [s for s in shells if s.volume > 0]
     cavities = [s for s in shells if s.volume < 0]
     if len(outer) != 1:
@@ -89,7 +89,7 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
         body = _closed_piece(piece)
         if body is not None:
             filled += not piece.is_watertight
-        elif np.sort(_spread(piece.vertices)[0])[1] > _FLAT:  # otherwise it is a line
+        elif np.sort(_spread(piece.vertices)[0])[1] > _FLAT:  # otherwise the piece is a line
             hulled += 1
             area += piece.area
             body = _thickened_sheet(piece.vertices) or _hull(piece.vertices)
@@ -101,7 +101,7 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
 
 
 def _closed_piece(piece: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """A connected piece with consistent normals and filled holes; None if it stays open."""
+    """Return a connected piece with consistent normals and filled holes, or None if it cannot be closed."""
     body = piece.copy()
     if not body.is_watertight:
         trimesh.repair.fill_holes(body, use_fan=True)
@@ -110,13 +110,12 @@ def _closed_piece(piece: trimesh.Trimesh) -> trimesh.Trimesh | None:
     body.fix_normals(multibody=False)
     if body.volume < 0:
         body.invert()
-    # Fans over concave holes may protrude.
+    # A hole filled with a fan of triangles may bulge beyond the hull.
     enclosed = body.is_volume and body.volume <= 1.001 * body.convex_hull.volume
     return body if enclosed and body.volume > 0.01 * body.convex_hull.volume else None
 
 
 def _union(bodies: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Closed bodies as one, without overlaps."""
     if len(bodies) == 1:
         return bodies[0]
     whole = trimesh.boolean.union(bodies, engine="manifold", check_volume=False)
@@ -128,7 +127,7 @@ def _hull(points: Floats) -> trimesh.Trimesh:
 
 
 def _thickened_sheet(points: Floats) -> trimesh.Trimesh | None:
-    """A slab around points (n, 3), m, in one plane; None if they are not."""
+    """Return a slab around points (n, 3) in one plane, or None if they are not in a plane."""
     spread, axes = _spread(points)
     if spread[2] > _FLAT:
         return None
@@ -137,7 +136,7 @@ def _thickened_sheet(points: Floats) -> trimesh.Trimesh | None:
 
 
 def _spread(points: Floats) -> tuple[Floats, Floats]:
-    """Extents (3,) of points (n, 3), m, along their principal axes, which are the rows (3, 3), widest first."""
+    """Return the extents (3,) of points (n, 3) along their principal axes, and these axes (3, 3), longest first."""
     offsets = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(offsets.T @ offsets)
     axes = axes.T[::-1]
@@ -145,7 +144,7 @@ def _spread(points: Floats) -> tuple[Floats, Floats]:
 
 
 def is_closed(mesh: trimesh.Trimesh) -> bool:
-    """True if no edge is the rim of a hole. Pieces may touch each other along edges."""
+    """Return True if no edge is the rim of a hole. Pieces may touch each other along edges."""
     _, counts = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
     return bool(np.all(counts % 2 == 0))
 
@@ -154,20 +153,20 @@ def is_closed(mesh: trimesh.Trimesh) -> bool:
 class Weight:
     """Mass properties of an object."""
 
-    mass: float  # kg
-    centre: Floats  # centre of mass, m, (3,)
-    inertia: Floats  # about the centre of mass, kg m^2, (3, 3)
-    reason: str  # origin of the mass
+    mass: float  # mass in kg
+    centre: Floats  # centre of mass in metres, shape (3,)
+    inertia: Floats  # inertia about the centre of mass in kg m^2, shape (3, 3)
+    reason: str  # explanation of how the mass was determined, for the report
 
     def moved(self, transform: Floats) -> "Weight":
-        """The mass properties after a rigid transform (4, 4)."""
+        """Return the mass properties after a rigid transform (4, 4)."""
         turn = transform[:3, :3]
         centre = turn @ self.centre + transform[:3, 3]
         return Weight(self.mass, centre, turn @ self.inertia @ turn.T, self.reason)
 
 
 def weigh(body: trimesh.Trimesh, *, mass: float | None, density: float | None) -> Weight:
-    """Mass properties of a closed body in metres, from its mass in kg, its density in kg/m^3, or `DENSITY`.
+    """Compute the mass properties of a closed body in metres from its mass (kg), its density (kg/m^3), or `DENSITY`.
 
     Raise `AssetError` if a hand cannot carry the mass.
     """
@@ -190,8 +189,9 @@ def weigh(body: trimesh.Trimesh, *, mass: float | None, density: float | None) -
 
 
 def _inertia(body: trimesh.Trimesh, mass: float) -> Floats:
-    """Inertia (3, 3) about the centre of mass, kg m^2, at least that of a thin rod about itself."""
+    """Return the inertia (3, 3) about the centre of mass in kg m^2, at least that of a thin rod about its axis."""
     values, axes = np.linalg.eigh(np.asarray(body.moment_inertia) * mass / body.volume)
     values = np.maximum(values, mass * _MIN_GYRATION**2)
-    values[2] = min(values[2], values[0] + values[1])  # physical limit, which self-intersection can violate
+    # Physical limit, which a self-intersecting body may violate.
+    values[2] = min(values[2], values[0] + values[1])
     return np.asarray(axes @ np.diag(values) @ axes.T)

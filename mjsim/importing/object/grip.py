@@ -1,4 +1,4 @@
-"""Grasp of an object from above: at a rim, a bar or a flat top."""
+"""Grasp of an object from above at a rim, a bar or a flat top."""
 
 from dataclasses import dataclass
 
@@ -8,24 +8,24 @@ import trimesh
 from mjsim.formats.scene.surface import Floats
 
 MAX_OFFSET = 0.15  # maximum horizontal distance from a carried object's centre of mass to the hand, in metres
-_RIM = 0.01  # range below the highest point, in metres; lower points may be the bottom of a hollow
-_POINTS = 100_000  # number of surface points among which the grip is chosen
+_RIM = 0.01  # depth below the highest point in metres; lower points may be at the bottom of a hollow object
+_POINTS = 100_000  # number of surface points from which the grip is chosen
 _FINGERS = 0.02  # radius around the nearest point in which the hand may grasp the crest, in metres
-_CREST = 0.001  # range below the crest, in metres
-_ABOVE = 0.005  # a point this close horizontally counts as above the centre of mass, in metres
+_CREST = 0.001  # points count as part of the crest up to this depth below it, in metres
+_ABOVE = 0.005  # points within this horizontal distance count as above the centre of mass, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """A grasp."""
+    """A grasp of an object."""
 
-    point: Floats  # m, (3,)
-    yaw: float  # direction of the fingers, across the rim towards the centre of mass, in radians
+    point: Floats  # grasped point in metres, shape (3,)
+    yaw: float  # direction of the fingers in radians, across the rim towards the centre of mass
     offset: float  # horizontal distance from the centre of mass, in metres
 
 
 def find_grip(mesh: trimesh.Trimesh, centre: Floats) -> Grip:
-    """The point at the top of an object's surface, m, that is nearest to the vertical through `centre` (3,), m."""
+    """Find the point at the top of an object's surface, in metres, that is nearest to a vertical through `centre`."""
     sampled, _ = trimesh.sample.sample_surface(mesh, _POINTS, seed=0)
     points = _upper(np.concatenate((mesh.vertices, sampled)), _RIM)
     if (near := _horizontal_distances(points, centre) < _ABOVE).any():
@@ -38,7 +38,7 @@ def find_grip(mesh: trimesh.Trimesh, centre: Floats) -> Grip:
 
 
 def _upper(points: Floats, depth: float) -> Floats:
-    """The points (n, 3) that are at most `depth` below the highest one, m."""
+    """Return the points (n, 3) that are at most `depth` metres below the highest one."""
     return np.asarray(points[points[:, 2] > points[:, 2].max() - depth])
 
 
@@ -47,5 +47,5 @@ def _horizontal_distances(points: Floats, centre: Floats) -> Floats:
 
 
 def _nearest(points: Floats, centre: Floats) -> Floats:
-    """The point of (n, 3) that is horizontally nearest to a point (3,), m."""
+    """Return the point of (n, 3) that is horizontally nearest to `centre` (3,)."""
     return np.asarray(points[_horizontal_distances(points, centre).argmin()])

@@ -1,4 +1,4 @@
-"""A catalogue that extends a house by imported objects, each in its own folder and written atomically."""
+"""Catalogue that extends a house with imported objects. Each has its own folder, which is written atomically."""
 
 import json
 import os
@@ -21,11 +21,11 @@ from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 
-HELD = 4  # minimum number of objects of a kind that a bin must hold, by bounding boxes
-_SLOTS = 2  # slots along each side of a bin (mjsim.world.body.slots)
+HELD = 4  # minimum number of identical objects that a bin must hold, judged by their bounding boxes
+_SLOTS = 2  # number of slots along each side of a bin (mjsim.world.body.slots)
 MAX_LABEL = 40
-_UNNAMED = ".unnamed"  # marks the folder of an object that is not yet in the catalogue
-_WALL_GAP = 0.02  # distance between an object and the walls of its bin, in metres
+_UNNAMED = ".unnamed"  # file that marks the folder of an object that is not in the catalogue yet
+_WALL_GAP = 0.02  # gap between an object and the walls of its bin, in metres
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
 _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
 
@@ -34,13 +34,13 @@ _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {mo
 class CatalogueEntry:
     """Names of an object in a catalogue."""
 
-    key: str  # its key and the name of its folder
+    key: str  # catalogue key, which is also the name of the object's folder
     label: str  # name shown to participants
-    category: str  # category key
+    category: str
 
     @classmethod
     def named(cls, name: str, category: str) -> "CatalogueEntry":
-        """Make an entry, and its key, from a name such as `Toy robot`. Raise `AssetError` if that is not possible."""
+        """Make an entry from a name such as `Toy robot`. Raise `AssetError` if the name gives no valid key."""
         label = " ".join(name.replace("_", " ").split())
         plain = unicodedata.normalize("NFKD", label.lower()).encode("ascii", "ignore").decode()
         key = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
@@ -52,10 +52,10 @@ class CatalogueEntry:
 
 
 class HouseExtension:
-    """A folder, which need not exist, with a catalogue and the objects that it adds to a house."""
+    """A folder, which need not exist yet, with a catalogue that extends a house with imported objects."""
 
     def __init__(self, folder: Path, house: str | None = None) -> None:
-        """Open a folder, or plan a new one, that extends `house`. If None, it is the previous house or `apartment`.
+        """Open or plan a folder that extends `house`. By default, this is the house it extended before, or `apartment`.
 
         Raise `AssetError` if it is not a folder, or its catalogue is invalid or extends another house.
         """
@@ -75,7 +75,7 @@ class HouseExtension:
             self._text = _HEADER.format(json.dumps(_reference(house or "apartment", folder)))
 
     def check(self, entry: CatalogueEntry, *, force: bool) -> None:
-        """Check whether an object can be added, before anything is computed.
+        """Check that an object can be added, before its model is computed.
 
         Raises:
             AssetError: The category is unknown, or the key is in use.
@@ -97,7 +97,7 @@ class HouseExtension:
             raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
 
     def fit(self, entry: CatalogueEntry, size: Floats) -> ImportDecision:
-        """Report how an object with extents (3,), m, fits into the bin of its category.
+        """Report how an object with extents (3,), in metres, fits into the bin of its category.
 
         Raise `AssetError` if so few of them fit that a clean-up could be impossible.
         """
@@ -114,7 +114,7 @@ class HouseExtension:
         return ImportDecision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
 
     def add(self, entry: CatalogueEntry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
-        """Add an object whose files `write` puts into a folder, or replace one with `force`. A failure changes nothing.
+        """Add an object whose files `write` puts into a folder, or replace it with `force`. A failure changes nothing.
 
         Raise `AssetError` as `check` does.
         """
@@ -132,7 +132,7 @@ class HouseExtension:
                 self.folder.rmdir()
 
     def _install(self, entry: CatalogueEntry, new: Path) -> Catalogue:
-        """Move a folder to its place and add it to the catalogue. Undo both on failure."""
+        """Move a folder to its final location and add the object to the catalogue. Undo both on failure."""
         place = self.folder / entry.key
         before = self._text if self.path.exists() else None
         swap = exchange if place.exists() else Path.rename
@@ -152,7 +152,7 @@ class HouseExtension:
         return catalogue
 
     def _with(self, entry: CatalogueEntry) -> str:
-        """The catalogue's text with an entry, which replaces one of the same key."""
+        """Return the catalogue's text with an entry added, or replaced if the key exists."""
         values = {"label": entry.label, "category": entry.category, "model": f"{entry.key}/{MODEL}"}
         encoded = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
         block = _ENTRY.format(key=entry.key, **encoded)
@@ -162,17 +162,17 @@ class HouseExtension:
 
 
 def held_in(room: Floats, size: Floats) -> int:
-    """Number of objects of extents (3,) that surely fit into a bin of inner sides (3,), in metres, used from any side.
+    """Return how many objects of extents (3,) surely fit into a bin of inner size (3,), whichever side it is used from.
 
     The objects stand upright in layers, side by side in the slots that people use, with their centres inside the bin.
     """
     layers = int(room[2] / size[2] + 0.5)
-    turned = (size[:2], size[1::-1])  # a person may place a carried object either way
+    turned = (size[:2], size[1::-1])  # a person may place a carried object in either orientation
     beside = [np.minimum((room[:2] - 2 * _WALL_GAP) // across, _SLOTS).prod() for across in turned]
     return int(min(beside)) * layers
 
 
 def _reference(house: str, folder: Path) -> str:
-    """A house as a catalogue in a folder refers to it: by its name, or by the path from there."""
+    """Return a reference to a house for the catalogue in a folder: its name, or its path relative to the folder."""
     named = parse_house(house)
     return os.path.relpath(Path(named.name).resolve(), folder.resolve()) if named.is_path else named.name

@@ -1,4 +1,4 @@
-"""Import of a mesh file as an object in a house's catalogue, with a picture of its mesh, parts and grips."""
+"""Import of a mesh file as an object of a catalogue, with a preview of its mesh, parts and grips."""
 
 import json
 from dataclasses import asdict
@@ -20,19 +20,19 @@ from mjsim.importing.object.object_import import ImportedObject, import_object
 from mjsim.render.pictures import draw_picture
 from mjsim.values.errors import AssetError, RenderError
 
-_PREVIEW_SIDE = 420  # pixels
+_PREVIEW_SIDE = 420  # width and height of the preview, in pixels
 _COLOURS = (
     (0.90, 0.45, 0.13), (0.20, 0.55, 0.80), (0.30, 0.65, 0.30), (0.80, 0.30, 0.45), (0.55, 0.40, 0.75),
     (0.75, 0.65, 0.15), (0.45, 0.45, 0.45),
 )  # fmt: skip
 _GRIPS = {"grip_0": (0.85, 0.1, 0.1, 1.0), "grip_1": (0.1, 0.2, 0.85, 1.0)}
-_ARROW = 0.03  # m
-_LOOK, _PART = 2, 3  # geom groups of docs/models.md
+_ARROW = 0.03  # length of a grip's arrow, in metres
+_LOOK, _PART = 2, 3  # geom groups defined in docs/models.md
 PREVIEW, REPORT = "preview.png", "report.json"
 
 
 def write_preview(model: Path, out: Path) -> None:
-    """Draw an object's visual mesh and parts side by side, with arrows along its grips' x axes."""
+    """Draw an object's visual mesh and its parts side by side, with arrows along the x axes of its grips."""
     pictures = []
     for shown in (_LOOK, _PART):
         spec = read_model(model, body="object")
@@ -46,7 +46,7 @@ def write_preview(model: Path, out: Path) -> None:
 
 
 def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
-    """Show only the visual mesh, or only the parts in colours of their own, and the grips."""
+    """Show the grips and either the visual mesh or the parts, each part in its own colour."""
     body = spec.body("object")
     parts = [geom for geom in body.geoms if geom.contype]
     for geom in body.geoms:
@@ -58,7 +58,7 @@ def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
 
 
 def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
-    """Add a rod from a site along its x axis."""
+    """Add a rod along the x axis of a site."""
     turn = np.zeros(4)
     if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER:
         turn[:] = np.cos(site.alt.euler[2] / 2), 0.0, 0.0, np.sin(site.alt.euler[2] / 2)
@@ -79,7 +79,7 @@ def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
 
 
 def _on_white(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An RGBA image (h, w, 4) as RGB (h, w, 3) on white."""
+    """Blend an RGBA image (h, w, 4) with white. Return RGB (h, w, 3)."""
     alpha = rgba[..., 3:].astype(np.float64) / 255
     return np.asarray(np.round(rgba[..., :3] * alpha + 255 * (1 - alpha)), dtype=np.uint8)
 
@@ -118,7 +118,7 @@ def add_mesh(
 
 
 def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
-    """The reason why an object cannot be held, or an empty string if it can."""
+    """Return the reason why an object cannot be held, or an empty string if it can."""
     if found := errors(findings):
         return found[0].message
     if item.grip.offset <= MAX_OFFSET:
@@ -130,7 +130,7 @@ def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
 
 
 def _keep_picture(folder: Path, target: Path) -> str:
-    """Keep the preview under another name. Return a text that says where, if there is one."""
+    """Move the preview to another path. Return a hint with that path, or an empty string if there is no preview."""
     if not (folder / PREVIEW).exists():
         return ""
     (folder / PREVIEW).replace(target)

@@ -1,4 +1,4 @@
-"""Files of an imported object: MJCF, OBJ meshes and a PNG texture, the same bytes for the same object."""
+"""Writer for the files of an imported object: MJCF, OBJ meshes and a PNG texture. Equal objects give equal bytes."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from mjsim.importing.object.visual_mesh import VisualMesh
 from mjsim.values.errors import AssetError
 
 MODEL = "object.xml"
-_ROLLING = "1 0.02 0.02"  # friction of what would roll: slide, spin, roll
+_ROLLING = "1 0.02 0.02"  # sliding, torsional and rolling friction of round objects
 
 _MJCF = """\
 <mujoco model="{key}">
@@ -91,7 +91,7 @@ def _assets(item: ImportedObject, key: str) -> Iterator[str]:
 
 
 def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
-    """The parts. Their masses are shares of the whole by volume, for tools that read only parts."""
+    """Yield the parts. Each part's mass is proportional to its volume, for tools that read only parts."""
     volumes = [trimesh.convex.convex_hull(points).volume for points in item.hulls]
     for number, volume in enumerate(volumes):
         mass = item.weight.mass * volume / sum(volumes)
@@ -99,7 +99,7 @@ def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
 
 
 def obj_lines(mesh: VisualMesh) -> Iterator[str]:
-    """Lines of an OBJ file."""
+    """Yield the lines of an OBJ file."""
     yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(mesh.vertices, 6) + 0.0)
     columns = [mesh.faces + 1]
     if mesh.uv is not None:
@@ -115,7 +115,7 @@ def obj_lines(mesh: VisualMesh) -> Iterator[str]:
 
 
 def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
-    """Write an RGB image, shape (height, width, 3)."""
+    """Write an RGB image of shape (height, width, 3)."""
     done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 4])
     if not done:
         raise AssetError(f"the picture {path} cannot be encoded as PNG")
@@ -127,5 +127,5 @@ def _numbers(values: Floats) -> str:
 
 
 def comment(text: str) -> str:
-    """Make text safe for an XML comment."""
+    """Escape text for an XML comment."""
     return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

@@ -1,4 +1,4 @@
-"""Import of a mesh file as an object, with a report of all decisions."""
+"""Import of a mesh file as an object, with a report of the decisions made."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,24 +19,24 @@ from mjsim.importing.object.scaling import Scaling, scaling
 from mjsim.importing.object.visual_mesh import VisualMesh, make_visual_mesh
 from mjsim.values.errors import AssetError
 
-_COARSE = 0.005  # maximum rounding step of 32-bit coordinates, as a share of the longest side
-_FAR = 10.0  # distance from the origin, in longest sides, above which it is reported
+_COARSE = 0.005  # maximum rounding error of 32-bit coordinates, relative to the longest side
+_FAR = 10.0  # distance from the origin above which the report mentions it, in longest sides
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedObject:
-    """An object in its own frame: z up, on the floor at z = 0, the middle of its footprint at the origin."""
+    """An object in its own frame: z up, on the floor at z = 0, with the middle of its footprint at the origin."""
 
     visual: VisualMesh
-    hulls: tuple[Floats, ...]  # vertices of the convex parts that collide, m, (k, 3) each
+    hulls: tuple[Floats, ...]  # vertices of each convex part that collides, in metres, shape (k, 3) each
     weight: Weight
     grip: Grip
     rolls: bool  # True for a round object, which gets a foot and rolling friction
-    decisions: tuple[ImportDecision, ...]  # the report
+    decisions: tuple[ImportDecision, ...]  # decisions made during the import, for the report
 
     @property
     def size(self) -> Floats:
-        """Extents of the colliding parts, m, shape (3,)."""
+        """Extents of the colliding parts in metres, shape (3,)."""
         return np.asarray(np.ptp(np.concatenate(self.hulls), axis=0))
 
 
@@ -95,7 +95,7 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
 
 
 def _extent(surface: Surface) -> tuple[float, Floats]:
-    """Longest side and middle (3,) of the bounding box, in the file's unit.
+    """Return the longest side and the middle (3,) of the bounding box, in the file's unit.
 
     Raise `AssetError` if it has no finite extent, or is too far from the origin for the precision of its numbers.
     """
@@ -116,7 +116,7 @@ def _extent(surface: Surface) -> tuple[float, Floats]:
 
 
 def _into_place(rotation: Floats, points: Floats) -> Floats:
-    """Transform (4, 4) that rotates points (n, 3), and moves the middle of their footprint to the origin."""
+    """Return a transform (4, 4) that rotates points (n, 3) and moves the middle of their footprint to the origin."""
     low, high = points.min(axis=0), points.max(axis=0)
     transform = np.eye(4)
     transform[:3, :3] = rotation
@@ -125,7 +125,7 @@ def _into_place(rotation: Floats, points: Floats) -> Floats:
 
 
 def _on_the_floor(surface: Surface, transform: Floats) -> tuple[Surface, trimesh.Trimesh]:
-    """The surface in its place, lowered to the floor, because thickened parts may extend farther down."""
+    """Move a surface into place, and lower it to the floor if thickened parts extend below it."""
     placed = surface.moved(transform)
     down = np.eye(4)
     down[2, 3] = -placed.corners[..., 2].min()
@@ -154,7 +154,6 @@ def _origin(path: Path, found: Scaling, raw: Surface, dropped: dict[str, int]) -
 
 
 def _moved(middle: Floats, longest: float) -> tuple[ImportDecision, ...]:
-    """Report of an object that is far from the origin."""
     away = float(np.linalg.norm(middle))
     reason = f"it lies {away:.3g} from the file's origin, in the file's unit"
     return (ImportDecision("place", "moved to the origin", reason),) if away > _FAR * longest else ()

@@ -1,4 +1,4 @@
-"""Convex parts with which an object collides: few, made by CoACD, and thick enough for the physics time step."""
+"""Convex collision parts of an object. They are few, made by CoACD, and thick enough for the physics time step."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,28 @@ from mjsim.house.validation.object_rules import THIN
 from mjsim.importing.object.closed_body import ClosedBody, simplified
 
 MAX_PARTS = 6
-MAX_VERTICES = 64  # per part
-MIN_WIDTH = THIN  # minimum width of each part in every direction
-_WALL = 0.008  # width below which a part is a wall, m; an object of walls collides as its hull
-_CONVEX = 0.9  # minimum share of its convex hull that a convex body fills
-_TRIANGLES = 1000  # limit to which a body is simplified before decomposition
-_CONCAVITY = 0.12  # CoACD's threshold
-_COARSE = 0.35  # the same for slow bodies, which have many pieces or intersect themselves
-_MANY = 8  # pieces
+MAX_VERTICES = 64  # maximum number of vertices of a part
+MIN_WIDTH = THIN  # minimum width of each part in any direction, in metres
+_WALL = 0.008  # width in metres below which an object consists of thin walls; it then collides as its hull
+_CONVEX = 0.9  # a body is convex if it fills at least this share of its convex hull
+_TRIANGLES = 1000  # maximum number of triangles of a body before decomposition
+_CONCAVITY = 0.12  # concavity threshold of CoACD
+_COARSE = 0.35  # concavity threshold for slow bodies, which have many pieces or intersect themselves
+_MANY = 8  # number of pieces that counts as many
 _CUT = 1e-6  # minimum overlap of an intersecting edge and triangle, relative to their sides
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """The convex parts of an object."""
+    """Convex parts of an object."""
 
-    hulls: tuple[Floats, ...]  # vertices of each part, m, (k, 3) each
-    reason: str  # how they were made
+    hulls: tuple[Floats, ...]  # vertices of each part in metres, shape (k, 3) each
+    reason: str  # explanation of how the parts were made, for the report
     thickened: int  # number of parts that were thickened
 
     @property
     def points(self) -> Floats:
-        """All vertices, m, shape (k, 3)."""
+        """All vertices in metres, shape (k, 3)."""
         return np.concatenate(self.hulls)
 
 
@@ -42,7 +42,7 @@ def convex_parts(solid: ClosedBody) -> Parts:
     hulls, reason = [np.asarray(hull.vertices)], "convex: its own hull"
     filled = solid.mesh.volume / hull.volume
     if filled < _CONVEX:
-        # The mean thickness of walls with volume v and total area a of both sides is 2 v / a.
+        # Walls of volume v, whose two sides have a total area of a, have a mean thickness of 2 v / a.
         walls = 2 * solid.mesh.volume / solid.mesh.area < _WALL
         pieces = [] if walls else _decomposed(solid)
         if walls or min(width(points) for points in pieces) < _WALL:
@@ -56,12 +56,12 @@ def convex_parts(solid: ClosedBody) -> Parts:
 
 
 def width(points: Floats) -> float:
-    """Minimum extent of the convex hull of points (n, 3) in any direction, in metres."""
+    """Return the minimum extent of the convex hull of points (n, 3) in any direction, in metres."""
     return _narrowest(points)[1]
 
 
 def _decomposed(solid: ClosedBody) -> list[Floats]:
-    """Vertices of the convex parts of a body, largest part first (CoACD, Wei et al. 2022; seed 0)."""
+    """Return the vertices of the convex parts of a body, the largest part first (CoACD, Wei et al. 2022)."""
     coarse = simplified(solid.mesh, _TRIANGLES)
     coacd.set_log_level("error")
     found = coacd.run_coacd(
@@ -79,7 +79,7 @@ def _decomposed(solid: ClosedBody) -> list[Floats]:
 
 
 def cuts_itself(mesh: trimesh.Trimesh) -> bool:
-    """True if an edge of a surface intersects one of its triangles."""
+    """Return True if an edge of a surface intersects one of its triangles."""
     vertices, edges = np.asarray(mesh.vertices), mesh.edges_unique
     start = vertices[edges[:, 0]]
     along = vertices[edges[:, 1]] - start
@@ -98,7 +98,7 @@ def cuts_itself(mesh: trimesh.Trimesh) -> bool:
 
 
 def _few_vertices(points: Floats) -> Floats:
-    """Vertices of the hull of points (n, 3), at most `MAX_VERTICES`, with the same bounding box."""
+    """Return at most `MAX_VERTICES` vertices of the hull of points (n, 3), with the same bounding box."""
     hull = trimesh.convex.convex_hull(points)
     if len(hull.vertices) <= MAX_VERTICES:
         return np.asarray(hull.vertices)
@@ -118,7 +118,7 @@ def _few_vertices(points: Floats) -> Floats:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Points (n, 3) whose hull is at least `MIN_WIDTH` wide, extended symmetrically if necessary."""
+    """Extend points (n, 3) symmetrically so that their hull is at least `MIN_WIDTH` wide."""
     for _ in range(4):
         direction, across = _narrowest(points)
         if across > MIN_WIDTH - 1e-6:
@@ -129,7 +129,7 @@ def _thickened(points: Floats) -> Floats:
 
 
 def _narrowest(points: Floats) -> tuple[Floats, float]:
-    """Direction (3,) in which the hull of points (n, 3) is narrowest, preferably an axis, and its width there, m."""
+    """Return the direction (3,) in which the hull of points (n, 3) is narrowest, preferably an axis, and its width."""
     normals = scipy.spatial.ConvexHull(points).equations[:, :3]
     directions = np.concatenate((np.eye(3), normals))
     widths = np.ptp(points @ directions.T, axis=0)

@@ -1,4 +1,4 @@
-"""The pose in which an object rests on the floor."""
+"""Pose in which an object rests on the floor."""
 
 import math
 from dataclasses import dataclass
@@ -10,25 +10,25 @@ import trimesh
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import MIN_WIDTH
 
-STEADY = math.radians(12.0)  # minimum tilt that a stable object withstands
+STEADY = math.radians(12.0)  # minimum tilt that a stable object withstands without tipping over
 _CONTACT = 0.0005  # points up to this height above the lowest one touch the floor, in metres
 _FOOT_SLOPE = 0.45  # half width of a foot divided by the height of the centre of mass
 _MAX_FACES = 300  # maximum number of hull faces tried as the base
-_LOWER = 1.2  # factor by which the best pose must lower the centre of mass to replace the file's pose
-_SMALLER = 0.95  # factor by which a rotation has to shrink the footprint's bounding box
+_LOWER = 1.2  # factor by which another pose must lower the centre of mass to replace the file's pose
+_SMALLER = 0.95  # ratio of footprint areas below which a rotated object replaces the original one
 
 
 @dataclass(frozen=True, eq=False)
 class RestingPose:
     """A pose of an object on the floor."""
 
-    rotation: Floats  # from the file's axes to the object's, (3, 3)
-    tilt: float  # tilt at which it tips over, in radians
+    rotation: Floats  # rotation (3, 3) from the file's axes to the object's axes
+    tilt: float  # angle at which the object tips over, in radians
     turned: bool  # True if the object rests on a different side than in the file
 
 
 def resting_pose(points: Floats, centre: Floats) -> RestingPose:
-    """The file's pose if points (n, 3), m, with this centre of mass are stable in it, otherwise the most stable one."""
+    """Return the file's pose if points (n, 3), in metres, are stable in it. Otherwise, return the most stable pose."""
     down = np.array([0.0, 0.0, -1.0])
     as_it_is = tilt(points, centre, down)
     if as_it_is >= STEADY:
@@ -38,7 +38,7 @@ def resting_pose(points: Floats, centre: Floats) -> RestingPose:
     sides = normals[first[np.linspace(0, len(first) - 1, min(len(first), _MAX_FACES)).astype(int)]]
     tilts = [tilt(points, centre, side) for side in sides]
     best = int(np.argmax(tilts))
-    if tilts[best] < STEADY:  # a round object gets a foot, on the side where it is lowest
+    if tilts[best] < STEADY:  # a round object gets a foot on the side where its centre of mass is lowest
         heights = (points @ sides.T).max(axis=0) - sides @ centre
         best = int(np.argmin(heights.round(4)))
         if centre[2] - points[:, 2].min() < _LOWER * heights[best]:
@@ -48,7 +48,7 @@ def resting_pose(points: Floats, centre: Floats) -> RestingPose:
 
 
 def tilt(points: Floats, centre: Floats, down: Floats) -> float:
-    """Tilt, rad, at which points (n, 3) that rest in direction `down` tip over; negative if they fall at once."""
+    """Return the tilt in radians at which points (n, 3) resting in direction `down` tip over. Negative if unstable."""
     turn = trimesh.geometry.align_vectors(down, [0.0, 0.0, -1.0])[:3, :3]
     placed, mass = points @ turn.T, turn @ centre
     floor = placed[:, 2].min()
@@ -57,7 +57,7 @@ def tilt(points: Floats, centre: Floats, down: Floats) -> float:
 
 
 def foot(points: Floats, centre: Floats) -> Floats:
-    """Corners (8, 3), m, of a low block below points (n, 3) that would otherwise roll away."""
+    """Return the corners (8, 3) of a low block below points (n, 3) that would otherwise roll away, in metres."""
     low, high = points.min(axis=0), points.max(axis=0)
     reach = np.minimum(centre[:2] - low[:2], high[:2] - centre[:2])
     half = np.clip(_FOOT_SLOPE * (centre[2] - low[2]), MIN_WIDTH / 2, np.maximum(0.8 * reach, MIN_WIDTH / 2))
@@ -67,16 +67,16 @@ def foot(points: Floats, centre: Floats) -> Floats:
 
 
 def _distance_inside(polygon: Floats, point: Floats) -> float:
-    """Distance of a point (2,) to the outline of the convex hull of points (n, 2), m; negative outside."""
+    """Return the distance from a point (2,) to the outline of the hull of points (n, 2). It is negative outside."""
     try:
         sides = scipy.spatial.ConvexHull(polygon).equations
-    except (scipy.spatial.QhullError, ValueError):  # a point or a line
+    except (scipy.spatial.QhullError, ValueError):  # the points are on a line, or equal
         return -float(np.linalg.norm(polygon - point, axis=1).min())
     return -float((sides[:, :2] @ point + sides[:, 2]).max())
 
 
 def _squared(points: Floats) -> Floats:
-    """Rotation (3, 3) about the vertical that minimizes the footprint's bounding box, if it shrinks noticeably."""
+    """Return the rotation (3, 3) about the vertical that minimizes the footprint's bounding box, or no rotation."""
     flat = points[:, :2]
     to_box, extents = trimesh.bounds.oriented_bounds_2D(flat)
     rotation = np.eye(3)

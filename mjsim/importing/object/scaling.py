@@ -1,4 +1,4 @@
-"""Unit and vertical axis of a mesh file: given, defined by the format, or guessed."""
+"""Unit and vertical axis of a mesh file: given by the user, defined by the format, or guessed."""
 
 from dataclasses import dataclass
 
@@ -15,23 +15,23 @@ _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0
 
 @dataclass(frozen=True)
 class Scaling:
-    """Conversion of a file's numbers to metres, z up."""
+    """Conversion of a file's coordinates to metres with z up."""
 
     unit: str  # key of `UNITS`
-    up: str  # `y` or `z`
+    up: str  # vertical axis, `y` or `z`
     factor: float  # metres per unit of the file, including `--scale`
     unit_reason: str
     up_reason: str
 
     @property
     def transform(self) -> Floats:
-        """Homogeneous transform (4, 4) from the file's numbers to metres, z up."""
+        """Homogeneous transform (4, 4) from the file's coordinates to metres with z up."""
         scale = np.diag([self.factor, self.factor, self.factor, 1.0])
         return np.asarray(_Y_UP @ scale if self.up == "y" else scale)
 
 
 def scaling(suffix: str, longest: float, *, units: str | None, up: str | None, scale: float) -> Scaling:
-    """Determine unit and axis of a file from its suffix and longest side, unless they are given.
+    """Determine the unit and axis of a file from its suffix and longest side, unless they are given.
 
     Raise `AssetError` if no unit gives a size that a hand carries.
     """
@@ -62,7 +62,7 @@ def _axis(suffix: str) -> tuple[str, str]:
 
 
 def _advice(longest: float, unit: str, reason: str) -> str:
-    """Message with the size, and with units or a scale that would fit."""
+    """Format a message with the size of an object, and with units or a scale that would fit."""
     limits = f"a hand carries {MIN_SIDE:g} to {MAX_SIDE:g} m"
     as_unit = "in any unit" if reason == "no unit fits" else f"in {unit} ({reason})"
     size = f"its longest side is {longest:.4g}, which {as_unit} is too {{}}: {limits}"

@@ -1,4 +1,4 @@
-"""The mesh that shows an object: a simplified surface with a texture, baked from the colours of the file."""
+"""Visual mesh of an object: a simplified surface whose texture is baked from the file's colours."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mjsim.formats.scene.surface import Floats, Ints, Surface
 from mjsim.importing.object.closed_body import is_closed, simplified
 
-SIDE = 512  # side of the image, in pixels
+SIDE = 512  # width and height of the texture, in pixels
 _GUTTER = 2  # margin around a triangle against bleeding colours, in pixels
 _SHRINK = 0.93  # factor by which the scale is reduced until all triangles fit
 _MIN_SIDE = 2  # minimum width of a triangle, in pixels
@@ -22,7 +22,7 @@ _SAMPLES = 200_000  # number of surface points at which the file's colours are s
 _FACING = 0.01  # weight of normals in the search for the nearest surface point, in metres
 _CREASE = math.radians(40.0)
 _SHEET = 2e-4  # distance between the two sides of an open surface, in metres
-_PLAIN = 3 / 255  # colours that differ by less are equal
+_PLAIN = 3 / 255  # colours that differ by less count as equal
 _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence (Roberts 2018)
 
 
@@ -30,12 +30,12 @@ _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 
 class Atlas:
     """Layout of triangles in an image."""
 
-    shapes: Floats  # corners of each triangle, in pixels from the upper left of its block, (n, 3, 2)
-    blocks: Ints  # left, top, width and height of each block, in pixels, (n, 4)
+    shapes: Floats  # corners of each triangle in pixels from the upper left of its block, shape (n, 3, 2)
+    blocks: Ints  # left, top, width and height of each block in pixels, shape (n, 4)
 
     @classmethod
     def pack(cls, corners: Floats) -> Self:
-        """Lay out triangles with these corners, m, shape (n, 3, 3), as large as they fit."""
+        """Lay out triangles (n, 3, 3), in metres, as large as the image allows."""
         flat = _flattened(corners)
         scale = SIDE / np.sqrt(np.prod(np.ptp(flat, axis=1), axis=1).sum())
         while (blocks := _shelves(flat, scale)) is None:
@@ -44,12 +44,12 @@ class Atlas:
 
     @property
     def uv(self) -> Floats:
-        """Texture coordinates of the corners, from 0 to 1 from the lower left, shape (n, 3, 2)."""
+        """Texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (n, 3, 2)."""
         places = (self.shapes + self.blocks[:, None, :2]) / SIDE
         return np.asarray(np.stack((places[..., 0], 1.0 - places[..., 1]), axis=-1))
 
     def texels(self) -> tuple[Ints, Floats]:
-        """Triangle (k,) and barycentric weights (k, 3) of all pixels of all blocks, block by block."""
+        """Return the triangle (k,) and the barycentric weights (k, 3) of each pixel, block by block."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
         a, b, c = (self.shapes[faces, k] for k in range(3))
@@ -59,7 +59,7 @@ class Atlas:
         return faces, weights / weights.sum(axis=1, keepdims=True)
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
-        """The image (SIDE, SIDE, 3) that results from the colours (k, 3) of all `texels`, RGB from 0 to 1."""
+        """Return an image (SIDE, SIDE, 3) made of the colours (k, 3) of all `texels`, RGB from 0 to 1."""
         picture = np.empty((SIDE, SIDE, 3), np.uint8)
         picture[:] = np.round(255 * np.clip(colours.mean(axis=0), 0, 1))
         across, down = self._pixels().T
@@ -67,7 +67,6 @@ class Atlas:
         return picture
 
     def _pixels(self) -> Ints:
-        """Column and row of all pixels of all blocks, shape (k, 2)."""
         grids = [
             np.stack(np.meshgrid(np.arange(w) + x, np.arange(h) + y, indexing="xy"), axis=-1).reshape(-1, 2)
             for x, y, w, h in self.blocks.tolist()
@@ -76,7 +75,7 @@ class Atlas:
 
 
 def _flattened(corners: Floats) -> Floats:
-    """Triangles (n, 3, 3) in the plane, longest side along x, m, shape (n, 3, 2). The corners stay in order."""
+    """Lay triangles (n, 3, 3) flat, with the longest side along x and the corners in the same order, as (n, 3, 2)."""
     count = np.arange(len(corners))
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -91,13 +90,13 @@ def _flattened(corners: Floats) -> Floats:
 
 
 def _drawn(flat: Floats, scale: float) -> Floats:
-    """Flat triangles (n, 3, 2), m, in pixels, with slivers widened."""
+    """Scale flat triangles (n, 3, 2) from metres to pixels, and widen slivers."""
     size = np.ptp(flat, axis=1, keepdims=True)
     return np.asarray(flat * np.maximum(scale, _MIN_SIDE / np.maximum(size, 1e-12)))
 
 
 def _shelves(flat: Floats, scale: float) -> Ints | None:
-    """Blocks (n, 4) of flat triangles (n, 3, 2), in rows from high to low; None if they do not fit."""
+    """Place flat triangles in rows, the highest first. Return their blocks (n, 4), or None if they do not fit."""
     sizes = np.ceil(np.ptp(_drawn(flat, scale), axis=1)).astype(int) + 2 * _GUTTER
     if sizes.max() > SIDE:
         return None
@@ -120,19 +119,20 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class VisualMesh:
-    """A surface with normals, and a texture or a colour."""
+    """A surface with normals and either a texture or a colour."""
 
-    vertices: Floats  # m, (n, 3)
-    faces: Ints  # shape (m, 3)
-    normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, (m, 3, 3)
-    uv: Floats | None  # texture coordinates of the corners, from 0 to 1 from the lower left, (m, 3, 2)
-    picture: NDArray[np.uint8] | None  # RGB, (height, width, 3)
+    vertices: Floats  # vertices in metres, shape (n, 3)
+    faces: Ints  # vertex indices, shape (m, 3)
+    normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, shape (m, 3, 3)
+    # Texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (m, 3, 2).
+    uv: Floats | None
+    picture: NDArray[np.uint8] | None  # RGB, shape (height, width, 3)
     colour: tuple[float, float, float]  # RGB from 0 to 1, used if there is no picture
     doubled: bool  # True if each face exists twice, because the surface is open and visible from both sides
 
 
 def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
-    """Simplify a surface, also given as a joined mesh, and bake its colours."""
+    """Simplify a surface and bake its colours into a texture. `mesh` is the same surface with joined vertices."""
     closed = is_closed(mesh)
     coarse = simplified(mesh, MAX_TRIANGLES if closed else MAX_TRIANGLES // 2)
     closed = closed and is_closed(coarse)
@@ -152,7 +152,7 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
 def _painted(
     surface: Surface, corners: Floats
 ) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
-    """Colour, texture coordinates and image of triangles with these corners (m, 3, 3)."""
+    """Return the colour, texture coordinates and image of triangles with these corners (m, 3, 3)."""
     triangles, weights = _sampled(surface)
     colours = surface.colours_at(triangles, weights)
     red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
@@ -169,7 +169,7 @@ def _painted(
 
 
 def _sampled(surface: Surface) -> tuple[Ints, Floats]:
-    """Points spread evenly over a surface: their triangles (k,) and barycentric weights (k, 3)."""
+    """Spread points evenly over a surface. Return their triangles (k,) and barycentric weights (k, 3)."""
     edges = np.diff(surface.corners, axis=1)
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     count = np.ceil(_SAMPLES * area / area.sum()).astype(int)
@@ -181,19 +181,19 @@ def _sampled(surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
-    """Positions and scaled normals of points on a surface, m, shape (k, 6)."""
+    """Return positions and scaled normals of points on a surface, shape (k, 6)."""
     points = np.einsum("kc,kcd->kd", weights, surface.corners[triangles])
     return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
 
 
 def corner_normals(vertices: Floats, faces: Ints) -> Floats:
-    """Normals (m, 3, 3) of the corners of all faces: means over adjacent faces at angles below `_CREASE`."""
+    """Return the normal at each corner of each face, shape (m, 3, 3), averaged over faces at angles below `_CREASE`."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     units = _normals(corners)
     count = faces.size
     at = scipy.sparse.csr_array((np.ones(count), (np.arange(count), faces.ravel())))
-    here, there = (at @ at.T).nonzero()  # corners at the same vertex
+    here, there = (at @ at.T).nonzero()  # pairs of corners at the same vertex
     near = np.einsum("kd,kd->k", units[here // 3], units[there // 3]) > math.cos(_CREASE)
     total = np.zeros((count, 3))
     np.add.at(total, here[near], weighted[there[near] // 3])
@@ -202,14 +202,13 @@ def corner_normals(vertices: Floats, faces: Ints) -> Floats:
 
 
 def _normals(corners: Floats) -> Floats:
-    """Unit normals (n, 3) of triangles (n, 3, 3)."""
     edges = np.diff(corners, axis=1)
     normals = np.cross(edges[:, 0], edges[:, 1])
     return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
 
 
 def _projected(corners: Floats, points: Floats) -> Floats:
-    """Weights (k, 3) of the corners (k, 3, 3) for the points (k, 3), clamped to the triangles."""
+    """Return barycentric weights (k, 3) of points (k, 3), clamped to triangles with corners (k, 3, 3)."""
     weights = trimesh.triangles.points_to_barycentric(corners, points)
     weights = np.clip(np.nan_to_num(weights, nan=1 / 3), 0.0, 1.0)
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))
