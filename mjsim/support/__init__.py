@@ -1,1 +1,1 @@
-"""Support for all other folders: files, kernels, random streams, digests of sources, the choice of GL."""
+"""Helpers used by all packages: files, compiled kernels, and the Python environment."""

@@ -1,4 +1,4 @@
-"""State of the Python environment: name conflicts of installed packages, and the choice of an OpenGL backend."""
+"""Checks of the Python environment: conflicting packages and the OpenGL backend."""
 
 import importlib.util
 import os
@@ -8,16 +8,16 @@ from pathlib import Path
 
 PACKAGES = ("planner", "hud", "experiments")
 VARIABLE = "MUJOCO_GL"
-POSTPONED = "MJSIM_GL"  # holds the value that `VARIABLE` had before `postpone_gl`
+POSTPONED = "MJSIM_GL"  # environment variable that stores the value of MUJOCO_GL before `postpone_gl`
 BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 EGL_PACKAGES = ("libegl1", "libgl1", "libgles2", "libegl-mesa0", "libgl1-mesa-dri")
 DISABLED = ("disable", "disabled", "off", "false", "0")
-ENABLED = ("enable", "enabled", "on", "true", "1")  # values by which MuJoCo chooses a backend itself
+ENABLED = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL that let MuJoCo choose a backend
 DEFAULT = "egl"
 
 
 def hidden_package(name: str) -> str | None:
-    """Return a hint if Python cannot import one of our packages, or imports another one of that name; else None."""
+    """Return how to correct the import of a package, or None if Python finds this project's package."""
     own = Path(__file__).resolve().parents[2] / name
     spec = importlib.util.find_spec(name)
     folders = list(spec.submodule_search_locations or ()) if spec else []
@@ -33,7 +33,7 @@ def hidden_package(name: str) -> str | None:
 
 
 def shared_names() -> tuple[str, ...]:
-    """Return a hint for each other distribution that installs a package with one of our names."""
+    """Return advice for each other distribution that installs a package with one of this project's names."""
     installed = metadata.packages_distributions()
     return tuple(
         f"the distribution {other} installs a package {name} too: pip uninstall {other}, or install mjsim in an "
@@ -44,9 +44,10 @@ def shared_names() -> tuple[str, ...]:
 
 
 def postpone_gl() -> None:
-    """Prevent MuJoCo from loading OpenGL at import, in this process and its children. Rendering loads it later.
+    """Prevent MuJoCo from loading OpenGL at import, in this process and its children.
 
-    Without `MUJOCO_GL`, MuJoCo would load GLFW, which starts another Python process to inspect its library.
+    If `MUJOCO_GL` is unset, MuJoCo would load GLFW, which starts another Python process to inspect its library.
+    OpenGL is loaded when something is drawn.
     """
     choice = os.environ.get(VARIABLE, "") or DEFAULT
     if choice.lower().strip() not in DISABLED and "mujoco" not in sys.modules:
@@ -54,6 +55,6 @@ def postpone_gl() -> None:
 
 
 def chosen_gl() -> str:
-    """Return the requested backend in lower case, as it was before `postpone_gl`."""
+    """Return the OpenGL backend that was requested before `postpone_gl`, in lower case."""
     choice = (os.environ.get(POSTPONED) or os.environ.get(VARIABLE) or DEFAULT).lower().strip()
     return DEFAULT if choice in ENABLED else choice

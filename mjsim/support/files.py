@@ -1,7 +1,7 @@
-"""Reading files with limits, writing files and folders atomically, and digests of source code.
+"""Size-limited reading, atomic writing, and digests of source code.
 
-Temporary files and folders are created next to their final path, with names that begin with `WORK`. Those of killed
-processes are removed once they are a day old, by the next process that writes into the same folder.
+Temporary files and folders are created next to their final path, with names that begin with `WORK`. Leftovers of
+killed processes are removed after a day, when another process writes into the same folder.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-MAX_INPUT = 256_000_000  # largest file that is read, in bytes
+MAX_INPUT = 256_000_000  # size limit of input files, in bytes
 MAX_SILENCE, MAX_WAIT = (
     8.0,
     60.0,
@@ -30,21 +30,23 @@ WORK = ".mjsim-work-"
 MAX_AGE = 24 * 3600  # age at which temporary files of killed processes are removed, in seconds
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # constants of Linux's renameat2
-ROOT = Path(__file__).parents[2]  # folder of the packages
+ROOT = Path(__file__).parents[2]  # folder that contains the packages
 PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 
 def check_input(path: Path) -> None:
-    """Raise an OSError for a pipe or device, which could be read forever, and for a file larger than `MAX_INPUT`."""
+    """Raise an OSError if a path is a pipe or device, or a file larger than `MAX_INPUT`."""
     found = path.stat()
-    if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):  # a folder fails when it is opened
+    if not (
+        stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)
+    ):  # opening a folder raises its own error
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     if found.st_size > MAX_INPUT:
         raise OSError(errno.EFBIG, f"larger than {MAX_INPUT // 10**6} MB", str(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file. Raise an OSError if it is missing or fails `check_input`."""
+    """Read a file. Raise an OSError if it is missing, too large, or not a regular file."""
     check_input(path)
     with path.open("rb") as file:
         return file.read(MAX_INPUT)
@@ -65,7 +67,7 @@ def read_stream(stream: int) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Read a UTF-8 file, with or without a byte order mark. Raise an OSError like `read_bytes`."""
+    """Read a UTF-8 file, with or without a byte order mark. Raise an OSError if that fails."""
     return read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
 
 
@@ -90,7 +92,8 @@ def _reject_constant(constant: str) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path next to `path`. Rename it to `path` on success, otherwise remove it.
 
-    The temporary name keeps the suffix, because encoders choose the format by it. Symbolic links are followed.
+    The temporary path has the same suffix, because image and video encoders derive the format from it. Symbolic links
+    are followed.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -105,7 +108,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # a failed write, such as to a full disk
+        if error.errno is not None and error.filename is None:  # for example because the disk is full
             error.filename = str(path)
         raise
     finally:
@@ -120,14 +123,14 @@ def work_folder(parent: Path) -> Iterator[Path]:
     try:
         yield folder
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # a failed write, such as to a full disk
+        if error.errno is not None and error.filename is None:  # for example because the disk is full
             error.filename = str(parent)
         raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-@functools.lru_cache(maxsize=64)  # once a day per process, because a batch writes many trials into one folder
+@functools.lru_cache(maxsize=64)  # each process scans a folder only once a day
 def _tidy(folder: Path, _day: int) -> None:
     remove_leftovers(folder)
 
@@ -157,7 +160,7 @@ def write_text_atomically(path: Path, text: str) -> None:
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Swap two paths of one file system, atomically where the file system supports it."""
+    """Swap two paths on the same file system, atomically if the file system supports it."""
     libc, names = ctypes.CDLL(None, use_errno=True), (os.fsencode(one), os.fsencode(other))
     if libc.renameat2(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
         return
@@ -171,7 +174,7 @@ def exchange(one: Path, other: Path) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Return True for an existing file, False even for names that no file can have (too long, a null character)."""
+    """Return True if a path is an existing file. Invalid paths, such as those with a null character, give False."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -180,12 +183,12 @@ def is_file(path: Path) -> bool:
 
 @functools.cache
 def source_digest(*places: str) -> str:
-    """Return a digest, 16 hex digits, of Python modules and folders relative to `ROOT`. By default, of all packages."""
+    """Return a digest of Python modules and folders, given relative to `ROOT`. By default, of all packages."""
     return digest_of(*(ROOT / place for place in places or PACKAGES))
 
 
 def digest_of(*places: Path) -> str:
-    """Return a digest, 16 hex digits, of the relative paths and contents of Python files in files and folders."""
+    """Return 16 hexadecimal digits that identify the relative paths and contents of Python files."""
     digest = hashlib.sha256()
     for place in places:
         for path in [place] if place.is_file() else sorted(place.rglob("*.py")):

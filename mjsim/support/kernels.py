@@ -1,4 +1,4 @@
-"""Compilation of numeric kernels with numba, cached on disk. Used by all four packages.
+"""Compile numeric kernels with numba, and cache the machine code on disk.
 
 numba is imported when the first kernel is declared.
 """
@@ -21,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 MARK = b"@kernel\n"
 UNUSED = 30 * 24 * 3600  # age at which unused machine code is deleted, in seconds
 
-# Division by zero gives infinity or NaN, as in NumPy. Checking for it would cost a tenth of a trial's time.
+# Division by zero gives infinity or NaN, as in NumPy. Raising exceptions instead would make trials a tenth slower.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 
@@ -29,7 +29,7 @@ _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)
 def kernel(function: F) -> F:
     """Compile a function at its first call, or load its machine code from the disk cache.
 
-    If no cache folder is writable (no home folder, a full disk), each process compiles it again.
+    Without a writable cache folder, each process compiles the function again.
     """
     import numba
 
@@ -37,16 +37,16 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a function into each kernel that calls it. For small functions that take many arrays."""
+    """Inline a function into each kernel that calls it. Use this for small functions with many array arguments."""
     import numba
 
     return cast(F, numba.njit(forceinline=True, **_OPTIONS)(function))
 
 
 def c_function(signature: str, function: Callable[..., Any]) -> Any:
-    """Compile a function of numbers to a C function pointer. The signature is like `float64(int64)`.
+    """Compile a function of numbers to a C callback. `signature` has numba's syntax, such as `float64(int64)`.
 
-    The pointer, `ctypes` of the result, is valid as long as the result exists.
+    The function pointer is the result's attribute `ctypes`. It is valid as long as the result exists.
     """
     import numba
 
@@ -58,7 +58,7 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
     folder, chosen = cache_folder(Path(function.__code__.co_filename)), config.CACHE_DIR
     if folder is not None:
-        config.CACHE_DIR = str(folder)  # numba reads it when decorating; restored below for other packages
+        config.CACHE_DIR = str(folder)  # numba reads it while decorating
         try:
             return compiler(cache=True)(function)
         except RuntimeError:  # numba cannot cache it
@@ -69,7 +69,7 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
 
 def cache_base() -> Path:
-    """Return the folder of all caches: `NUMBA_CACHE_DIR` if set, otherwise the user's cache folder."""
+    """Return the parent of all cache folders: `NUMBA_CACHE_DIR` if set, otherwise the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
 
@@ -78,8 +78,8 @@ def cache_base() -> Path:
 def cache_folder(source: Path) -> Path | None:
     """Return the folder for the machine code of a module's kernels, or None if it is not writable.
 
-    Its name holds a digest of all modules whose code is compiled in. numba alone would notice changes of the kernel's
-    own file, but not of kernels that it calls.
+    Its name contains a digest of all modules that the kernels use. numba itself detects changes in a kernel's own
+    file, but not in other kernels that it calls.
     """
     base = cache_base()
     try:

@@ -1,4 +1,4 @@
-"""Comparison of rendered frames with stored ones, for tests of this project and of others (docs/hud.md)."""
+"""Golden-frame comparison for tests of rendered images (docs/hud.md)."""
 
 import lazy_loader
 

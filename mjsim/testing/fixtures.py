@@ -1,4 +1,4 @@
-"""Pytest fixtures, to be imported into a `conftest.py`. Only this module needs pytest."""
+"""Pytest fixtures to import in a `conftest.py`."""
 
 import re
 from collections.abc import Callable
@@ -15,10 +15,10 @@ GoldenFrame = Callable[..., Comparison]
 
 @pytest.fixture
 def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
-    """Compare frames with `golden/<name>.png` in the folder of the test file, or in the nearest one above it.
+    """Return a function that compares a frame with `golden/<name>.png` next to the test file or in a parent folder.
 
-    `golden_frame(frame)` uses the name of the test, `golden_frame(frame, "hall")` another one. Keyword arguments are
-    those of `mjsim.testing.compare_frame`. Images of a failed comparison are written to `tmp_path`.
+    `golden_frame(frame)` uses the name of the test, and `golden_frame(frame, "hall")` the name `hall`. Keyword
+    arguments are passed to `mjsim.testing.compare_frame`. Images of a failed comparison are written to `tmp_path`.
     """
 
     def compare(frame: NDArray[np.uint8], name: str | None = None, **options: object) -> Comparison:

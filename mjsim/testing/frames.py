@@ -1,7 +1,7 @@
-"""Golden frames: compared exactly on known drivers, approximately on others.
+"""Golden frames: stored images with which tests compare rendered frames.
 
-`name.json` next to `name.png` holds the SHA-256 of the frame for each driver whose frame was reviewed. On such a driver
-all pixels must be equal. On others, the PSNR must exceed a limit.
+`name.json` next to `name.png` contains a SHA-256 hash of the frame for each known OpenGL driver. On a known driver all
+pixels must be equal. On other drivers, the PSNR must exceed a limit.
 """
 
 import hashlib
@@ -22,14 +22,14 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import MjsimError
 
 UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
-CLOSE_ENOUGH = 45.0  # default PSNR limit, dB
-_GAIN = 4  # amplification of the difference image, to make small differences visible
+CLOSE_ENOUGH = 45.0  # default PSNR limit in dB
+_GAIN = 4  # factor that makes small differences visible
 
 Image = NDArray[np.uint8]
 
 
 class FrameMismatchError(MjsimError, AssertionError):
-    """A frame differs from its golden frame, or there is none."""
+    """A frame differs from its golden frame, or the golden frame is missing."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Comparison:
     Attributes:
         exact: True if all pixels are equal.
         known_driver: True if a hash is stored for this driver.
-        psnr: Peak signal-to-noise ratio, dB. inf if all pixels are equal.
+        psnr: Peak signal-to-noise ratio in dB, or inf if all pixels are equal.
         updated: True if the frame was stored as the golden frame.
     """
 
@@ -63,16 +63,16 @@ def compare_frame(
     Args:
         frame: RGB, uint8, shape (height, width, 3).
         golden: PNG file. Its hashes are stored next to it as JSON.
-        key: Identifier of what drew the frame. By default `driver_key()`; use `drawing_key()` for frames that were
-            drawn without OpenGL.
+        key: Identifier of the driver and libraries that drew the frame. By default `driver_key()`. Use `drawing_key()`
+            for frames that were drawn without OpenGL.
         update: True to store the frame as the golden frame. By default, True if the environment variable
             `MJSIM_UPDATE_GOLDEN` is set and not 0. Review stored frames before you commit them.
         output: Folder for the actual, expected and difference images of a failure. By default a temporary folder.
-        close_enough: PSNR limit if no hash is stored for `key`, dB.
+        close_enough: PSNR limit in dB if no hash is stored for `key`.
 
     Raises:
-        FrameMismatchError: The frame differs, or there is no golden frame; the message names the images.
-        RenderError: `key` was left out and no OpenGL context can be made.
+        FrameMismatchError: The frame differs, or the golden frame is missing. The message lists the images.
+        RenderError: `key` is None, and no OpenGL context can be created.
     """
     _check_image(frame)
     path = Path(golden)
@@ -98,18 +98,18 @@ def compare_frame(
 
 
 def driver_key() -> str:
-    """Identify everything besides its content that a frame's pixels depend on: the OpenGL driver, and `drawing_key`."""
+    """Return an identifier of the OpenGL driver, OpenCV and the CPU, all of which affect a frame's pixels."""
     gl = gl_info()
     return f"{gl.renderer} | {gl.version} | {drawing_key()}"
 
 
 def drawing_key() -> str:
-    """Identify OpenCV and the CPU's vector instructions, which affect the rounding of text and scaled images."""
+    """Return an identifier of OpenCV and the CPU's vector instructions, which affect rounding in text and images."""
     return f"OpenCV {cv2.__version__} | {platform.machine()} {cv2.getCPUFeaturesLine()}"
 
 
 def psnr(a: Image, b: Image) -> float:
-    """Peak signal-to-noise ratio of two images, dB. inf if they are equal, -inf if their shapes differ."""
+    """Return the peak signal-to-noise ratio of two images in dB: inf if equal, -inf if their shapes differ."""
     if a.shape != b.shape:
         return float("-inf")
     error = float(np.mean((a.astype(np.float64) - b) ** 2))

@@ -1,1 +1,1 @@
-"""Frozen values that packages exchange, and the errors of `mjsim`."""
+"""Immutable values shared by all packages, and the exceptions of `mjsim`."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mjsim.values.errors import ActionError
 
-TIME_TOLERANCE = 1e-6  # tolerance for comparing times, which are rounded sums of many steps, in seconds
+TIME_TOLERANCE = 1e-6  # tolerance in seconds for comparing times, which accumulate rounding errors
 
 
 @dataclass(frozen=True)
@@ -17,10 +17,10 @@ class Move:
     """Walk, turn and look for one control step. Velocities are in the person's own frame.
 
     Attributes:
-        forward: Velocity along the heading, m/s.
-        left: Velocity to the left of the heading, m/s.
-        turn: Yaw rate, counter-clockwise seen from above, rad/s.
-        look: Pitch rate of the head, positive upwards, rad/s.
+        forward: Velocity along the heading, in m/s.
+        left: Velocity to the left of the heading, in m/s.
+        turn: Yaw rate, counter-clockwise seen from above, in rad/s.
+        look: Pitch rate of the head, positive upwards, in rad/s.
 
     Raises:
         ActionError: A component is not finite.
@@ -79,16 +79,17 @@ def _check_name(name: str | None) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FollowPath:
-    """Walk along a path around objects on the floor, then face the goal and pick or place there.
+    """Walk along a path while avoiding objects on the floor, then face the goal and pick or place.
 
     Attributes:
-        points: Floor polyline, m, shape (k, 2), k >= 1.
-        goal: Position of the object or receptacle that the path leads to, m, shape (2,). It may be off the path.
-        stop_distance: The walk ends at this distance from the goal, m, or at the end of the path.
-        then: Action at the end, once the person faces the goal. None to neither act nor turn.
-        until: Simulated time at which to stop, s. None to walk to the end.
-        shown: True if the HUD shows the path. It removes the part behind the person.
-        tolerance: Distance from the path at which the walk stops, m.
+        points: Floor polyline in metres, shape (k, 2), k >= 1.
+        goal: Position of the object or receptacle that the path leads to, in metres, shape (2,). It may be off the
+            path.
+        stop_distance: Distance from the goal in metres at which the walk ends, unless the path ends before.
+        then: Action after the person has turned to the goal. With None, the person neither turns nor acts.
+        until: Simulated time at which to stop, in seconds. None to walk to the end.
+        shown: True if the HUD shows the path. The part behind the person is removed.
+        tolerance: Distance from the path at which the walk stops, in metres.
 
     Raises:
         ActionError: The points or the goal have a wrong shape, or a number is not finite.
@@ -120,10 +121,10 @@ class FollowPath:
 
 @dataclass(frozen=True)
 class Wait:
-    """Stand still until the current pick or place has ended, or until a time if there is none.
+    """Stand still until the current pick or place ends. If there is none, stand still until a given time.
 
     Attributes:
-        until: Simulated time at which to stop, s. None for one control step.
+        until: Simulated time at which to stop, in seconds. None for one control step.
 
     Raises:
         ActionError: The time is not a number.
@@ -143,7 +144,7 @@ Action = StepAction | FollowPath | Wait
 IDLE = Move()
 """Stand still."""
 WAIT = Wait()
-"""Wait for the end of a pick or place, or for one control step if there is none."""
+"""Wait for the current pick or place to end, or for one control step if there is none."""
 
 
 class Refusal(enum.Enum):
@@ -164,13 +165,13 @@ class Refusal(enum.Enum):
 
 @dataclass(frozen=True)
 class ActionResult:
-    """Answer to a `Pick` or `Place`, given in its first control step.
+    """Result of a `Pick` or `Place`, reported in its first control step.
 
     Attributes:
         action: The requested action.
         refusal: None if the motion has started, otherwise the reason why it has not.
-        object: Instance name of the object concerned, if any.
-        receptacle: Key of the receptacle concerned, if any.
+        object: Instance name of the affected object, if any.
+        receptacle: Key of the affected receptacle, if any.
     """
 
     action: Pick | Place
@@ -184,7 +185,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """Kind of an event: outcome of a motion, lost or dislodged object, or anomaly (docs/metrics.md)."""
+    """Type of a physical event: outcome of a pick or place, lost or displaced object, or anomaly (docs/metrics.md)."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"
@@ -197,10 +198,10 @@ class EventKind(enum.Enum):
 
 
 class Stop(enum.Enum):
-    """Reason why an action of several control steps stopped."""
+    """Reason why a multi-step action stopped."""
 
-    DONE = "done"  # complete
-    ARRIVED = "arrived"  # at the end of the path; the following step executes `FollowPath.then`
+    DONE = "done"  # the action is complete
+    ARRIVED = "arrived"  # the path is complete, and the next step executes `FollowPath.then`
     BLOCKED = "blocked"  # the walk makes no progress
     CHANGED = "changed"  # the person has left the path, or an object has moved
     EVENT = "event"  # a `WorldEvent` occurred
@@ -211,7 +212,7 @@ class Stop(enum.Enum):
 class WorldEvent:
     """A physical event."""
 
-    time: float  # simulated time, s
+    time: float  # simulated time in seconds
     kind: EventKind
-    object: str  # instance name of the object concerned
-    receptacle: str | None = None  # receptacle concerned, if any
+    object: str  # instance name
+    receptacle: str | None = None  # receptacle key, if any

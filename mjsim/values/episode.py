@@ -1,4 +1,4 @@
-"""Episodes: a disorganized house with a start pose, stored as JSON."""
+"""Episodes, which are disorganized houses with a start pose, and their JSON files."""
 
 import dataclasses
 import json
@@ -13,8 +13,8 @@ from mjsim.support.files import read_json, read_text, write_text_atomically
 from mjsim.values.errors import EpisodeError, brief
 
 FORMAT_VERSION = 1
-CAPACITY = 2  # objects that a person carries at most (PAPER section 2)
-POINTS = 40  # default number of points of a house where objects may be dropped
+CAPACITY = 2  # maximum number of objects that a person carries (PAPER section 2)
+POINTS = 40  # default number of points in a house where objects may be dropped
 
 
 @dataclass(frozen=True)
@@ -33,21 +33,20 @@ class PlacedObject:
     name: str  # instance name, unique in the episode (`object_07`)
     category: str  # category key in the catalogue (`dishes`)
     model: str  # object model key in the catalogue (`mug`)
-    point: tuple[float, float]  # sampled navigable point (x, y), m, above which it was dropped
-    position: tuple[float, float, float]  # settled origin, m
-    quaternion: tuple[float, float, float, float]  # settled orientation, wxyz
+    point: tuple[float, float]  # floor point (x, y) above which the object was dropped, in metres
+    position: tuple[float, float, float]  # origin after settling, in metres
+    quaternion: tuple[float, float, float, float]  # orientation after settling, wxyz
 
 
 @dataclass(frozen=True)
 class Episode:
-    """A house, its misplaced objects, their targets and the start (PAPER section 4).
+    """A house, its misplaced objects, their targets and the start pose (PAPER section 4).
 
     Attributes:
         house: Name of the house, or the path of its catalogue.
-        house: Name of the house, or the path of its catalogue.
-        objects: Misplaced objects. An episode with N objects has the first N sampled points.
+        objects: Misplaced objects. N objects are at the first N sampled points.
         receptacles: Receptacle keys of the house.
-        targets: Object instance name -> receptacle key.
+        targets: Receptacle key of each object, by instance name.
     """
 
     house: str
@@ -86,7 +85,7 @@ class Episode:
 
     @classmethod
     def from_json(cls, text: str) -> "Episode":
-        """Parse the JSON of `to_json`.
+        """Parse the output of `to_json`.
 
         Raises:
             EpisodeError: The text is not JSON, its format version is unknown, or fields are missing or ill-typed.
@@ -113,7 +112,7 @@ class Episode:
         """Read an episode file.
 
         Raises:
-            EpisodeError: The file is missing or malformed; the message names the file.
+            EpisodeError: The file is missing or malformed. The message names the file.
         """
         try:
             return cls.from_json(read_text(path))

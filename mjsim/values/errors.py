@@ -1,4 +1,4 @@
-"""Errors of `mjsim`, all derived from `MjsimError`. Messages name the invalid value and how to correct it."""
+"""Exceptions of `mjsim`, all derived from `MjsimError`. Messages state how to correct the error."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ class SamplingError(MjsimError):
 
 
 class ActionError(MjsimError):
-    """An action has invalid numbers. A refused action is not an error."""
+    """An action contains invalid values. A refused action does not raise this error."""
 
 
 class PersonError(MjsimError):
@@ -32,7 +32,7 @@ class PersonError(MjsimError):
 
 
 class PhysicsError(MjsimError):
-    """MuJoCo warned, or a state is not finite.
+    """MuJoCo issued a warning, or the simulation state is not finite.
 
     Attributes:
         steps: Control steps of the action (`mjsim.values.observation.Steps`), the last of which failed. None if the
@@ -43,11 +43,11 @@ class PhysicsError(MjsimError):
 
 
 class StateError(MjsimError):
-    """A saved state does not fit the world, or a motion is under way."""
+    """A saved state belongs to another world, or a motion is in progress."""
 
 
 class RenderError(MjsimError):
-    """No GL context could be made, or a frame cannot be drawn."""
+    """No OpenGL context could be created, or a frame cannot be drawn."""
 
 
 class EnvironmentConfigError(MjsimError):
@@ -55,7 +55,7 @@ class EnvironmentConfigError(MjsimError):
 
 
 class EnvironmentStateError(MjsimError):
-    """A call is not possible now, such as a step before the first reset."""
+    """A method was called at the wrong time, for example `step` before the first reset."""
 
 
 class ViewerError(MjsimError):
@@ -63,6 +63,6 @@ class ViewerError(MjsimError):
 
 
 def brief(text: str, limit: int = 600) -> str:
-    """Shorten a message, which may quote a file, to one line of at most `limit` characters."""
+    """Shorten a message to one line of about `limit` characters."""
     line = " ".join(text.split())
     return line if len(line) <= limit else f"{line[: limit // 2]} ... {line[-limit // 2 :]}"

@@ -1,4 +1,4 @@
-"""Contents of the two hands: the knapsack of PAPER section 3.3."""
+"""Objects in a person's hands (the knapsack of PAPER section 3.3)."""
 
 from dataclasses import dataclass, replace
 
@@ -10,7 +10,7 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True)
 class Inventory:
-    """Instance names in the left and the right hand, or None. With `capacity` 1, only the right hand is used.
+    """Instance names of the objects in the hands. A free hand is None. With `capacity` 1, the left hand stays free.
 
     Raises:
         ActionError: Both hands hold the same object.
@@ -34,7 +34,7 @@ class Inventory:
 
     @property
     def free_hands(self) -> tuple[int, ...]:
-        """Indices of hands that can take an object: 0 left, 1 right."""
+        """Indices of the usable free hands: 0 for left, 1 for right."""
         usable = (LEFT, RIGHT) if self.capacity > 1 else (RIGHT,)
         return tuple(hand for hand in usable if self.hands[hand] is None)
 
@@ -42,7 +42,7 @@ class Inventory:
         return self.hands.index(name) if name in self.hands else None
 
     def take(self, hand: int, name: str) -> "Inventory":
-        """Return the inventory with `name` in `hand`. Raise an ActionError if it is full or `name` is held."""
+        """Return a copy with `name` in `hand`. Raise an ActionError if the hand is full or `name` is already held."""
         if self.hands[hand] is not None:
             raise ActionError(
                 f"hand {hand} already holds {self.hands[hand]!r}; release it before taking {name!r}"
@@ -50,7 +50,7 @@ class Inventory:
         return replace(self, left=name) if hand == LEFT else replace(self, right=name)
 
     def release(self, name: str) -> "Inventory":
-        """Return the inventory without `name`. Raise an ActionError if neither hand holds it."""
+        """Return a copy without `name`. Raise an ActionError if neither hand holds it."""
         hand = self.hand_of(name)
         if hand is None:
             raise ActionError(f"no hand holds {name!r}; the hands hold {self.hands}")

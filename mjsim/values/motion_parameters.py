@@ -1,4 +1,4 @@
-"""Parameters of a person's motions, as named tuples because kernels accept those."""
+"""Parameters of a person's motions. They are named tuples because compiled kernels accept these."""
 
 from typing import NamedTuple
 
@@ -7,30 +7,30 @@ class MotionParameters(NamedTuple):
     """Parameters of picking and placing: turning, looking, reaching, lifting, lowering and withdrawing.
 
     Attributes:
-        turn_gain: Yaw rate per heading error while turning to an object or receptacle, 1/s.
-        turn_timeout: Longest time for that turn, s.
-        object_tolerance: Heading error at which reaching may start, rad.
-        receptacle_tolerance: Heading error at which placing may start, rad.
-        standing_speed: A slower person counts as standing, m/s.
-        standing_turn_rate: A person who turns more slowly counts as standing, rad/s.
+        turn_gain: Yaw rate per heading error while turning to an object or receptacle, in 1/s.
+        turn_timeout: Longest duration of such a turn, in seconds.
+        object_tolerance: Heading error at which reaching may start, in radians.
+        receptacle_tolerance: Heading error at which placing may start, in radians.
+        standing_speed: Walking speed below which the person counts as standing, in m/s.
+        standing_turn_rate: Yaw rate below which the person counts as standing, in rad/s.
         look_gain: Share of the pitch error that the head corrects in one control step.
-        look_speed: Fastest pitch rate of the head during a motion, rad/s.
-        reach_time: Time from the hand's posture to the grip, s.
-        align_time: Pause at the grip before the lift, s.
-        lift_time: Time from the floor to the carrying posture, s.
-        lead: Head start of the horizontal or the vertical part of a reach or lift, as a share of its time.
-        start_time: Time for a hand to start and stop, added to distance over speed, s.
-        least_travel: Shorter horizontal hand movements are skipped, m.
-        travel_speed: Speed of a loaded hand above a receptacle, m/s.
-        descent_speed: Speed of a hand that lowers a load, m/s.
-        hover_gap: Gap between a moving load and everything below it, m.
-        hover_time: Pause above the slot before the descent, s.
-        release_gap: Gap between a load and what is below it when the hand opens, m.
+        look_speed: Fastest pitch rate of the head during a motion, in rad/s.
+        reach_time: Duration of the movement from the hand's posture to the grip, in seconds.
+        align_time: Pause at the grip before the lift, in seconds.
+        lift_time: Duration of the movement from the floor to the carrying posture, in seconds.
+        lead: Head start of the horizontal or the vertical part of a reach or lift, as a share of its duration.
+        start_time: Time for a hand to start and stop, in seconds. It is added to the distance divided by the speed.
+        least_travel: Length below which a horizontal hand movement is skipped, in metres.
+        travel_speed: Speed of a loaded hand above a receptacle, in m/s.
+        descent_speed: Speed of a hand that lowers a load, in m/s.
+        hover_gap: Gap between a moving load and everything below it, in metres.
+        hover_time: Pause above the slot before the descent, in seconds.
+        release_gap: Gap between a load and the surface below it when the hand opens, in metres.
         withdraw_steps: Number of control steps in which the open hand moves straight up.
-        withdraw_step: Distance per such step, m.
-        posture_gain: Speed of a hand that returns to a posture, per remaining distance, 1/s.
-        posture_speed: Upper limit of that speed, m/s.
-        posture_acceleration: Acceleration limit of that speed, m/s^2.
+        withdraw_step: Height by which the hand rises in each of these steps, in metres.
+        posture_gain: Speed of a hand that returns to its posture, divided by the remaining distance, in 1/s.
+        posture_speed: Speed limit of a hand that returns to its posture, in m/s.
+        posture_acceleration: Acceleration limit of a hand that returns to its posture, in m/s^2.
     """
 
     turn_gain: float = 6.0
@@ -63,16 +63,16 @@ class CarryingParameters(NamedTuple):
     """Parameters of carrying: the height of loads, and how they avoid the house and each other.
 
     Attributes:
-        least_height: Lowest height of a load's underside, above counters, m.
-        margin: Gap between a load and the house, m.
-        near: Shortest time that a hand looks ahead for free space, s.
-        far: Longest time that it looks ahead, s.
-        most_shift: Farthest that a hand moves sideways before it is drawn in, m.
-        stacking_gap: Gap between two loads, one above the other, m.
-        stacking_distance: Distance over which the right load rises above the left one as they approach, m.
-        push_back: Speed at which a hand yields to what its load touches, in addition to that of the approach, m/s.
-        return_rate: Share of that displacement that is undone per second, 1/s.
-        most_compliance: Largest such displacement, m.
+        least_height: Lowest height of a load's underside, in metres. It is higher than counters.
+        margin: Gap between a load and the house, in metres.
+        near: Shortest look-ahead time of the search for free space, in seconds.
+        far: Longest look-ahead time of this search, in seconds.
+        most_shift: Maximum sideways shift of a hand before it is pulled towards the body, in metres.
+        stacking_gap: Vertical gap between two stacked loads, in metres.
+        stacking_distance: Distance over which the right load rises above the left one as they approach, in metres.
+        push_back: Speed at which a hand yields when its load touches something, added to the approach speed, in m/s.
+        return_rate: Share of a yielding hand's displacement that is undone per second, in 1/s.
+        most_compliance: Maximum displacement of a yielding hand, in metres.
     """
 
     least_height: float = 0.97
@@ -91,16 +91,17 @@ class WalkingParameters(NamedTuple):
     """Parameters of simulated participants who walk along a path.
 
     Attributes:
-        look_ahead: Distance along the path of the point to walk to, m. More cuts corners, less wobbles.
-        look_beyond: Distance along the path that is searched for obstacles, m. It exceeds `sidestep_range`.
-        sidestep_range: Distance at which the person starts to walk around an object on the floor, m.
-        object_clearance: Gap between the body and the middle of such an object, m.
-        sidestep_room: Distance ahead per sideways distance that is needed to pass on the far side, m/m. It prevents
-            changing sides back and forth.
+        look_ahead: Distance of the steering point ahead on the path, in metres. Larger values cut corners, smaller ones
+            cause wobbling.
+        look_beyond: Length of the path ahead that is checked for obstacles, in metres. It exceeds `sidestep_range`.
+        sidestep_range: Distance at which the person starts to walk around an object on the floor, in metres.
+        object_clearance: Gap between the body and the centre of such an object, in metres.
+        sidestep_room: Distance to an object, per metre to the side, that is needed to pass it on the far side. It
+            prevents repeated changes of side.
         braking_share: Share of the acceleration limit that is planned for braking.
-        turn_gain: Yaw rate per heading error, 1/s.
-        facing_tolerance: Heading error at which the person faces the goal, rad.
-        least_progress: A walk that progresses less than this within `PersonParameters.patience` is blocked, m.
+        turn_gain: Yaw rate per heading error, in 1/s.
+        facing_tolerance: Heading error below which the person counts as facing the goal, in radians.
+        least_progress: Distance in metres below which a walk counts as blocked after `PersonParameters.patience`.
     """
 
     look_ahead: float = 0.25
@@ -114,14 +115,14 @@ class WalkingParameters(NamedTuple):
     least_progress: float = 0.05
 
 
-# Field of `PersonParameters` -> its type.
+# Type of each parameter group, by its field in `PersonParameters`.
 GROUPS: dict[str, type[MotionParameters] | type[CarryingParameters] | type[WalkingParameters]] = {
     "motion": MotionParameters,
     "carrying": CarryingParameters,
     "walking": WalkingParameters,
 }
 
-# Ranges in which a pick or place ends within 30 s.
+# Valid ranges, within which each pick or place ends within 30 s.
 GROUP_RANGES: dict[str, tuple[float, float]] = {
     "motion.turn_timeout": (0.04, 4.0),
     "motion.look_gain": (0.01, 1.0),

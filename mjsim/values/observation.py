@@ -1,4 +1,4 @@
-"""Observations of the whole state of a house (PAPER section 1), and series of control steps."""
+"""Observations of the complete state of a house (PAPER section 1), and records of control steps."""
 
 import enum
 from collections.abc import Sequence
@@ -26,18 +26,18 @@ class Observation:
     """Current poses of the person and of every object.
 
     Attributes:
-        time: Simulated time since reset, s.
-        position: Position of the body axis on the floor, (x, y), m, shape (2,).
-        heading: Yaw of the body, rad, 0 along +x, counter-clockwise.
-        pitch: Pitch of the head, rad, positive upwards.
-        eye: Position of the eye camera, m, shape (3,).
-        velocity: Planar velocity in the house frame, m/s, shape (2,).
+        time: Simulated time since reset, in seconds.
+        position: Position of the body axis on the floor, (x, y), in metres, shape (2,).
+        heading: Yaw of the body, in radians, 0 along +x, counter-clockwise.
+        pitch: Pitch of the head, in radians, positive upwards.
+        eye: Position of the eye camera, in metres, shape (3,).
+        velocity: Planar velocity in the house frame, in m/s, shape (2,).
         object_names: Instance names, in the episode's order.
-        object_positions: Object origins, m, shape (n, 3).
+        object_positions: Object origins in metres, shape (n, 3).
         object_quaternions: Orientations wxyz, shape (n, 4).
         object_status: Status of each object.
         hands: Instance names in the left and the right hand, or None.
-        busy: True while a pick or place is under way.
+        busy: True while a pick or place is in progress.
     """
 
     time: float
@@ -64,11 +64,11 @@ class Observation:
 class StepStates(NamedTuple):
     """States after n control steps, one per row. Kernels fill the arrays in place."""
 
-    time: NDArray[np.float64]  # simulated time, s, shape (n,)
-    position: NDArray[np.float64]  # the person's floor positions, m, shape (n, 2)
-    heading: NDArray[np.float64]  # yaw of the body, rad, shape (n,)
-    pitch: NDArray[np.float64]  # pitch of the head, rad, shape (n,)
-    object_position: NDArray[np.float64]  # object origins, m, shape (n, k, 3)
+    time: NDArray[np.float64]  # simulated time in seconds, shape (n,)
+    position: NDArray[np.float64]  # the person's floor positions, in metres, shape (n, 2)
+    heading: NDArray[np.float64]  # yaw of the body, in radians, shape (n,)
+    pitch: NDArray[np.float64]  # pitch of the head, in radians, shape (n,)
+    object_position: NDArray[np.float64]  # object origins in metres, shape (n, k, 3)
     object_quaternion: NDArray[np.float64]  # orientations wxyz, shape (n, k, 4)
     state_hash: NDArray[np.uint64]  # `World.state_hash` after each step, shape (n,)
     health: NDArray[np.float64]  # rows of `HealthSample` after each step, shape (n, 7)
@@ -104,11 +104,11 @@ class StepStates(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Control steps that were executed."""
+    """Executed control steps."""
 
-    # the action of a single step, or all moves: forward, left (m/s), turn and look (rad/s), shape (n, 4)
+    # action of a single step, or n moves, shape (n, 4): forward and left in m/s, turn and look in rad/s
     actions: StepAction | NDArray[np.float64]
-    passed: StepStates | None = None  # the n - 1 states between the steps, or None for a single step
+    passed: StepStates | None = None  # n - 1 states between the steps, or None for a single step
 
     def __len__(self) -> int:
         return 1 if self.passed is None else len(self.passed.time) + 1

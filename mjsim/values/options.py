@@ -9,23 +9,24 @@ from mjsim.values.errors import ActionError
 
 FIDELITIES = ("full", "event")
 CAPACITIES = (1, 2)
-REST_STEPS = 4  # consecutive control steps below `settle_speed` after which an object is at rest
+REST_STEPS = 4  # number of consecutive control steps below `settle_speed` after which an object is at rest
 
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Options of a world that are the same for every person: time step, grip, rest, tier of fidelity.
+    """Options of a world that do not depend on the person: time step, grip, settling and fidelity.
 
     Attributes:
         control_timestep: Duration of one `World.step`, s. A multiple of the model's timestep.
-        grip_distance: Farthest distance of a hand from the grip site at which it can grip, m.
-        grip_error: A weld that is stretched farther than this slips, m.
-        grip_patience: Time for which a weld may be stretched farther, s.
-        settle_time: Longest time for a released object to come to rest, s.
-        settle_speed: Slower objects are at rest, m/s.
-        volume_margin: A centre this far outside a receptacle's volume still counts as inside, m.
-        fidelity: `full`, everything in physics, or `event`, kinematic except for the fall of released objects
-            (docs/simulation.md).
+        grip_distance: Maximum distance between a hand and the grip site for a grip, in metres.
+        grip_error: Stretch of the weld between hand and object beyond which it slips, in metres.
+        grip_patience: Time for which the stretch may exceed `grip_error`, in seconds.
+        settle_time: Longest time for a released object to come to rest, in seconds.
+        settle_speed: Speed below which an object counts as being at rest, in m/s.
+        volume_margin: Distance outside a receptacle's volume at which an object's centre still counts as inside, in
+            metres.
+        fidelity: `full` simulates all motions with physics. `event` moves the person kinematically, and uses physics
+            only for the fall of released objects (docs/simulation.md).
         capacity: Number of objects that can be carried: 2, or 1 with only the right hand.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Parameters of a person: speeds, reach, size, eyes and hands. All tiers of fidelity use them."""
+"""Parameters of a person: speeds, reach, size, eyes and hands."""
 
 import dataclasses
 import math
@@ -24,7 +24,7 @@ def _number(default: float, low: float, high: float, unit: str) -> Any:
 
 @dataclass(frozen=True)
 class PersonParameters:
-    """One person. The world, the planner, pictures and simulated participants all use these parameters.
+    """Parameters of one person, used by the world, the planner, the renderer and simulated participants.
 
     Values without a source are choices of this project.
 
@@ -33,29 +33,29 @@ class PersonParameters:
         1.077
 
     Attributes:
-        walking_speed: Preferred speed, m/s, at which simulated participants walk. Healthy adults prefer 0.94 to
-            1.43 m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.
-        walking_acceleration: Limit of the walking acceleration, m/s^2.
-        turning_speed: Fastest turn of the body, rad/s.
-        turning_acceleration: Limit of the angular acceleration of the body, rad/s^2.
-        looking_speed: Fastest pitch rate of the head while walking, rad/s.
-        reach: Farthest horizontal distance from the body's axis to an object's centre or a receptacle's volume for
-            picking or placing, m. It is an arm's length and a step of bending forward.
-        body_radius: Radius of the trunk, m. Planned paths keep 0.05 m more from walls. Houses are sampled for the
-            default radius, so that everybody can use the same house.
-        eye_height: Height of the eyes, m. Those of standing adults are at 1.4 to 1.75 m (Pheasant and Haslegrave,
-            Bodyspace, 2006).
-        field_of_view: Horizontal field of view of pictures and of perception, rad. Vertically, a participant sees what
-            a 4:3 picture shows, which is 70 degrees by default.
-        viewing_distance: Distance at which an object is noticed, m.
-        looking_interval: Time between two looks for objects while walking, s.
-        reading_time: Time for which a participant stands and reads the HUD before each visit, s. By default 0.
+        walking_speed: Speed at which simulated participants walk, in m/s. Healthy adults prefer 0.94 to 1.43
+            m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.
+        walking_acceleration: Limit of the walking acceleration, in m/s^2.
+        turning_speed: Maximum yaw rate of the body, in rad/s.
+        turning_acceleration: Limit of the angular acceleration of the body, in rad/s^2.
+        looking_speed: Maximum pitch rate of the head while walking, in rad/s.
+        reach: Maximum horizontal distance from the body's axis to an object's centre or a receptacle's volume for
+            picking or placing, in metres. It allows for bending forward with an outstretched arm.
+        body_radius: Radius of the trunk, in metres. Planned paths keep an additional 0.05 m from walls. Houses are
+            sampled for the default radius, so that all participants can use the same house.
+        eye_height: Height of the eyes, in metres. Those of standing adults are at 1.4 to 1.75 m (Pheasant and
+            Haslegrave, Bodyspace, 2006).
+        field_of_view: Horizontal field of view of pictures and of perception, in radians. Vertically, a participant
+            sees what a 4:3 picture shows, which is 70 degrees by default.
+        viewing_distance: Maximum distance at which an object is noticed, in metres.
+        looking_interval: Time between checks for visible objects while walking, in seconds.
+        reading_time: Time for which a participant stands and reads the HUD before each visit, in seconds. By default 0.
             Preparing a step mentally takes 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read 238
             words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
-        patience: Time without progress after which a walking person steps back or looks for another way, s.
-        motion: Picking and placing.
-        carrying: Carrying.
-        walking: Walking of simulated participants.
+        patience: Time without progress after which a walking person steps back or looks for another way, in seconds.
+        motion: Parameters of picking and placing.
+        carrying: Parameters of carrying.
+        walking: Parameters of simulated participants' walking.
 
     Raises:
         PersonError: A value is not a number, or is out of range.
@@ -72,7 +72,7 @@ class PersonParameters:
     field_of_view: float = _number(
         2.0 * math.atan(PICTURE_ASPECT * math.tan(math.radians(35.0))),
         math.radians(20.0),
-        2.618,  # 150 degrees, rounded as in messages
+        2.618,  # 150 degrees
         "rad",
     )
     viewing_distance: float = _number(8.0, 0.5, 100.0, "m")
@@ -92,7 +92,7 @@ class PersonParameters:
 
     @property
     def fastest_walk(self) -> float:
-        """Fastest walking speed, m/s, to which `Move` is limited."""
+        """Walking speed limit of `Move`, in m/s."""
         return self.walking_speed * 14 / 13
 
     @property
@@ -101,12 +101,12 @@ class PersonParameters:
         return 2.0 * math.atan(math.tan(self.field_of_view / 2.0) / PICTURE_ASPECT)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all parameters as JSON-ready values. Those of `GROUPS` are nested."""
+        """Return all parameters as JSON-serializable values, with a nested table for each group."""
         values: dict[str, Any] = {name: getattr(self, name) for name in RANGES}
         return values | {group: getattr(self, group)._asdict() for group in GROUPS}
 
     def unusual(self) -> str:
-        """Describe the parameters that differ from the defaults. Empty if there are none."""
+        """Describe the parameters that differ from the defaults. Return an empty text if there are none."""
         default = PersonParameters()
         others = [
             (name, unit)
@@ -121,7 +121,7 @@ class PersonParameters:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "PersonParameters":
-        """Restore the parameters that `as_dict` returned.
+        """Create parameters from the output of `as_dict`.
 
         Raises:
             PersonError: A name is unknown or missing, or a value is invalid.
@@ -138,7 +138,7 @@ class PersonParameters:
         return cls(**{**values, **groups})
 
 
-# Parameter -> lowest value, highest value and unit.
+# Lowest value, highest value and unit of each parameter.
 RANGES: dict[str, tuple[float, float, str]] = {
     f.name: (*f.metadata["range"], f.metadata["unit"])
     for f in dataclasses.fields(PersonParameters)
