@@ -1,1 +1,1 @@
-"""Running episodes: the world, its state, and its tiers of fidelity."""
+"""Running episodes: the world, its state, and its two levels of fidelity."""

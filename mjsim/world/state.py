@@ -1,9 +1,9 @@
 """Reproducibility of runs: state hashes, checkpoints, and the versions that determine the physics.
 
-If bodies may sleep, MuJoCo's state vector does not record which do, so setting it on live data is not exact, but
+MuJoCo's state vector does not record which bodies sleep. Setting a state on live data is therefore not exact, but
 setting it after `mj_resetData` is. A run that takes a checkpoint therefore resets itself and restores its own state.
-From then on, it is bit-identical to a run that starts at the checkpoint. Checkpoints are taken only while no pick or
-place is under way, because a motion is a generator, whose state cannot be stored.
+From then on, it is bit-identical to a run that starts at the checkpoint. No checkpoint is taken during a pick or place,
+because a motion is a generator, whose state cannot be stored.
 """
 
 import functools
@@ -28,18 +28,18 @@ from mjsim.world.body.grips import GripState
 from mjsim.world.body.rig import RigState
 from mjsim.world.health.monitor import HealthState
 
-CHECKPOINT_PERIOD = 10.0  # shortest simulated time between checkpoints, s
+CHECKPOINT_PERIOD = 10.0  # minimum simulated time between checkpoints, in seconds
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _HASHED = int(
     mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_EQ_ACTIVE
 )
-# Attributes of a model that affect only its looks: textures, colours, and what the renderer needs of meshes and cameras
+# Attributes of a model that affect only its appearance, such as textures and colours.
 _LOOKS = (
     "tex_", "mat_", "light_", "cam_", "skin_", "mesh_normal", "mesh_texcoord", "mesh_facenormal", "name_",
 )  # fmt: skip
 _LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
-_NO_PHYSICS = ("render", "environments")  # folders of mjsim that do not affect states
+_NO_PHYSICS = ("render", "environments")  # folders of mjsim whose code does not affect states
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,24 +49,24 @@ class PersonState:
     rig: RigState  # commands of the servos
     grips: GripState  # object and grip in each hand
     carrying: CarryingState  # compliance of the hands, and how long they have been strained
-    hand_velocities: NDArray[np.float64]  # velocities of the hands' targets, m/s, (2, 3)
+    hand_velocities: NDArray[np.float64]  # velocities of the hands' targets in m/s, shape (2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class StateDetails:
-    """The part of a world's state outside MuJoCo."""
+    """The part of a world's state that is stored outside MuJoCo."""
 
-    hands: tuple[str | None, str | None]  # instance names in the left and the right hand
+    hands: tuple[str | None, str | None]  # names of the objects in the left and the right hand
     status: tuple[ObjectStatus, ...]  # status of each object
     health: HealthState
-    person: PersonState | None  # None in fidelity `event`
+    person: PersonState | None  # None for fidelity `event`
 
 
 @dataclass(frozen=True, eq=False)
 class WorldState:
     """The complete state of a world between two motions."""
 
-    physics: NDArray[np.float64]  # MuJoCo's integration state, or the state of a kinematic world, (n,)
+    physics: NDArray[np.float64]  # MuJoCo's integration state, or the state of a kinematic world, shape (n,)
     details: StateDetails
 
     @property
@@ -78,7 +78,7 @@ class WorldState:
 
     @classmethod
     def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
-        """Restore a state from `physics`, shape (n,), and the text of `details_json`. Raise a StateError if invalid."""
+        """Restore a state from `physics` (n,) and the text of `details_json`. Raise a StateError if invalid."""
         try:
             values = json.loads(details)
             return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
@@ -91,7 +91,7 @@ def checkpoint_hash(physics: NDArray[np.float64], details: str) -> int:
 
 
 class StateHash:
-    """Hashes the physics of a simulation: time, positions, velocities, activations, commands, active welds."""
+    """Hash of a simulation's physics: time, positions, velocities, activations, commands and active welds."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -104,7 +104,7 @@ class StateHash:
 
 
 def hash64(content: Any) -> int:
-    """Return the first 64 bits of the SHA-1 of some bytes, as a checksum against accidental differences."""
+    """Return the first 64 bits of the SHA-1 hash of some bytes, as a checksum against accidental differences."""
     return int.from_bytes(hashlib.sha1(content, usedforsecurity=False).digest()[:8], "little")
 
 
@@ -116,7 +116,7 @@ def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float
 
 
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
-    """Reset the data and set them to a state that `take_physics` returned, shape (n,).
+    """Reset the data, and set them to a state (n,) that `take_physics` returned.
 
     Raises:
         StateError: The state belongs to another model, or is not finite.
@@ -173,6 +173,6 @@ def _installed_version() -> str:
 
 @functools.cache
 def _code_fingerprint() -> str:
-    """Return a digest of the source of this package, because a version may span many changes."""
+    """Return a digest of this package's source code, because the code can change without a new version."""
     root = Path(__file__).parents[1]
     return digest_of(*(place for place in sorted(root.iterdir()) if place.name not in _NO_PHYSICS))

@@ -30,7 +30,7 @@ from mjsim.world.state import WorldState
 from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED
 from mjsim.world.walking.walker import BACK_OFF, Walker
 
-MAX_STEPS = 1000  # default limit of control steps per action
+MAX_STEPS = 1000  # default maximum number of control steps per action
 
 _STOPS = {ARRIVED: Stop.ARRIVED, BLOCKED: Stop.BLOCKED, CHANGED: Stop.CHANGED}
 
@@ -57,7 +57,7 @@ class StepResult:
 class World:
     """A running episode.
 
-    During a pick or place (`Observation.busy`), a `Move` is ignored and another `Pick` or `Place` is refused. A
+    During a pick or place (`Observation.busy`), a `Move` is ignored and a second `Pick` or `Place` is refused. A
     refused action has the same effect as `IDLE`. Progress along a path is not part of the state: `restore` does not
     change it, and `reset` clears it.
 
@@ -85,8 +85,8 @@ class World:
         Args:
             scene: The composed episode.
             options: Options of the world. By default, those of `WorldOptions()`.
-            walls: Edges x, y, x, y of the floor on which a person who follows a path may walk around objects, m, shape
-                (e, 4). By default, the whole floor.
+            walls: Edges (x, y, x, y), in metres, of the floor on which a person who follows a path may walk around
+                objects, shape (e, 4). By default, the whole floor.
 
         Raises:
             AssetError: The scene has no person, or an object lacks a grip site.
@@ -106,7 +106,7 @@ class World:
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state for rendering and ray casts. Do not change it, and get it again after every step."""
+        """The state for rendering and ray casts. Do not change it, and read this property again after every step."""
         return self._tier.data
 
     def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
@@ -131,7 +131,7 @@ class World:
 
     @property
     def busy(self) -> bool:
-        """True while a pick or place is under way."""
+        """True during a pick or place."""
         return self._tier.busy
 
     @property
@@ -141,26 +141,26 @@ class World:
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Positions of the left and the right hand in the body frame, m, a copy of shape (2, 3)."""
+        """Copy of the positions of the left and the right hand in the body frame, in metres, shape (2, 3)."""
         return self._tier.hands
 
     @property
     def blocked(self) -> bool:
-        """True if the walk along a path makes no progress, until the first step after backing off."""
+        """True if the person makes no progress along a path, until the first step after backing off."""
         return self._walker.blocked
 
     def reset(self) -> Observation:
-        """Return to the start of the episode. The same actions then lead to bit-identical states."""
+        """Return to the start of the episode. Repeating the same actions then leads to bit-identical states."""
         self._tier.reset()
         self._walker.reset()
         return self._tier.observation()
 
     def state_hash(self) -> int:
-        """Return a 64-bit hash of the physics."""
+        """Return a 64-bit hash of the physics state."""
         return self._tier.state_hash()
 
     def state(self) -> WorldState:
-        """Return the complete state, for `restore`.
+        """Return the complete state, which `restore` accepts.
 
         Raises:
             StateError: A pick or place is under way.
@@ -187,7 +187,7 @@ class World:
         return self._tier.observation()
 
     def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
-        """Execute an action: one control step for `Move`, `Pick` and `Place`, up to `limit` steps for others.
+        """Execute an action: one control step for `Move`, `Pick` and `Place`, up to `limit` steps for other actions.
 
         Args:
             action: Action of the person.

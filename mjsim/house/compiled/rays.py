@@ -34,7 +34,7 @@ def first_hit(
     """Return the distance to the nearest geom along a ray and the geom's id, or infinity and -1 if the ray hits none.
 
     Args:
-        start, ray: Start, m, and direction, (3,). Distances are in units of the direction's length.
+        start, ray: Start in metres, and direction, each (3,). Distances are in units of the direction's length.
         groups: Mask of the geom groups to hit, (6,).
         through: Mask of the geoms that the ray passes through, (ngeom,).
         without: Id of a body to ignore, so that geoms touching its surface are found too. -1 for none.

@@ -10,7 +10,7 @@ All contact bits are set here. Two geoms collide if contype of one shares a bit 
     hands                     0         0             nothing
 
 The `ref` of each joint is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is
-the person's x in the house, m, and `qpos` of `avatar/left/z` is the height of the left hand, m.
+the person's x in the house, and `qpos` of `avatar/left/z` is the height of the left hand, both in metres.
 """
 
 import itertools

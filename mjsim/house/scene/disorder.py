@@ -32,7 +32,7 @@ class Disorder:
 
     Attributes:
         misplaced: Number of misplaced objects of each episode.
-        distances: Known distances over the floor from misplaced objects to where they belong, m.
+        distances: Walking distances from misplaced objects to where they belong, in metres.
     """
 
     misplaced: tuple[int, ...]
@@ -68,8 +68,8 @@ class Disorder:
         """Assign points to objects so that their distances from home match distances drawn from the observed ones.
 
         Args:
-            points: Free points (p, 2), m.
-            homes: Places where the objects belong (k, 2), m, k <= p.
+            points: Free points (p, 2), in metres.
+            homes: Positions where the objects belong (k, 2), in metres, k <= p.
             seed: Seed of the drawn distances.
 
         Returns:

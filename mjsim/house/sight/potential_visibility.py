@@ -142,8 +142,8 @@ def _may_see(
 ) -> Mask:
     """Return a mask of the objects that are visible from a cell near the eye, at most `angle` radians off the gaze.
 
-    `eye` and the unit vector `gaze` are (3,). `stride` is how far the eye can move, m. `centers` (n, 3) and `radii`
-    (n,) are balls around the objects, m. Results for cells are stored in `grid`.
+    `gaze` is a unit vector. `stride` is how far the eye can move. `centers` (n, 3) and `radii` (n,) are balls around
+    the objects. Lengths are in metres. Results for cells are stored in `grid`.
     """
     ahead = np.zeros(len(radii), np.bool_)
     for i in range(len(radii)):

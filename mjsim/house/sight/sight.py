@@ -105,8 +105,9 @@ def visible_objects(
     An object is in view if one of seven rays, to the centre of its bounding box and to points around it, is inside the
     field of view and hits the object first. Walls, furniture and other objects block rays, the person's body does not.
 
-    `data` needs current poses of geoms. `eye` is (3,), m, `heading` rad, counter-clockwise from +x, and `pitch` rad,
-    positive upwards. `field` is by default that of the scene's person. `among` are the names to look for.
+    `data` needs current poses of geoms. `eye` (3,) is in metres. `heading`, counter-clockwise from +x, and `pitch`,
+    positive upwards, are in radians. `field` defaults to that of the scene's person. `among` limits the search to some
+    names.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     return tuple(scene.index.names[i] for i in sorted(set(_object_hits(scene, data, gaze, among, once=True))))

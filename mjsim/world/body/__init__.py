@@ -1,1 +1,1 @@
-"""The person's body, hands and motions in full physics: picking, carrying and placing."""
+"""The person's body and hands in full physics: picking, carrying and placing objects."""

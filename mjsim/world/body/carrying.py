@@ -1,4 +1,4 @@
-"""Carrying: hands keep their postures and hold loads clear of the house (`mjsim.world.body.postures`).
+"""Carrying: hands keep their postures, and hold loads clear of the house (`mjsim.world.body.postures`).
 
 A load that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, or if the hand lags far
 behind its servo.
@@ -26,10 +26,12 @@ from mjsim.world.body.slots import object_corners
 
 Floats = NDArray[np.float64]
 
-MAX_SERVO_LAG = 0.25  # m. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
-LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, m
+MAX_SERVO_LAG = (
+    0.25  # In metres. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
+)
+LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
-_HOUSE, _PERSON = -1, -2  # owners of geoms that do not belong to an object
+_HOUSE, _PERSON = -1, -2  # owner numbers of geoms that do not belong to an object
 
 
 @kernel
@@ -43,10 +45,10 @@ def count_strain(
     patience: float,
     strained: NDArray[np.int64],
 ) -> int:
-    """Count for how many consecutive control steps each hand has been strained.
+    """Count, for each hand, the consecutive control steps in which it was strained, in `strained` (2,).
 
-    A hand is strained if its weld is stretched by more than `max_error`, m, or its servo lags. Updates `strained` (2,).
-    Returns the hands whose count exceeds `patience` as a bit mask: 1 for the left, 2 for the right hand.
+    A hand is strained if its weld is stretched by more than `max_error` metres or its servo lags. Returns the hands
+    whose count exceeds `patience` as a bit mask: 1 for the left, 2 for the right hand.
     """
     slipping = 0
     for hand in range(2):
@@ -69,13 +71,15 @@ def count_strain(
 class CarryingState:
     """State of `Carrying` between control steps."""
 
-    # offset by which contacts have pushed each hand from its posture, m, (2, 2)
+    # How far contacts have pushed each hand away from its posture, in metres, shape (2, 2).
     compliance: NDArray[np.float64]
-    strained: NDArray[np.int64]  # number of control steps for which each hand has been strained, (2,)
+    strained: NDArray[
+        np.int64
+    ]  # number of consecutive control steps in which each hand was strained, shape (2,)
 
 
 class Carrying:
-    """Keeps both hands in posture. Each world has one instance."""
+    """Keeps both hands in their postures. Each world has one instance."""
 
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
@@ -83,7 +87,7 @@ class Carrying:
         self.clearance: ClearanceField = compiled_house(scene.catalogue).cached(
             "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
         )
-        # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
+        # Horizontal radius of each object around its grip and its extent below the grip, in metres, shape (n, 2).
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
@@ -122,7 +126,7 @@ class Carrying:
         _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
 
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
-        """Return the best position (3,), body frame, m, for a hand to carry an object clear of the house."""
+        """Return the best position (3,) in the body frame for a hand to carry an object clear of the house."""
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
         rig, carrying = self._person.rig, self._person.parameters.carrying
@@ -135,11 +139,11 @@ class Carrying:
         if not data.ncon:
             return self._no_contacts
         contact = data.contact
-        # Contiguous copies, because kernels are compiled for a memory layout, which varies with the number of contacts
+        # Copy to contiguous arrays. Kernels are compiled per memory layout, which varies with the number of contacts.
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:
-        """Count this control step, and return the hands whose loads have been strained for too long."""
+        """Count strain in this control step, and return the hands whose loads have been strained for too long."""
         person, options = self._person, self._person.options
         left, right = person.held
         if left is None and right is None:
@@ -160,7 +164,7 @@ class Carrying:
 
 @kernel
 def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: Any, dt: float) -> None:
-    """Call `update_hands` with plain tuples, which numba unpacks in half the time of named tuples."""
+    """Call `update_hands` with plain tuples, which Numba unpacks in half the time of named tuples."""
     pose, command, clearance = body
     motion = BodyMotion(pose, command, ClearanceField(*clearance))
     update_hands(

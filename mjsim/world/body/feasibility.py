@@ -1,4 +1,4 @@
-"""Feasibility of picks and places: reach, sight, hands and targets (PAPER section 3.4)."""
+"""Conditions for picks and places: an object or receptacle in reach and in sight, and a suitable hand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from mjsim.values.inventory import Inventory
 from mjsim.values.observation import ObjectStatus
 from mjsim.world.body.person import Person
 
-_CHEST = 0.75  # height of the chest as a share of the eye height
+_CHEST = 0.75  # height of the chest as a fraction of the eye height
 
 
 def resolve_pick(
@@ -76,7 +76,7 @@ def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: 
 
 
 def reachable_receptacles(person: Person) -> tuple[str, ...]:
-    """Return the receptacles within reach and in sight, in the episode's order."""
+    """Return the receptacles that are within reach and in sight, in the episode's order."""
     near = (k for k in person.scene.receptacles if _distance(person, k) <= person.parameters.reach)
     return tuple(k for k in near if _receptacle_in_sight(person, k))
 
@@ -90,7 +90,7 @@ def _object_distance(person: Person, item: int) -> float:
 
 
 def _object_in_sight(person: Person, item: int) -> bool:
-    """Return True if the centre or a grip is visible from the eye or the chest. This prevents picking through walls."""
+    """Return True if an object is visible from the eye or chest. This prevents a person from picking through walls."""
     viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data

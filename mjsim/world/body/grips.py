@@ -1,4 +1,4 @@
-"""Grips: welds between a hand's site and a grip site of an object."""
+"""Grips: welds between a site of a hand and a grip site of an object."""
 
 import itertools
 import math
@@ -15,11 +15,11 @@ from mjsim.world.body.rig import Rig, find_id
 AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for at least ten physics steps
 
 
-GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip of each hand
+GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip in each hand
 
 
 class Grips:
-    """Controls the welds that `avatar.attach_avatar` added for each hand, object, grip and stiffness."""
+    """Controls the welds that `avatar.attach_avatar` added between hands and objects."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
@@ -36,11 +36,11 @@ class Grips:
         ]
         self._grip_sites = np.array(sites, np.intp).reshape(len(names), len(avatar.GRIPS))
         self._welds = np.array(welds, np.intp).reshape(2, len(names), len(avatar.GRIPS), 2)
-        self.sites = np.full((2, 2), -1, np.intp)  # site of each hand and of the grip in it, -1 for none
+        self.sites = np.full((2, 2), -1, np.intp)  # site of each hand and of the grip in it, or -1
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
-        """Return the grip of an object, 0 or 1, for which the hand turns less."""
+        """Return the grip of an object, 0 or 1, that requires the smaller turn of the hand."""
         return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
@@ -49,14 +49,14 @@ class Grips:
         return int(np.argmax(agreement))
 
     def point(self, item: int, grip: int) -> NDArray[np.float64]:
-        """Return the position of a grip site, m, (3,)."""
+        """Return the position (3,) of a grip site in metres."""
         return np.array(self._data.site_xpos[self._grip_sites[item, grip]])
 
     def gap(self, hand: int, item: int, grip: int) -> float:
         return site_gap(self._data.site_xpos, self._hand_sites[hand], self._grip_sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
-        """Weld an object to a hand. `gently` uses the soft weld. A sleeping object wakes up."""
+        """Weld an object to a hand, with a soft weld if `gently`. A sleeping object wakes up."""
         self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
         self._held[hand] = (item, grip)
         self._update()
@@ -65,18 +65,18 @@ class Grips:
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
-            # Falls start slowly, so MuJoCo would put an object that was held still to sleep in the air.
+            # A released object starts to fall slowly. Without this, MuJoCo would put it to sleep in the air.
             self._data.tree_asleep[self._trees[held[0]]] = AWAKE
             self._held[hand] = None
             self._update()
 
     def error(self, hand: int) -> float:
-        """Return by how much the weld of a hand is stretched, m, or 0 if it holds nothing."""
+        """Return by how many metres the weld of a hand is stretched, or 0 if the hand is empty."""
         held = self._held[hand]
         return 0.0 if held is None else self.gap(hand, *held)
 
     def get_state(self) -> GripState:
-        """Return object and grip of each hand. The welds themselves are part of the physics."""
+        """Return the object and grip in each hand. The welds themselves are part of the physics state."""
         left, right = self._held
         return left, right
 
@@ -96,7 +96,7 @@ class Grips:
 
 @kernel
 def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
-    """Return the distance between two sites, m. `site_xpos` as in `MjData`, m, (nsite, 3)."""
+    """Return the distance between two sites in metres. `site_xpos` is that of `MjData`, shape (nsite, 3)."""
     total = 0.0
     for axis in range(3):
         total += (site_xpos[first, axis] - site_xpos[second, axis]) ** 2
@@ -105,8 +105,8 @@ def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
 
 @kernel
 def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float:
-    """Return the angle between the frames of two sites, rad. `site_xmat` as in `MjData`, (nsite, 9)."""
-    trace = 0.0  # trace of the rotation between the frames, which is 1 + 2 cos(angle)
+    """Return the angle between two site frames in radians. `site_xmat` is that of `MjData`, shape (nsite, 9)."""
+    trace = 0.0  # The trace of the rotation between the frames is 1 + 2 cos(angle).
     for k in range(9):
         trace += site_xmat[first, k] * site_xmat[second, k]
     return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))

@@ -1,7 +1,8 @@
 """Picking and placing as motions of a hand.
 
-A pick stands still, turns, reaches, welds gently, lifts into the carrying posture, and welds firmly. A place moves over
-a slot of the receptacle, lowers the load to the measured fill height, releases it, and waits until it rests.
+During a pick, the person stands still, turns, reaches for the object, welds it gently, lifts it into the carrying
+posture, and welds it firmly. During a place, the hand moves over a slot of the receptacle, lowers the object to the
+measured fill height, releases it, and waits until it rests.
 """
 
 import math
@@ -17,14 +18,14 @@ from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.person import Motion, Person, Steps, wrap
 from mjsim.world.body.slots import Slot, best_slot, load_extent, object_corners
 
-_ARRIVAL_TIMEOUT = 0.4  # longest wait for the hand to arrive after the reach, s
-_GRIP_TIMEOUT = 0.2  # longest wait for the firm grip to pull the load in, s
-_CLOSE_ENOUGH = 0.012  # m
+_ARRIVAL_TIMEOUT = 0.4  # maximum wait after a reach until the hand arrives, in seconds
+_GRIP_TIMEOUT = 0.2  # maximum wait until the firm grip has pulled the load in, in seconds
+_CLOSE_ENOUGH = 0.012  # distance in metres at which the hand has arrived
 Vector = NDArray[np.float64]
-_TOUCH = 0.0005  # overlap at which the descent ends, m
-_OVERLAP = 0.001  # overlap below which the hand opens, m
-_RAISE = 0.003  # distance by which an overlapping load is raised per control step, m
-_RAISE_TIMEOUT = 0.6  # s
+_TOUCH = 0.0005  # overlap with other geoms at which the descent ends, in metres
+_OVERLAP = 0.001  # overlap below which the hand opens, in metres
+_RAISE = 0.003  # distance by which an overlapping load is raised per control step, in metres
+_RAISE_TIMEOUT = 0.6  # time limit for raising a load, in seconds
 
 
 def pick(
@@ -34,7 +35,7 @@ def pick(
     carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
-    """Reach for an object, lift it and look to `pitch`, rad. Return True if the hand then carries it."""
+    """Reach for an object, lift it, and look to `pitch` (radians). Return True if the hand then holds the object."""
     rig, grips = person.rig, person.grips
     yield from person.face(person.center(item), person.motion.object_tolerance)
     person.moving_hand = hand
@@ -50,7 +51,7 @@ def pick(
         return False
     grips.close(hand, item, grip, gently=True)
     yield from _lift(person, hand, carry_position(hand, item), pitch)
-    # A gently held load hangs 2 cm off the hand. It is pulled in only now, when it is clear of its neighbours.
+    # A gently held load hangs 2 cm below the hand. The firm weld pulls it in once it is clear of its neighbours.
     grips.close(hand, item, grip)
     yield from _draw_in(person, hand)
     if grips.error(hand) > person.options.grip_error:
@@ -60,7 +61,7 @@ def pick(
 
 
 def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
-    """Move over the object first, then down to it, and follow it if it moves."""
+    """Move the hand above an object, then down to it, following the object if it moves."""
     steps = person.steps(person.motion.reach_time)
     for _ in person.swing(
         hand, lambda: person.rig.to_body(person.grips.point(item, grip)), steps, ACROSS_FIRST
@@ -70,7 +71,7 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
 
 
 def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) -> Steps:
-    """Lift straight up first, to avoid low things, then move to the body."""
+    """Lift straight up first, to avoid low obstacles, then move the hand to the body."""
     for _ in range(person.steps(person.motion.align_time)):
         yield
     for _ in person.swing(hand, lambda: goal, person.steps(person.motion.lift_time), UP_FIRST):
@@ -79,7 +80,6 @@ def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) ->
 
 
 def _draw_in(person: Person, hand: int) -> Steps:
-    """Wait until the firm grip has pulled the load into the hand."""
     for _ in range(person.steps(_GRIP_TIMEOUT)):
         if person.grips.error(hand) < 0.5 * person.options.grip_error:
             break
@@ -87,7 +87,7 @@ def _draw_in(person: Person, hand: int) -> Steps:
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Put an object into its receptacle, and look to `pitch`, rad. Return True if it comes to rest inside."""
+    """Put an object into its receptacle, and look to `pitch` (radians). Return True if it comes to rest inside."""
     heading = square_heading(person, receptacle)
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
@@ -113,7 +113,7 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
 
 
 def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
-    """Return the height above the volume's centre, m, at which an object's lowest point crosses the receptacle."""
+    """Return the height above the volume's centre at which an object's lowest point moves over the receptacle."""
     return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
 
 
@@ -122,7 +122,7 @@ def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector)
 
 
 def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
-    """Move up to the hover height, then across to the hover position (3,) in the receptacle's axes."""
+    """Move up to the hover height, then across to the hover position (3,) in the receptacle's frame."""
     target = person.rig.hand_targets[hand]
 
     def above() -> Vector:
@@ -141,9 +141,9 @@ def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Ve
 def _descend(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, slot: Slot, low: float
 ) -> Steps:
-    """Lower the object until its lowest point, `low` m from the hand, is just above the fill height.
+    """Lower an object until its lowest point, `low` metres below the hand, is just above the fill height.
 
-    If it touches anything, stop and raise it until the overlap is small.
+    If the object touches anything, stop, and raise it until the overlap is small.
     """
     rig = person.rig
     release = slot.fill + person.motion.release_gap - low
@@ -173,7 +173,7 @@ def overlap(person: Person, item: int) -> float:
 def deepest_overlap(
     geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
 ) -> float:
-    """Return an object's deepest overlap, m, in contacts (k, 2) with distances (k,), m. The foot is ignored."""
+    """Return an object's deepest overlap in metres, ignoring the foot, from contacts (k, 2) and distances (k,)."""
     deepest = 0.0
     for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]
@@ -183,7 +183,7 @@ def deepest_overlap(
 
 
 def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Withdraw the hand upwards, and wait until the object rests."""
+    """Withdraw the hand upwards, and wait until the released object rests."""
     options, motion = person.options, person.motion
     still = 0
     for step in range(person.steps(options.settle_time)):

@@ -1,6 +1,7 @@
-"""Free space for carried loads, now and in the near future: a person draws in a box when passing a door frame.
+"""Free space for carried loads, now and in the near future.
 
-The kernels look up the clearance where the hand will be soon, and move the hand away from geoms that are too near.
+The kernels look up the clearance where the hand will be soon, and move the hand away from geoms that are too near. For
+example, a person draws in a box when passing a door frame.
 """
 
 import math
@@ -15,20 +16,20 @@ from mjsim.values.motion_parameters import CarryingParameters
 
 Floats = NDArray[np.float64]
 
-# Indices into `Rig.pose` and `Rig.motion`
+# Indices into `Rig.pose` and `Rig.motion`.
 X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
 ROUNDS = 3
-# Candidate positions, as shares of the line from the body's axis to the posture
+# Candidate positions of a hand, as fractions of the way from the body's axis to the posture.
 EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class BodyMotion(NamedTuple):
     """Pose and command of the body, and the clearance around it."""
 
-    pose: Floats  # starts with x, y, m, and heading, rad, (10,) or longer
-    command: Floats  # starts with forward and left velocity, m/s, and yaw rate, rad/s, (3,) or longer
+    pose: Floats  # x, y, heading, and further values, in metres and radians, shape (10,) or longer
+    command: Floats  # forward and left velocity, yaw rate, and further values, in m/s and rad/s, shape (3,) or longer
     clearance: ClearanceField  # clearance at the heights of carried objects
 
 
@@ -36,7 +37,7 @@ class BodyMotion(NamedTuple):
 def drawn_in(
     forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return the position (forward, left), m, closest to a posture, where a load is clear of the house now and soon.
+    """Return the (forward, left) position closest to a posture where a load is clear of the house, now and soon.
 
     The kernel tries a sideways shift first, such as past a door frame. Otherwise it chooses a point between the body's
     axis and the posture, as far out as the line from the axis is clear, because the far side of a wall is out of reach.
@@ -67,7 +68,6 @@ def drawn_in(
 def _clear_throughout(
     forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
 ) -> bool:
-    """Return True if a load is clear between axis and posture, judged by the clearance at both ends."""
     length = math.sqrt(forward * forward + left * left)
     for horizon in (0.0, carrying.near, carrying.far):
         axis, _, _ = _room(0.0, 0.0, horizon, body)
@@ -81,7 +81,6 @@ def _clear_throughout(
 def _sideways(
     forward: float, left: float, needed: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return the shift in the body frame, m, that moves a load away from geoms that are too near."""
     shift_f, shift_l = 0.0, 0.0
     for horizon in (0.0, carrying.near, carrying.far):
         for _ in range(ROUNDS):
@@ -97,7 +96,7 @@ def _sideways(
 
 @kernel
 def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Return the clearance, m, at a point of the body frame in `horizon` seconds, and the direction of its increase."""
+    """Return the clearance at a point of the body frame after `horizon` seconds, and its direction of increase."""
     pose, command = body.pose, body.command
     forward += command[FORWARD] * horizon
     left += command[LEFT] * horizon

@@ -1,4 +1,4 @@
-"""Kernels for changes over time: point-to-point movements of a hand, and commands with limited rates."""
+"""Kernels for hand movements from point to point, and for commands whose rates are limited."""
 
 import math
 
@@ -7,23 +7,23 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # orders of a movement's horizontal and vertical parts
+STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # order of the horizontal and vertical parts of a movement
 
-# Velocity forward and left, m/s, yaw rate, rad/s, and pitch of the head, rad: `Rig.motion` or a part of a body state
+# Velocity forward and left (m/s), yaw rate (rad/s) and pitch of the head (rad): `Rig.motion`, or part of a body state.
 Command = NDArray[np.float64]
 FORWARD, LEFT, TURN, LOOK = 0, 1, 2, 3
 
 
 @kernel
 def minimum_jerk(phase: float) -> float:
-    """Return the progress 0..1 of a minimum-jerk movement at a phase 0..1 (Flash and Hogan, 1985), clamped."""
+    """Return the progress from 0 to 1 of a minimum-jerk movement at a phase from 0 to 1 (Flash and Hogan, 1985)."""
     s = min(1.0, max(0.0, phase))
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 @kernel
 def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
-    """Return horizontal and vertical progress 0..1 at a phase 0..1. One part starts earlier by the fraction `lead`."""
+    """Return the horizontal and vertical progress at a phase, all from 0 to 1. One part starts earlier by `lead`."""
     if order == STRAIGHT:
         share = minimum_jerk(phase)
         return share, share
@@ -35,7 +35,7 @@ def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
 def point_between(
     start: NDArray[np.float64], goal: NDArray[np.float64], phase: float, order: int, lead: float
 ) -> NDArray[np.float64]:
-    """Return the position of a hand at a phase 0..1 of its movement from `start` to `goal`, m, all (3,)."""
+    """Return the position (3,) of a hand at a phase from 0 to 1 of its movement from `start` to `goal`."""
     across, up = progress(phase, order, lead)
     point = np.empty(3)
     for axis in range(3):
@@ -47,7 +47,7 @@ def point_between(
 def change_velocity(
     command: Command, forward: float, left: float, max_speed: float, max_change: float
 ) -> None:
-    """Change the velocity towards a target, by at most `max_change` and up to `max_speed`, all in m/s."""
+    """Change the velocity towards a target, by at most `max_change` and up to `max_speed`, in m/s."""
     speed = math.hypot(forward, left)
     if speed > max_speed:
         forward, left = forward * (max_speed / speed), left * (max_speed / speed)
@@ -62,7 +62,7 @@ def change_velocity(
 
 @kernel
 def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
-    """Change the yaw rate towards a target, by at most `max_change` and up to `max_rate`, all in rad/s."""
+    """Change the yaw rate towards a target, by at most `max_change` and up to `max_rate`, in rad/s."""
     change = min(max_rate, max(-max_rate, rate)) - command[TURN]
     command[TURN] += min(max_change, max(-max_change, change))
 
@@ -71,7 +71,7 @@ def change_turn_rate(command: Command, rate: float, max_rate: float, max_change:
 def change_pitch(
     command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
 ) -> None:
-    """Change the pitch at a rate, rad/s, clamped to `max_rate`. The pitch stays between `lowest` and `highest`, rad."""
+    """Change the pitch at a rate of at most `max_rate` (rad/s), and keep it between `lowest` and `highest` (rad)."""
     rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
         command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

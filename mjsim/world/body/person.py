@@ -1,4 +1,4 @@
-"""The person in full physics: state, servos, grips, and simple movements of which motions consist."""
+"""The person in full physics: state, servos, grips, and the basic movements that make up motions."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
@@ -21,27 +21,27 @@ from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, cha
 from mjsim.world.body.postures import move_hand, posture_pace
 from mjsim.world.body.rig import Rig
 
-# A motion sets the servos, yields once per control step, and returns True if it succeeded.
+# A motion sets the servos, yields once per control step, and finally returns True if it succeeded.
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
 
 @dataclass(eq=False)
 class Person:
-    """The body of the person in a running world."""
+    """The person's body in a running world."""
 
     scene: Scene
     options: WorldOptions
     data: mujoco.MjData
     rig: Rig
     grips: Grips
-    # Indices of the objects in the left and the right hand, or None
+    # Indices of the objects in the left and the right hand, or None.
     held: list[int | None] = field(default_factory=lambda: [None, None])
-    # Velocities of the hands' targets where no motion moves them, m/s, (2, 3)
+    # Velocities of the targets of hands that no motion moves, in m/s, shape (2, 3).
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
-    moving_hand: int | None = None  # hand that a motion moves now; other hands keep their posture
+    moving_hand: int | None = None  # hand that a motion moves; the other hand keeps its posture
     receptacle_heights: ReceptacleHeights = field(init=False)
-    posture_pace: NDArray[np.float64] = field(init=False)  # see `mjsim.world.body.postures.Hands`
+    posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
     def __post_init__(self) -> None:
         self.receptacle_heights = ReceptacleHeights(self.scene)
@@ -69,30 +69,30 @@ class Person:
         return self.options.control_timestep
 
     def steps(self, seconds: float) -> int:
-        """Convert a duration, s, to control steps, at least 1."""
+        """Convert a duration in seconds to a number of control steps, at least 1."""
         return max(1, round(seconds / self.dt))
 
     def travel_steps(self, distance: float) -> int:
-        """Return the number of control steps in which a loaded hand travels a distance, m. 0 for tiny distances."""
+        """Return the number of control steps that a loaded hand takes to travel a distance in metres."""
         motion = self.motion
         if distance < motion.least_travel:
             return 0
         return self.steps(motion.start_time + distance / motion.travel_speed)
 
     def descent_steps(self, height: float) -> int:
-        """Return the number of control steps in which a hand lowers a load by a height, m."""
+        """Return the number of control steps that a hand takes to lower a load by a height in metres."""
         return self.steps(self.motion.start_time + height / self.motion.descent_speed)
 
     def carried_bodies(self) -> frozenset[int]:
         return frozenset(int(self.scene.index.bodies[item]) for item in self.held if item is not None)
 
     def move_hand_to_rest(self, hand: int) -> None:
-        """Move an empty hand's target towards its rest posture by one control step."""
+        """Move the target of an empty hand towards its rest posture for one control step."""
         rest = avatar.posture(hand, avatar.REST, self.parameters.eye_height)
         move_hand(self.rig.hand_targets, self.hand_velocities, hand, *rest, self.posture_pace, self.dt)
 
     def center(self, item: int) -> NDArray[np.float64]:
-        """Return an object's centre of mass, m, (3,)."""
+        """Return an object's centre of mass (3,) in metres."""
         return np.array(self.data.xipos[self.scene.index.bodies[item]])
 
     def speed(self, item: int) -> float:
@@ -103,12 +103,12 @@ class Person:
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
-        """Change the commanded velocities and pitch towards a move, within the person's limits."""
+        """Change the commanded velocities and pitch towards those of a move, within the person's limits."""
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
         change_command(self.rig.motion, forward, left, turn, look, self._limits)
 
     def brake(self) -> None:
-        """Reduce the walking velocity for one control step. Turning and looking stay as they are."""
+        """Slow down for one control step. Turning and looking are not affected."""
         rig = self.rig
         size = math.hypot(rig.motion[0], rig.motion[1])
         rig.motion[:2] *= (
@@ -116,26 +116,26 @@ class Person:
         )
 
     def turn_towards(self, error: float) -> None:
-        """Change the yaw rate so that a heading error, rad, decays without overshoot."""
+        """Set the yaw rate so that a heading error in radians decays without overshoot."""
         person, rig = self.parameters, self.rig
         change = _clip(self.motion.turn_gain * error, person.turning_speed) - rig.turn
         rig.motion[2] += _clip(change, person.turning_acceleration * self.dt)
 
     def glance(self, point: NDArray[np.float64]) -> None:
-        """Move the head's pitch towards a point (3,) of the house frame, m."""
+        """Move the head's pitch towards a point (3,) in the house."""
         x, y, z = point.tolist()
         eye_x, eye_y, eye_z = self.rig.eye.tolist()
         self.look_towards(math.atan2(z - eye_z, math.hypot(x - eye_x, y - eye_y)))
 
     def look_towards(self, pitch: float) -> None:
-        """Move the head's pitch towards an angle, rad, at the speed of a glance."""
+        """Move the head's pitch towards an angle in radians, at the speed of a glance."""
         target, motion = self.rig.pitch_target, self.motion
         target += _clip(motion.look_gain * (pitch - target), motion.look_speed * self.dt)
         lowest, highest = avatar.PITCH_RANGE
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stand still, look at a point (3,), m, and turn to it or to a heading, up to a tolerance, rad."""
+        """Stand still, look at a point (3,), and turn to it or to a heading until the error is within a tolerance."""
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
@@ -153,7 +153,7 @@ class Person:
     def swing(
         self, hand: int, goal: Callable[[], NDArray[np.float64]], steps: int, order: int
     ) -> Iterator[None]:
-        """Move a hand's target to a goal (3,), m, which may move, one control step per iteration."""
+        """Move a hand's target to a goal (3,), which may change on the way, one control step per iteration."""
         start = self.rig.hand_targets[hand].copy()
         for k in range(1, steps + 1):
             self.rig.hand_targets[hand] = point_between(start, goal(), k / steps, order, self.motion.lead)
@@ -161,7 +161,7 @@ class Person:
 
 
 def wrap(angle: float) -> float:
-    """Wrap an angle to [-pi, pi), rad."""
+    """Wrap an angle in radians to [-pi, pi)."""
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
@@ -174,10 +174,10 @@ def change_command(
     look: float,
     limits: NDArray[np.float64],
 ) -> None:
-    """Change a command (forward, left, yaw rate, pitch) towards a move, in m/s and rad/s, by one control step.
+    """Change a command (forward, left, yaw rate, pitch) towards a move for one control step.
 
-    `limits` (8,) has the fastest walk, acceleration, yaw rate, angular acceleration, pitch rate, lowest and highest
-    pitch, and the control step.
+    `limits` (8,) has the maximum walking speed, acceleration, yaw rate, angular acceleration and pitch rate, the lowest
+    and highest pitch, and the duration of a control step, in SI units.
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
     change_velocity(command, forward, left, max_speed, acceleration * dt)

@@ -1,4 +1,4 @@
-"""Kernels for the postures of the hands in one control step: a target moves to where there is free space.
+"""Kernels that update the hands' postures for one control step, so that loads stay in free space.
 
 If a load nevertheless touches something static (`mjsim.world.body.load_room`), the hand yields along the contact's
 normal, up to a limit. Beyond the limit, the body stops walking or turning into the contact. The arrays belong to the
@@ -18,42 +18,44 @@ from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-UPRIGHT = 0.3  # horizontal share of a contact's normal above which it is an obstacle, not a surface below
+UPRIGHT = (
+    0.3  # A contact whose normal has a larger horizontal part is with an obstacle, not with a surface below.
+)
 
-_ARRIVED = 0.0005  # distance to the goal at which a hand stops, m
+_ARRIVED = 0.0005  # distance to the goal at which a hand stops, in metres
 
 
 class Hands(NamedTuple):
     """Control of both hands, left before right, in the body frame."""
 
-    targets: Floats  # commanded positions, m, (2, 3)
-    velocities: Floats  # velocities of the targets, m/s, (2, 3)
-    compliance: Floats  # offsets by which the hands yield to contacts, m, (2, 2)
-    goals: Floats  # buffer for the goals of the targets, m, (2, 3)
-    rest: Floats  # rest posture of the left hand, m, (3,)
-    loads: Floats  # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
-    pace: Floats  # gain, 1/s, speed limit, m/s, and acceleration limit, m/s^2, of the targets, (3,)
+    targets: Floats  # commanded positions in metres, shape (2, 3)
+    velocities: Floats  # velocities of the targets in m/s, shape (2, 3)
+    compliance: Floats  # offsets by which the hands yield to contacts, in metres, shape (2, 2)
+    goals: Floats  # buffer for the goals of the targets, in metres, shape (2, 3)
+    rest: Floats  # rest posture of the left hand in metres, shape (3,)
+    loads: Floats  # horizontal radius of each object around its grip and extent below the grip, in metres, shape (n, 2)
+    pace: Floats  # gain (1/s), speed limit (m/s) and acceleration limit (m/s^2) of the targets, shape (3,)
 
 
 class Contacts(NamedTuple):
     """Contacts of the physics."""
 
-    geoms: Ints  # geoms of each contact, (k, 2)
-    frames: Floats  # frame of each contact, normal first, (k, 9)
-    owners: Ints  # object of each geom, -1 for the house, -2 for the person, (ngeom,)
+    geoms: Ints  # geoms of each contact, shape (k, 2)
+    frames: Floats  # frame of each contact, with the normal first, shape (k, 9)
+    owners: Ints  # object index of each geom, -1 for the house, -2 for the person, shape (ngeom,)
 
 
 class Holding(NamedTuple):
-    """Loads of the hands, and their posture."""
+    """Loads of the hands, and the posture of loaded hands."""
 
-    left: int  # object in the hand, or -1
+    left: int  # index of the object in the hand, or -1
     right: int
     moving: int  # hand that a motion moves, or -1
-    posture: Floats  # posture of a loaded left hand, m, (3,)
+    posture: Floats  # posture of a loaded left hand in metres, shape (3,)
 
 
 def posture_pace(motion: MotionParameters) -> Floats:
-    """Return `Hands.pace` of a person, (3,)."""
+    """Return a person's value of `Hands.pace`, shape (3,)."""
     return np.array([motion.posture_gain, motion.posture_speed, motion.posture_acceleration])
 
 
@@ -66,7 +68,7 @@ def update_hands(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Set the targets of hands that no motion moves, and keep the walking command off contacts. dt in s."""
+    """Set the targets of hands that no motion moves, and keep the walking command from pressing into contacts."""
     for hand in range(2):
         side = 1.0 - 2.0 * hand
         hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt
@@ -95,9 +97,9 @@ def update_hands(
 def move_hand(
     targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
 ) -> None:
-    """Move a hand's target in `targets` (2, 3), m, towards x, y, z in the body frame, and slow it down near the goal.
+    """Move a hand's target towards x, y, z in the body frame for `dt` seconds, slowing down near the goal.
 
-    `velocities` (2, 3), m/s, are updated. `pace` is `Hands.pace`.
+    Updates `targets` (2, 3), in metres, and `velocities` (2, 3), in m/s. `pace` is `Hands.pace`.
     """
     dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
     gap = math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -119,7 +121,6 @@ def move_hand(
 
 @kernel
 def _raise_right(goals: Floats, radii: float, height: float, carrying: CarryingParameters) -> None:
-    """Raise the right load above the left one if they would otherwise meet."""
     apart = math.hypot(goals[1, 0] - goals[0, 0], goals[1, 1] - goals[0, 1])
     near = (radii + carrying.stacking_distance - apart) / carrying.stacking_distance
     over = goals[0, 2] + height + carrying.stacking_gap - goals[1, 2]
@@ -136,7 +137,6 @@ def _comply(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Yield to all static geoms that a load touches from the side."""
     owners = contacts.owners
     for contact in range(len(contacts.geoms)):
         first, second = owners[contacts.geoms[contact, 0]], owners[contacts.geoms[contact, 1]]

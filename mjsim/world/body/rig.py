@@ -15,15 +15,15 @@ from mjsim.values.errors import AssetError
 
 Vector = NDArray[np.float64]
 
-# Indices of a body state: pose, velocity in the house frame, commands in the body frame (the last one is the pitch of
-# the head), and from `SERVO` on the latest servo commands of x, y, yaw and pitch in the house frame; m and rad
+# Indices of a body state: pose, velocity in the house frame, commands in the body frame, the pitch of the head, and,
+# from `SERVO` on, the latest servo commands for x, y, yaw and pitch in the house frame. Units are metres and radians.
 X, Y, HEADING, PITCH = 0, 1, 2, 3
 VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7
 FORWARD, LEFT, TURN, LOOK = 8, 9, 10, 11
 SERVO = 12
 BODY_SIZE = 16
 
-# A position servo with damping lags behind a moving target by kv / kp seconds, so commands are ahead by that time.
+# A position servo with damping lags behind a moving target by kv / kp seconds, so commands run ahead by that.
 _LEAD = avatar.HAND_KV / avatar.HAND_KP
 _SERVOS = 10
 
@@ -32,14 +32,14 @@ _SERVOS = 10
 class RigState:
     """Commands of the person."""
 
-    motion: Vector  # see `Rig.motion`, (4,)
-    hand_targets: Vector  # see `Rig.hand_targets`, m, (2, 3)
-    previous_hand_targets: Vector  # `hand_targets` of the previous control step, m, (2, 3)
-    command: Vector  # previous servo commands: velocities of x, y and yaw, pitch, hand positions, (10,)
+    motion: Vector  # see `Rig.motion`, shape (4,)
+    hand_targets: Vector  # see `Rig.hand_targets`, in metres, shape (2, 3)
+    previous_hand_targets: Vector  # `hand_targets` of the previous control step in metres, shape (2, 3)
+    command: Vector  # previous servo commands: velocities of x, y and yaw, pitch, hand positions, shape (10,)
 
 
 class Rig:
-    """Interface to the avatar's joints and servos in a simulation."""
+    """Interface to the person's joints and servos in a simulation."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
         self.model, self.data = scene.model, data
@@ -51,13 +51,15 @@ class Rig:
         joints += [f"{avatar.PREFIX}{hand}/{axis}" for hand in avatar.HANDS for axis in "xyz"]
         ids = [find_id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in joints]
         actuators = np.array([find_id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in joints])
-        # x, y, yaw and pitch of the head, then both hands in the body frame, m and rad, a view of the state, (10,)
+        # View of the state, shape (10,): x, y, yaw, pitch of the head, and both hands in the body frame.
         self.pose = _view(data.qpos, model.jnt_qposadr[ids])
-        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # velocities of `pose`, (10,)
+        self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # velocities of `pose`, shape (10,)
         self._activations = _view(data.act, model.actuator_actadr[actuators])
         self._controls = _view(data.ctrl, actuators)
-        self.motion = np.zeros(4)  # commanded velocity forward and left, m/s, yaw rate, rad/s, and pitch, rad
-        self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, m
+        self.motion = np.zeros(
+            4
+        )  # commanded velocity forward and left (m/s), yaw rate (rad/s) and pitch (rad)
+        self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, in metres
         self._last_hand_targets = np.zeros((2, 3))
         self._last_command = np.zeros(_SERVOS)
         self.grip_sites = tuple(
@@ -69,7 +71,7 @@ class Rig:
         self.reset()
 
     def reset(self) -> None:
-        """Set the commands to standing still in the current pose."""
+        """Set the commands so that the person stands still in the current pose."""
         self.motion[:] = 0.0, 0.0, 0.0, self.pose[3]
         self.hand_targets[:] = self.pose[4:].reshape(2, 3)
         self._last_hand_targets[:] = self.hand_targets
@@ -80,7 +82,7 @@ class Rig:
 
     @property
     def body_state(self) -> Vector:
-        """Poses, rates and commands, laid out as in `mjsim.world.body.rig`, (BODY_SIZE,)."""
+        """Poses, rates and commands, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
         return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
 
     def get_state(self) -> RigState:
@@ -103,12 +105,12 @@ class Rig:
 
     @property
     def position(self) -> Vector:
-        """Position of the body axis on the floor, m, (2,)."""
+        """Position of the body's axis on the floor in metres, shape (2,)."""
         return self.pose[:2].copy()
 
     @property
     def heading(self) -> float:
-        """Yaw, rad, not wrapped."""
+        """Yaw in radians, not wrapped."""
         return float(self.pose[2])
 
     @property
@@ -125,31 +127,31 @@ class Rig:
 
     @property
     def hands(self) -> Vector:
-        """Hand positions in the body frame, m, (2, 3)."""
+        """Hand positions in the body frame in metres, shape (2, 3)."""
         return self.pose[4:].reshape(2, 3).copy()
 
     @property
     def eye(self) -> Vector:
-        """Position of the eye camera in the house frame, m, (3,)."""
+        """Position of the eye in the house frame in metres, shape (3,)."""
         x, y, heading, pitch = self.pose[:4].tolist()
         return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
 
     def to_body(self, point: Vector) -> Vector:
-        """Transform a point (3,) of the house frame, m, to the body frame."""
+        """Transform a point (3,) from the house frame to the body frame."""
         x, y, heading = self.pose[:3].tolist()
         px, py, pz = point.tolist()
         c, s = math.cos(heading), math.sin(heading)
         return np.array([c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), pz])
 
     def bearing(self, point: Vector) -> float:
-        """Return the direction of a point (2,) or (3,), m, relative to the heading, rad in [-pi, pi]."""
+        """Return the direction to a point (2,) or (3,) relative to the heading, in radians from -pi to pi."""
         x, y, heading = self.pose[:3].tolist()
         dx, dy = float(point[0]) - x, float(point[1]) - y
         c, s = math.cos(heading), math.sin(heading)
         return math.atan2(c * dy - s * dx, c * dx + s * dy)
 
     def advance(self) -> None:
-        """Step the physics by one control step, while the servos ramp from the last commands to the new ones."""
+        """Advance the physics by one control step, while the servos ramp from the previous commands to the new ones."""
         ramp_servos(
             self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
             self._activations, self._controls, self._dt,
@@ -162,7 +164,7 @@ def ramp_servos(
     pose: Vector, motion: Vector, targets: Vector, last_targets: Vector, last_command: Vector,
     activations: Vector, controls: Vector, dt: float,
 ) -> None:  # fmt: skip
-    """Set the start and the rate of the servos' activations so that they reach the commands in one control step.
+    """Set up the servos' activations and their rates so that they reach the commands in one control step.
 
     The hands ramp from `last_targets` (2, 3), and the lead is applied at once. `activations` and `controls` (10,) are
     those of `MjData.act` and `MjData.ctrl`. All arrays from `last_targets` on are overwritten.

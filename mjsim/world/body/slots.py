@@ -1,4 +1,4 @@
-"""Slots of receptacles: a height map of their contents by ray casts, and the best slot for an object."""
+"""Slots of receptacles: a height map of the contents, measured by ray casts, and the best slot for an object."""
 
 import itertools
 from dataclasses import dataclass
@@ -13,37 +13,37 @@ from mjsim.world.body.person import Person
 
 Vector = NDArray[np.float64]
 
-_WALL_GAP = 0.012  # gap between an object and the walls, m
-_SIDE_GAP = 0.006  # free width around an object on its way down, m
-_MAX_SPACING = 0.02  # largest distance between points of the height map, m
-_RAYS_ABOVE = 0.2  # height of the start of rays above the receptacle's volume, m
+_WALL_GAP = 0.012  # gap between an object and the walls, in metres
+_SIDE_GAP = 0.006  # free width around an object on its way down, in metres
+_MAX_SPACING = 0.02  # maximum distance between points of the height map, in metres
+_RAYS_ABOVE = 0.2  # start height of rays above the receptacle's volume, in metres
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
-_SLOPE_COST = 2.0  # cost of a mean gap of 1 m below the object, in metres of fill height
-_MIN_GAIN = 0.015  # amount by which another place must cost less than the best slot to be preferred, m
+_SLOPE_COST = 2.0  # cost of a mean gap below the object relative to the cost of fill height
+_MIN_GAIN = (
+    0.015  # Another position is preferred to the best slot only if it costs less by at least this, in metres.
+)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadExtent:
-    """Extent of a held object around the hand, in the receptacle's axes."""
+    """Extent of a held object around the hand, along the receptacle's axes."""
 
-    low: Vector  # smallest coordinates of its corners, m, (3,)
-    high: Vector  # largest coordinates of its corners, m, (3,)
+    low: Vector  # minimum coordinates of the object's corners in metres, shape (3,)
+    high: Vector  # maximum coordinates of the object's corners in metres, shape (3,)
 
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """A place in a receptacle for an object."""
+    """A position in a receptacle for an object."""
 
-    hand: (
-        Vector  # horizontal position of the hand for releasing the object, in the receptacle's axes, m, (2,)
-    )
-    fill: float  # height of the contents below the object, m above the centre of the receptacle's volume
-    top: float  # height of the highest contents of the receptacle, m above the same centre
+    hand: Vector  # position of the hand when it releases the object, along the receptacle's axes, in metres, shape (2,)
+    fill: float  # height of the contents below the object, relative to the centre of the receptacle's volume, in metres
+    top: float  # height of the highest contents, relative to the same centre, in metres
 
 
 def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
-    """Return points (k, 3) in an object's body frame, m, whose bounding box encloses its colliding geoms.
+    """Return points (k, 3) in an object's body frame whose bounding box encloses its colliding geoms.
 
     These are the vertices of mesh geoms, and the corners of the bounding boxes of other geoms.
     """
@@ -70,7 +70,7 @@ def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
 def load_extent(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
 ) -> LoadExtent:
-    """Measure an object as a hand holds it now. Its `corners`, (k, 3) m, are in the object's frame."""
+    """Measure the extent of an object in a hand from its `corners` (k, 3), which are in the object's frame."""
     body = int(person.scene.index.bodies[item])
     world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
     local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
@@ -78,10 +78,10 @@ def load_extent(
 
 
 def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent: LoadExtent) -> Slot:
-    """Choose where the object will lie lowest and most level.
+    """Choose the slot in which an object will lie lowest and most level.
 
-    There are 2 x 2 slots. Among equal ones, the nearest to the person is chosen. Another place is taken only if it is
-    better by more than `_MIN_GAIN`. At all places, the object clears the walls if possible.
+    There are 2 x 2 slots. Among equally good ones, the nearest to the person is chosen. A position between slots is
+    chosen only if it is better by more than `_MIN_GAIN`. At all positions, the object clears the walls if possible.
     """
     half = receptacle.half_size[:2]
     middle = 0.5 * (extent.low + extent.high)[:2]
@@ -102,7 +102,6 @@ def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent:
 
 
 def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tuple[Vector, Vector]:
-    """Return points (k, 2) all over the receptacle, in its axes, and the heights of its contents without `item`, m."""
     half = receptacle.half_size
     axes = [np.linspace(-h, h, 1 + 2 * int(np.ceil(h / _MAX_SPACING))) for h in half[:2]]
     local = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -115,12 +114,14 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
 
 @kernel
 def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
-    """Return the fill height below an object at each centre (k, 2), m, and its cost, m, both (k,).
+    """Return the fill height below an object at each centre (k, 2), and the cost of that position, in metres.
 
-    Objects tip over on a slope, so the mean gap below the object adds to the cost.
+    The mean gap below the object adds to the cost, because objects tip over on a slope.
     """
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
-    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)  # includes at least one point of the map
+    reach = np.maximum(
+        half + _SIDE_GAP, _MAX_SPACING
+    )  # large enough to include at least one point of the map
     for k in range(len(centres)):
         total, count = 0.0, 0
         for p in range(len(points)):

@@ -1,4 +1,4 @@
-"""The tier `event`: picks and places are computed in advance and played. Only released objects fall by physics."""
+"""Fidelity `event`: picks and places are planned in advance and played. Only released objects fall by physics."""
 
 import math
 from dataclasses import dataclass
@@ -27,20 +27,20 @@ class ActiveMotion:
     """A planned motion that is being played."""
 
     plan: PlannedMotion
-    result: ActionResult  # answer to the action that started it
+    result: ActionResult  # answer to the action that started the motion
     hand: int
     item: int
-    played: int = 0  # number of control steps so far
+    played: int = 0  # number of control steps played so far
 
     @property
     def next_stop(self) -> int:
-        """Next control step with an incident, or else the last one. The motion can be played up to it in one call."""
+        """Next control step at which an event occurs, or else the last one. One call can play the motion up to it."""
         incidents = (step + 1 for step, _, _ in self.plan.incidents if step >= self.played)
         return min(incidents, default=self.plan.length)
 
 
 class Event(Tier):
-    """Kinematic tier with planned motions."""
+    """Kinematic simulation of the person with planned motions."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self._full = Full(scene, options)
@@ -48,11 +48,11 @@ class Event(Tier):
         self._kinematic = KinematicWorld(self._full, options)
         self._planner = MotionPlanner(self._full, self._kinematic)
         self._motion: ActiveMotion | None = None
-        self._in_step = False  # True if the data of the physics show the current state
+        self._in_step = False  # True if the physics data show the current state
 
     @property
     def data(self) -> mujoco.MjData:
-        """Physics data, brought up to date for rendering and ray casts."""
+        """Physics data, updated to the current state for rendering and ray casts."""
         if not self._in_step:
             self._kinematic.write(self._full.data)
             self._in_step = True
@@ -61,7 +61,7 @@ class Event(Tier):
     def answer(self, action: Pick | Place) -> ActionResult:
         if self.busy:
             return ActionResult(action, Refusal.BUSY, action.object)
-        _ = self.data  # brings the physics data up to date for `Full.answer`
+        _ = self.data  # update the physics data, which `Full.answer` reads
         return self._full.answer(action)
 
     @property
@@ -86,7 +86,7 @@ class Event(Tier):
 
     @property
     def health_sample(self) -> HealthSample:
-        # Held objects are exactly at their hands, and nothing else touches anything.
+        # Held objects are exactly at the hands, and nothing else touches anything.
         left, right = (math.nan if grasp is None else 0.0 for grasp in self._kinematic.grasps)
         return HealthSample(weld_error_m=(left, right), weld_error_rad=(left, right))
 
@@ -145,7 +145,7 @@ class Event(Tier):
         self._motion, self._in_step = None, False
 
     def _begin(self, action: StepAction) -> ActionResult | None:
-        _ = self.data  # brings the physics data up to date for `Full.resolve`
+        _ = self.data  # update the physics data, which `Full.resolve` reads
         result = self._full.resolve(action, busy=self.busy)
         if result is not None and result.applied:
             hand, item = self._full.hand_for(result)

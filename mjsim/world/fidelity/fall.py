@@ -1,4 +1,4 @@
-"""The fall of a released object by physics, in an otherwise kinematic world."""
+"""Physics simulation of a released object's fall in an otherwise kinematic world."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,30 +15,31 @@ from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.world.fidelity.kinematic_world import KinematicWorld
 
-_SETTLING_TIME = 1.0  # time for other objects to settle after the released one has come to rest, s
+_SETTLING_TIME = (
+    1.0  # time for other objects to settle after the released object has come to rest, in seconds
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Fall:
     """Result of releasing an object."""
 
-    # Poses of all objects after each control step until the released one was at rest, or until the time limit, m and
-    # wxyz, (k, n, 7)
+    # Poses (metres and wxyz) of all objects after each control step of the fall, shape (k, n, 7).
     poses: NDArray[np.float64]
-    rest: NDArray[np.float64]  # final poses of all objects, (n, 7)
+    rest: NDArray[np.float64]  # final poses of all objects, shape (n, 7)
     success: bool  # True if the released object is at rest in its receptacle
-    incidents: tuple[tuple[int, EventKind, int], ...]  # other events: control step, kind and object
+    incidents: tuple[tuple[int, EventKind, int], ...]  # other events: control step, type and object index
 
 
 def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle: ReceptacleGeometry) -> Fall:
-    """Release an object in physics while the person stands. Sleeping objects stay asleep unless they are touched.
+    """Simulate the release of an object while the person stands. Sleeping objects stay asleep unless touched.
 
-    Afterwards, the kinematic world has an empty hand and the new sleep states.
+    Afterwards, the hand is empty and the sleep states are updated in the kinematic world.
     """
     person = full.person
     options = person.options
     _enter(full, kinematic)
-    full.monitor.check(person.held)  # records the last time and position of the object in the hand
+    full.monitor.check(person.held)  # record the last time and position at which the hand holds the object
     person.grips.open(hand)
     kinematic.release(hand)
     held = [None if other == item else other for other in person.held]
@@ -62,7 +63,7 @@ def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle
 
 
 def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, int]]:
-    """Simulate one control step, unless all released objects sleep, and return its events."""
+    """Simulate one control step unless all released objects sleep, and return its events."""
     if not full.is_settled:
         full.person.rig.advance()
     events = list(full.monitor.check(held))
@@ -70,7 +71,7 @@ def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, in
 
 
 def _enter(full: Full, kinematic: KinematicWorld) -> None:
-    """Set the physics to the kinematic state, including velocities, commands, welds and sleep."""
+    """Set the physics to the kinematic state, including velocities, commands, welds and sleep states."""
     model, data, person = full.scene.model, full.data, full.person
     body, vector = kinematic.body, kinematic.state.vector
     hands, hand_speeds = vector[HANDS:HAND_SPEEDS], vector[HAND_SPEEDS:GRASPS]
@@ -87,7 +88,7 @@ def _enter(full: Full, kinematic: KinematicWorld) -> None:
         if grasp is not None:
             person.grips.close(hand, *grasp)
             _set_velocity(full, kinematic, hand, grasp[0])
-    mujoco.mj_makeM(model, data)  # also for sleeping objects, because one may wake up in the middle of a step
+    mujoco.mj_makeM(model, data)  # Include sleeping objects, because one may wake up in the middle of a step.
     mujoco.mj_factorM(model, data)
     _put_to_sleep(data, kinematic)
     mujoco.mj_forward(model, data)
@@ -105,14 +106,14 @@ def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -
     data.qvel[dof] = body[VX] - rate * y + c * forward - s * left
     data.qvel[dof + 1] = body[VY] + rate * x + s * forward + c * left
     data.qvel[dof + 2] = up
-    # Angular velocities of free joints are in the body's own frame.
+    # The angular velocity of a free joint is relative to the body's own frame.
     data.qvel[dof + 3 : dof + 6] = data.xmat[full.scene.index.bodies[item]].reshape(3, 3)[2] * rate
 
 
 def _put_to_sleep(data: mujoco.MjData, kinematic: KinematicWorld) -> None:
-    """Mark the trees that are at rest as asleep, with effect from the next forward pass.
+    """Put the kinematic trees that are at rest to sleep, with effect from the next forward pass.
 
-    The engine updates its list of sleeping trees only when a tree wakes up, so the person is made to wake up.
+    MuJoCo updates its list of sleeping trees only when a tree wakes up, so this wakes the person's tree.
     """
     data.tree_asleep[:] = kinematic.asleep
     data.tree_awake[:] = data.tree_asleep < 0

@@ -1,4 +1,4 @@
-"""The tier `full`: walking, reaching, carrying and releasing by physics.
+"""Fidelity `full`: walking, reaching, carrying and releasing are simulated by physics.
 
 MuJoCo's timers of physics steps are turned off, because they would take a twentieth of a trial's time.
 """
@@ -29,12 +29,12 @@ from mjsim.world.fidelity.tier import EpisodeState, Tier
 from mjsim.world.health.monitor import Health, HealthMonitor, HealthSample
 from mjsim.world.state import PersonState, StateHash, WorldState, set_physics, take_physics
 
-# Margin of a receptacle in which a delivered object stays delivered, because the next object may push it a little, m
+# Later objects may push a delivered object this far out of its receptacle's volume, in metres.
 _DISLODGED_MARGIN = 0.03
 
 
 def stop_engine_clock() -> None:
-    """Make MuJoCo's timers (`MjData.timer`) read 0 s in this process, unless a clock is set.
+    """Stop MuJoCo's timers (`MjData.timer`) in this process, unless a custom clock is set.
 
     `mujoco.set_mjcb_time(None)` restores MuJoCo's own clock.
     """
@@ -61,7 +61,7 @@ class _Motion:
 
 
 class Full(Tier):
-    """Tier with everything in physics. The other tier uses its parts where it needs physics."""
+    """Simulation of everything by physics. `Event` uses parts of it where it needs physics."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         stop_engine_clock()
@@ -137,7 +137,7 @@ class Full(Tier):
         raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
 
     def hand_for(self, result: ActionResult) -> tuple[int, int]:
-        """Return hand and object of a feasible action. A pick uses the free hand, or the hand on the object's side."""
+        """Return the hand and object of a feasible action. If both hands are free, a pick uses the nearer one."""
         item = self.scene.index.position_of(str(result.object))
         if isinstance(result.action, Place):
             return self.episode_state.held.index(item), item
@@ -147,7 +147,6 @@ class Full(Tier):
         return LEFT if self.person.rig.to_body(self.person.center(item))[1] > 0.0 else RIGHT, item
 
     def _begin(self, result: ActionResult) -> None:
-        """Start a feasible pick or place, after which the head looks to where it looked before."""
         hand, item = self.hand_for(result)
         pitch = self.person.rig.pitch_target
         if isinstance(result.action, Pick):
@@ -215,11 +214,11 @@ class Full(Tier):
 
     @property
     def is_settled(self) -> bool:
-        """True if all objects outside the hands sleep. The person is always awake and wakes objects in the hands."""
+        """True if all objects outside the hands sleep. Held objects are kept awake by the person."""
         return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def poses(self) -> NDArray[np.float64]:
-        """Return the poses of all objects, m and wxyz, (n, 7)."""
+        """Return the poses (metres and wxyz) of all objects, shape (n, 7)."""
         return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
 
     def _in_place(self, item: int) -> bool:
@@ -244,7 +243,7 @@ class Full(Tier):
         self.person.moving_hand = None
 
     def _held_posture(self) -> tuple[float, float, float]:
-        """Return the posture of loaded hands: close to the body for turns, and out of the way of a reaching hand."""
+        """Return the posture of loaded hands: close to the body during turns, and out of the way of a reaching hand."""
         if self._motion is None:
             return avatar.CARRY
         return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE

@@ -19,12 +19,12 @@ from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, 
 
 Floats = NDArray[np.float64]
 
-# Layout of `KinematicState.vector`
-TIME = 0  # s
-BODY = 1  # body state, see `mjsim.world.body.rig`
-HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, m
-HAND_SPEEDS = HANDS + 6  # m/s
-GRASPS = HAND_SPEEDS + 6  # for each hand: 2 * object + grip, or -1
+# Layout of `KinematicState.vector`.
+TIME = 0  # in seconds
+BODY = 1  # body state, laid out as in `mjsim.world.body.rig`
+HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, in metres
+HAND_SPEEDS = HANDS + 6  # in m/s
+GRASPS = HAND_SPEEDS + 6  # for each hand, 2 * object + grip, or -1
 STATE_SIZE = GRASPS + 2
 
 REST, CARRY, TUCKED, ASIDE = 0, 1, 2, 3  # rows of `KinematicModel.postures`
@@ -35,33 +35,33 @@ _NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 
 
 class KinematicState(NamedTuple):
-    """The variable state. Kernels change it in place."""
+    """The variable state, which kernels change in place."""
 
-    vector: Floats  # time, body, hands and grasps, (STATE_SIZE,)
-    poses: Floats  # poses of the objects, m and wxyz, (n, 7)
+    vector: Floats  # time, body, hands and grasps, shape (STATE_SIZE,)
+    poses: Floats  # poses (metres and wxyz) of the objects, shape (n, 7)
 
 
 class KinematicModel(NamedTuple):
-    """The constants of a world."""
+    """The constants of a kinematic world."""
 
     gait: Gait  # limits and servos of the body
-    floor: Floor  # outlines of obstacles for the trunk
-    grips: Floats  # pose of an object in the frame of the hand that holds it, by object and grip, (n, 2, 7)
-    loads: Floats  # each object's horizontal radius around its grip and its extent below the grip, m, (n, 2)
-    posture_pace: Floats  # `Hands.pace`, (3,)
+    floor: Floor  # outlines of the trunk's obstacles
+    grips: Floats  # pose of each object in the frame of the holding hand, by grip, shape (n, 2, 7)
+    loads: Floats  # horizontal radius of each object around its grip and extent below the grip, in metres, shape (n, 2)
+    posture_pace: Floats  # see `Hands.pace`, shape (3,)
     carrying: CarryingParameters
-    # Postures of an empty left hand (`REST`), and of a loaded one while walking (`CARRY`), turning (`TUCKED`) or
-    # while the other hand reaches (`ASIDE`), m, (4, 3)
+    # Postures of the left hand in metres, shape (4, 3): empty (`REST`), or loaded while walking (`CARRY`), turning
+    # (`TUCKED`) or while the other hand reaches (`ASIDE`).
     postures: Floats
     clearance: ClearanceField  # clearance at the heights of carried objects
-    timestep: float  # physics timestep, s
-    compliance: Floats  # `Hands.compliance`, always 0 because there are no contacts, m, (2, 2)
-    goals: Floats  # buffer for `Hands.goals`, m, (2, 3)
+    timestep: float  # physics timestep in seconds
+    compliance: Floats  # `Hands.compliance`, always 0 because there are no contacts
+    goals: Floats  # buffer for `Hands.goals`
 
 
 @kernel
 def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: StepStates) -> None:
-    """Execute a control step for each row of moves (n, 4): forward and left, m/s, turn and look, rad/s."""
+    """Execute one control step for each row of moves (n, 4): forward and left (m/s), turn and look (rad/s)."""
     body = state.vector[BODY:HANDS]
     for row in range(len(moves)):
         kinematics.command(body, moves[row, 0], moves[row, 1], moves[row, 2], moves[row, 3], model.gait)
@@ -78,7 +78,7 @@ def follow_rows(
     moves: Floats,
     rows: StepStates,
 ) -> tuple[int, int]:
-    """Walk along a path until the walk has to stop. Write the moves to `moves` (n, 4) and the states to `rows`.
+    """Walk along a path until the walk has to stop. Store the moves (n, 4) and the states of the steps.
 
     Returns the number of control steps, at most n, and the latest phase of the walk.
     """
@@ -127,14 +127,16 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
         model.gait.dt,
     )
     kinematics.advance(body, model.gait, model.floor)
-    for _ in range(model.gait.substeps):  # bit-identical to the sum in the physics
+    for _ in range(
+        model.gait.substeps
+    ):  # Add up in a loop, so that the time is bit-identical to that of the physics.
         vector[TIME] += model.timestep
     carry(state, model)
 
 
 @kernel
 def held_in(vector: Floats, hand: int) -> int:
-    """Return the object in a hand, or -1. `vector` is `KinematicState.vector`."""
+    """Return the object in a hand, or -1. `vector` is that of `KinematicState`."""
     grasp = int(vector[GRASPS + hand])
     return grasp // 2 if grasp >= 0 else -1
 
@@ -172,7 +174,7 @@ def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
     rows.object_position[row] = state.poses[:, :3]
     rows.object_quaternion[row] = state.poses[:, 3:]
     rows.state_hash[row] = state_hash(state)
-    # Held objects are exactly at their hands, and nothing else touches anything.
+    # Held objects are exactly at the hands, and nothing else touches anything.
     rows.health[row, :2], rows.health[row, 6] = 0.0, math.nan
     for hand in range(2):
         error = 0.0 if vector[GRASPS + hand] >= 0.0 else math.nan
@@ -185,7 +187,7 @@ def state_hash(state: KinematicState) -> np.uint64:
     for word in state.vector.view(np.uint64):
         digest = (digest ^ word) * _PRIME
         digest ^= digest >> _SHIFT
-    # Four independent chains, which a processor computes in parallel
+    # Hash in four independent chains, which the processor computes in parallel.
     words = state.poses.reshape(state.poses.size).view(np.uint64)
     lanes = np.array([1, 2, 3, 4], np.uint64)
     for i in range(len(words)):

@@ -33,13 +33,13 @@ from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.world.walking.path_following import Walk
 
-# Acceleration above which a motionless object is not at rest, m/s^2. Gravity causes 9.8, solver noise about 1.
+# A motionless object with a larger acceleration is not at rest, in m/s^2. Gravity causes 9.8, solver noise about 1.
 _REST_ACCELERATION = 3.0
-MAX_ROWS = 256  # largest number of control steps per call
+MAX_ROWS = 256  # maximum number of control steps per call
 
 
 class KinematicWorld:
-    """A person and objects that are moved by `mjsim.world.fidelity.kinematic_steps`.
+    """A person and objects that are moved kinematically, by `mjsim.world.fidelity.kinematic_steps`.
 
     Attributes:
         state: Variable state.
@@ -86,7 +86,7 @@ class KinematicWorld:
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Positions of the hands in the body frame, m, a view of shape (2, 3)."""
+        """Positions of the hands in the body frame in metres, a view of shape (2, 3)."""
         return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
 
     @property
@@ -98,7 +98,7 @@ class KinematicWorld:
         return [None if grasp < 0 else divmod(int(grasp), 2) for grasp in self.state.vector[GRASPS:]]
 
     def grasp(self, hand: int, item: int, grip: int) -> None:
-        """Put an object into a hand, aligned with it."""
+        """Put an object into a hand, aligned with the hand."""
         self.wake(item)
         self.state.vector[GRASPS + hand] = 2 * item + grip
         carry(self.state, self.model)
@@ -113,7 +113,7 @@ class KinematicWorld:
             self.asleep[tree], tree = AWAKE, int(self.asleep[tree])
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Start from physics after a reset and `mj_forward`."""
+        """Start from physics data after a reset and `mj_forward`."""
         rig, vector = self._rig, self.state.vector
         vector[TIME] = data.time
         self._body[:] = rig.body_state
@@ -132,7 +132,9 @@ class KinematicWorld:
         """Update the poses of bodies, geoms, sites and cameras in `data`, for rendering and ray casts."""
         model, vector = self._model, self.state.vector
         if data.ntree_awake < model.ntree:
-            mujoco.mj_resetData(model, data)  # sleeping bodies would not follow their coordinates
+            mujoco.mj_resetData(
+                model, data
+            )  # Without a reset, sleeping bodies would not follow their coordinates.
         data.time = vector[TIME]
         data.qpos[self._qpos] = self.state.poses.ravel()
         self._rig.pose[:4] = vector[BODY : BODY + 4]
@@ -142,20 +144,20 @@ class KinematicWorld:
         mujoco.mj_camlight(model, data)
 
     def walk(self, moves: NDArray[np.float64]) -> StepStates | None:
-        """Execute a control step for each row (n, 4), as in `walk_rows`, and return the states between them."""
+        """Execute one control step for each move (n, 4), and return the states between the moves."""
         walk_rows(moves, self.state, self.model, self._rows)
         return self._passed(len(moves))
 
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int
     ) -> tuple[int, NDArray[np.float64], StepStates | None]:
-        """Walk along a path. Return the latest phase of the walk, the moves (n, 4), and the states between moves."""
+        """Walk along a path. Return the walk's latest phase, the moves (n, 4), and the states between the moves."""
         moves = np.empty((min(limit, MAX_ROWS), 4))
         count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
         return phase, moves[:count], self._passed(count)
 
     def play(self, trajectory: MotionTrajectory, start: int, end: int) -> StepStates | None:
-        """Play the control steps `start` to `end` of a trajectory, and return the states between them."""
+        """Play control steps `start` to `end` of a trajectory, and return the states between the steps."""
         play_rows(trajectory, start, end, self.state, self._rows)
         return self._passed(end - start)
 
@@ -169,7 +171,7 @@ class KinematicWorld:
         return np.concatenate((self.state.vector, self.state.poses.ravel(), self.asleep))
 
     def unpack(self, values: NDArray[np.float64]) -> None:
-        """Restore a state that `pack` returned. Raise a StateError if it does not fit."""
+        """Restore a state that `pack` returned. Raise a StateError if the state does not fit this world."""
         vector, poses = self.state
         sizes = (STATE_SIZE, poses.size, len(self.asleep))
         if values.shape != (sum(sizes),) or not np.isfinite(values).all():
@@ -191,7 +193,7 @@ def _floor(scene: Scene) -> Floor:
 
 
 def _grip_poses(scene: Scene) -> NDArray[np.float64]:
-    """Return the pose of each object in the frame of a hand aligned with its grip 0 or 1, (n, 2, 7)."""
+    """Return the pose of each object in the frame of a hand that holds it at grip 0 or 1, shape (n, 2, 7)."""
     model, names = scene.model, scene.index.names
     poses = np.zeros((len(names), 2, 7))
     for item, name in enumerate(names):

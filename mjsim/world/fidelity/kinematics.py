@@ -1,8 +1,8 @@
 """Kernels for kinematic walking: the person's servos and trunk, one control step at a time.
 
-A body state is an array of `BODY_SIZE` numbers. `command` changes its commands like `Person.walk`. `advance` lets the
-four servos follow them in steps of the physics, with the masses, gains and force limits of the compiled model. The
-trunk is a disc that slides along the outlines of the house. Loose objects are not obstacles.
+A body state is an array of `BODY_SIZE` numbers. `command` changes its commands in the same way as `Person.walk`. In
+`advance`, the four servos follow the commands in steps of the physics, with the masses, gains and force limits of the
+compiled model. The trunk is a disc that slides along the outlines of the house. Loose objects are not obstacles.
 """
 
 import math
@@ -37,9 +37,9 @@ from mjsim.world.fidelity.trunk_contact import is_clear, slide
 
 
 class Gait(NamedTuple):
-    """Limits of walking, and the servos for it, in SI units."""
+    """Limits of walking, and the parameters of its servos, in SI units."""
 
-    # `PersonParameters`: fastest walk, turning speed, looking speed, walking and turning acceleration
+    # From `PersonParameters`: maximum walking, turning and looking speed, and walking and turning acceleration.
     max_speed: float
     max_turn: float
     max_look: float
@@ -50,10 +50,12 @@ class Gait(NamedTuple):
     mass: float  # mass moved along x and y, with gain and force limit of the velocity servos
     walk_gain: float
     walk_force: float
-    inertia: float  # moment of inertia of the yaw, with gain and torque limit of its velocity servo
+    inertia: (
+        float  # moment of inertia around the vertical axis, with gain and torque limit of the velocity servo
+    )
     turn_gain: float
     turn_force: float
-    head_inertia: float  # moment of inertia of the head, with its position servo
+    head_inertia: float  # moment of inertia of the head, with gains and torque limit of the position servo
     head_stiffness: float
     head_damping: float
     head_force: float
@@ -65,7 +67,7 @@ class Gait(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene, options: WorldOptions) -> "Gait":
-        """Read the values from a compiled scene with a person."""
+        """Read the values from a compiled scene that includes a person."""
         model, person = scene.model, scene.person
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -107,7 +109,7 @@ class Gait(NamedTuple):
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Change the commands towards `Move(forward, left, turn, look)`, m/s and rad/s, for `advance` to execute."""
+    """Change the commands towards a move, in m/s and rad/s, for `advance` to execute."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -116,7 +118,7 @@ def command(
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
-    """Change the commands of a body, (BODY_SIZE,), towards standing, and its yaw rate towards `turn`, rad/s."""
+    """Change the commands of a body (BODY_SIZE,) towards standing, and its yaw rate towards `turn` (rad/s)."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -124,13 +126,13 @@ def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
 
 @kernel
 def look_at(body: NDArray[np.float64], pitch: float, gait: Gait) -> None:
-    """Command a pitch of the head, rad, clamped to its range."""
+    """Command a pitch of the head in radians, clamped to the head's range."""
     body[LOOK] = min(gait.highest, max(gait.lowest, pitch))
 
 
 @kernel
 def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
-    """Advance the servos and the trunk by a control step, while servos ramp from the last commands to the new ones."""
+    """Advance the servos and the trunk by one control step, while the servos ramp to the new commands."""
     heading = body[HEADING] + 0.5 * body[TURN] * gait.dt
     c, s = math.cos(heading), math.sin(heading)
     to_x = c * body[FORWARD] - s * body[LEFT]
@@ -144,7 +146,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
     )
     walk, turn = _servo(gait.mass, gait.walk_gain, h), _servo(gait.inertia, gait.turn_gain, h)
     head = _servo(gait.head_inertia, gait.head_damping, h)
-    # The speed of a servo never exceeds its last or its new command.
+    # The speed of a servo never exceeds its previous and its new command.
     reach_x = gait.radius + gait.dt * max(abs(body[VX]), abs(body[SERVO]), abs(to_x))
     reach_y = gait.radius + gait.dt * max(abs(body[VY]), abs(body[SERVO + 1]), abs(to_y))
     free = is_clear(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
@@ -169,7 +171,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
 
 @kernel
 def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
-    """Return a servo's factors for a physics step: speed kept, and speed gained per force, with and without damping."""
+    """Return a servo's factors for a physics step: the kept speed, and the speed per force with and without damping."""
     return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 

@@ -1,6 +1,7 @@
 """Planner of picks and places without physics, with the times and speeds of the person's parameters.
 
-Only the fall of a released object is simulated. Success is determined as in `mjsim.world.body.hand_motions`.
+Only the fall of a released object is simulated by physics. The conditions for success are those of
+`mjsim.world.body.hand_motions`.
 """
 
 import math
@@ -33,11 +34,14 @@ _SEATING = 1  # number of control steps in which a firm grip pulls the load into
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """A pick or place that was computed in advance."""
+    """A pick or place that was planned in advance."""
 
     trajectory: MotionTrajectory  # state after each control step
-    success: bool = True  # True if the hand holds the object, or if it is at rest in its receptacle
-    incidents: tuple[tuple[int, EventKind, int], ...] = ()  # other events: control step, kind and object
+    # True if a picked object is in the hand, or a placed object is at rest in its receptacle.
+    success: bool = True
+    incidents: tuple[
+        tuple[int, EventKind, int], ...
+    ] = ()  # other events: control step, type and object index
 
     @property
     def length(self) -> int:
@@ -45,9 +49,9 @@ class PlannedMotion:
 
 
 class MotionPlanner:
-    """Computes motions from the current state of a kinematic world, without changing it.
+    """Plans motions from the current state of a kinematic world, without changing that state.
 
-    The data of the physics must be up to date.
+    The physics data must be up to date.
     """
 
     def __init__(self, full: Full, kinematic: KinematicWorld) -> None:
@@ -90,7 +94,6 @@ class MotionPlanner:
         return PlannedMotion(self._trajectory, fall.success, incidents)
 
     def _reach(self, item: int) -> int:
-        """Turn to an object and reach for it. Return the closest grip after the turn."""
         grips, center = self._person.grips, self._person.center(item)
         self._face(center, math.nan, self._times.object_tolerance)
         heading = float(self._kinematic.body[HEADING])
@@ -101,7 +104,7 @@ class MotionPlanner:
         return grip
 
     def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
-        """Turn to a receptacle and move the load over it. Return the slot, and the load's extent below the hand, m."""
+        """Turn to a receptacle and move the load over it. Return the slot and the load's extent below the hand."""
         heading = square_heading(self._person, receptacle)
         self._face(receptacle.center, heading, self._times.receptacle_tolerance)
         extent = self._load_extent(receptacle)
@@ -112,7 +115,7 @@ class MotionPlanner:
 
     def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
         grasp = self._kinematic.grasps[self._hand]
-        if grasp is None:  # only for the type checker, because a place starts with a loaded hand
+        if grasp is None:  # never true, because a place starts with a loaded hand; needed by the type checker
             return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
             self._corners[grasp] = self._corners_about_hand(*grasp)
@@ -136,7 +139,7 @@ class MotionPlanner:
         return self._kinematic.state.vector[first : first + 3].copy()
 
     def _face(self, point: Vector, heading: float, tolerance: float) -> None:
-        """Stand still and turn to a point (3,), m, or to a heading, rad, unless it is NaN."""
+        """Stand still and turn to a point (3,), or to a heading unless it is NaN."""
         kinematic, steps = self._kinematic, self._steps(self._times.turn_timeout)
         room = self._room(steps)
         motion_primitives.face(
@@ -152,14 +155,13 @@ class MotionPlanner:
         *,
         in_house: bool = False,
     ) -> None:
-        """Move the hand to a goal (3,), m, as in `HandMovement`. Without a gaze, the head keeps its pitch."""
+        """Move the hand to a goal (3,) in a number of control steps. By default, the head keeps its pitch."""
         kinematic, room = self._kinematic, self._room(steps)
         gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
         movement = HandMovement(self._hand, goal, in_house, steps, order, gaze)
         motion_primitives.move_hand(kinematic.state, room, movement, self._times, kinematic.model)
 
     def _travel(self, receptacle: ReceptacleGeometry, hover: Vector) -> None:
-        """Move up to the hover height, then across to the hover position (3,) in the receptacle's axes, m."""
         goal, person = receptacle.center + receptacle.rotation @ hover, self._person
         start, above = self._hand_position, self._in_body(goal)
         up = np.array([start[0], start[1], max(start[2], above[2])])
@@ -168,13 +170,11 @@ class MotionPlanner:
         self._move(goal, person.travel_steps(distance), gaze=receptacle.center, in_house=True)
 
     def _descend(self, receptacle: ReceptacleGeometry, release: Vector) -> None:
-        """Move down to the release position (3,) in the receptacle's axes, m, and take one more step."""
         goal = self._in_body(receptacle.center + receptacle.rotation @ release)
         self._move(goal, self._person.descent_steps(abs(float(goal[2] - self._hand_position[2]))))
         self._move(self._hand_position, 1)
 
     def _withdraw(self, fall: Fall, pitch: float) -> None:
-        """Withdraw the hand while the released object falls, and look to `pitch`, rad."""
         kinematic, room = self._kinematic, self._room(len(fall.poses))
         motion_primitives.withdraw(
             kinematic.state, room, self._hand, fall.poses, pitch, self._times, kinematic.model
@@ -185,7 +185,6 @@ class MotionPlanner:
         motion_primitives.end(self._kinematic.state, self._room(1), self._kinematic.model)
 
     def _room(self, steps: int) -> MotionTrajectory:
-        """Return the trajectory, with capacity for more control steps."""
         if int(self._trajectory.length[0]) + steps > len(self._trajectory.vectors):
             self._trajectory = self._trajectory.longer(steps)
         return self._trajectory

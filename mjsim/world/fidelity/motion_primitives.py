@@ -1,4 +1,4 @@
-"""Kernels for the movements of kinematic picks and places, with the timing of `mjsim.world.body`."""
+"""Kernels for the hand and body movements of kinematic picks and places, with the timing of `mjsim.world.body`."""
 
 import math
 from typing import NamedTuple
@@ -43,11 +43,11 @@ Floats = NDArray[np.float64]
 
 
 class MotionTrajectory(NamedTuple):
-    """States of a motion that is computed before it is played, one per control step."""
+    """States of a motion that is planned before it is played, one per control step."""
 
-    vectors: Floats  # `KinematicState.vector` after each step, (capacity, STATE_SIZE)
-    poses: Floats  # poses of the objects, m and wxyz, (capacity, n, 7)
-    length: NDArray[np.int64]  # number of control steps so far, (1,)
+    vectors: Floats  # `KinematicState.vector` after each step, shape (capacity, STATE_SIZE)
+    poses: Floats  # poses (metres and wxyz) of the objects, shape (capacity, n, 7)
+    length: NDArray[np.int64]  # number of stored control steps, shape (1,)
 
     @classmethod
     def empty(cls, max_steps: int, objects: int) -> "MotionTrajectory":
@@ -68,11 +68,11 @@ class HandMovement(NamedTuple):
     """A movement of a hand."""
 
     hand: int
-    goal: Floats  # final position, m, (3,)
-    in_house: bool  # True if the goal is in the house frame, False for the body frame
+    goal: Floats  # final position in metres, shape (3,)
+    in_house: bool  # True if the goal is in the house frame, False if it is in the body frame
     steps: int  # number of control steps
-    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST` of `mjsim.world.body.motion_profiles`
-    gaze: Floats  # point of the house to look at, m, (3,), or NaN, NaN and a pitch, rad
+    order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST`, from `mjsim.world.body.motion_profiles`
+    gaze: Floats  # point (3,) of the house to look at, or NaN, NaN and a pitch in radians
 
 
 @kernel
@@ -104,7 +104,7 @@ def face(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Stand still and turn to a point (3,), m, or to a heading, rad, unless it is NaN. Like `Person.face`."""
+    """Stand still and turn to a point (3,), or to a heading unless it is NaN."""
     body = state.vector[BODY:HANDS]
     for _ in range(max_steps):
         if _turn(body, point, heading, tolerance, motion, model.gait):
@@ -118,7 +118,6 @@ def face(
 def _turn(
     body: Floats, point: Floats, heading: float, tolerance: float, motion: MotionParameters, gait: Gait
 ) -> bool:
-    """Set the commands for the next control step of a turn. Return True if the person stands and faces the goal."""
     towards = math.atan2(point[1] - body[Y], point[0] - body[X]) if math.isnan(heading) else heading
     error = towards - body[HEADING]
     error = (error + math.pi) % (2.0 * math.pi) - math.pi
@@ -189,9 +188,9 @@ def withdraw(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand up and then to its rest posture, in k steps with given object poses (k, n, 7), m and wxyz.
+    """Move a hand up and then to its rest posture, in one control step for each row of object poses (k, n, 7).
 
-    The head looks to `pitch`, rad.
+    Meanwhile, the head moves to `pitch` (radians).
     """
     first = HANDS + 3 * hand
     for k in range(len(poses)):
@@ -210,7 +209,7 @@ def withdraw(
 
 @kernel
 def end(state: KinematicState, trajectory: MotionTrajectory, model: KinematicModel) -> None:
-    """Append the control step that follows a motion, in which the hands move towards their postures."""
+    """Append the control step after a motion, in which the hands move towards their postures."""
     state.vector[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
     control_step(state, CARRY, -1, model)
     _append(trajectory, state)

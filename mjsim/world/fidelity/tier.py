@@ -1,4 +1,4 @@
-"""Interface and bookkeeping of the tiers of fidelity."""
+"""Base class of the levels of fidelity, and the episode state that they share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -69,10 +69,10 @@ class EpisodeState:
     def observation(
         self, time: float, person: Floats, velocity: Floats, objects: tuple[Floats, Floats], *, busy: bool
     ) -> Observation:
-        """Compose an observation.
+        """Create an observation.
 
-        `person` is x, y, yaw and pitch of the head, m and rad, (4,). `velocity` is in the house frame, m/s, (2,).
-        `objects` are origins, m, (n, 3), and orientations wxyz, (n, 4).
+        `person` (4,) is x, y, yaw and pitch of the head. `velocity` (2,) is in the house frame. `objects` are positions
+        (n, 3) and orientations wxyz (n, 4). Lengths are in metres, angles in radians.
         """
         x, y, heading, pitch = person.tolist()
         return Observation(
@@ -119,24 +119,24 @@ class EpisodeState:
 
 
 class Tier(ABC):
-    """A way to advance the person and the objects by control steps."""
+    """A simulation of the person and the objects in control steps. Each level of fidelity has its own subclass."""
 
     episode_state: EpisodeState
 
     @property
     @abstractmethod
     def busy(self) -> bool:
-        """True while a pick or place is under way."""
+        """True during a pick or place."""
 
     @property
     @abstractmethod
     def body(self) -> NDArray[np.float64]:
-        """Copy of the body state, laid out as in `mjsim.world.body.rig`, (BODY_SIZE,)."""
+        """Copy of the body state, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
 
     @property
     @abstractmethod
     def hands(self) -> NDArray[np.float64]:
-        """Positions of the left and the right hand in the body frame, m, a copy of shape (2, 3)."""
+        """Copy of the positions of the left and the right hand in the body frame, in metres, shape (2, 3)."""
 
     @property
     @abstractmethod
@@ -149,7 +149,7 @@ class Tier(ABC):
 
     @abstractmethod
     def answer(self, action: Pick | Place) -> ActionResult:
-        """Return the answer that a pick or place would get now, without changing anything."""
+        """Return the answer that a pick or place would receive now, without changing anything."""
 
     @abstractmethod
     def observation(self) -> Observation:
@@ -157,14 +157,14 @@ class Tier(ABC):
 
     @abstractmethod
     def state_hash(self) -> int:
-        """Return a 64-bit hash of the physics."""
+        """Return a 64-bit hash of the physics state."""
 
     def follow(self, walk: Walk, progress: NDArray[np.float64], limit: int) -> tuple[int, Steps | None]:
         """Walk along a path for up to `limit` control steps, until an event occurs or the walk has to stop.
 
-        A path that is not shown by a display takes one step per call, because the person looks where the path leads
-        and may see other objects. `progress` of a `Walker`, (2,), is updated. Returns the latest phase of the walk, and
-        the steps, or None if the person has already arrived.
+        A path that no display shows takes one step per call, because the person looks along the path and may see other
+        objects. Updates `progress` (2,) of a `Walker`. Returns the latest phase of the walk, and the steps, or None if
+        the person has already arrived.
         """
         arguments, phase, first = plain(walk), WALKING, True
 
@@ -181,7 +181,7 @@ class Tier(ABC):
         return phase, steps
 
     def wait(self, limit: int) -> Steps:
-        """Idle until the pick or place under way ends or an event occurs, or for one control step if there is none."""
+        """Wait until the current pick or place ends or an event occurs. If there is none, wait one control step."""
         busy = self.busy
         steps = self._step_each(lambda _: IDLE if self.busy or not busy else None, limit if busy else 1)
         return cast(Steps, steps)

@@ -1,4 +1,4 @@
-"""Kernels for the contact of the trunk, a disc, with the house: it slides along outlines and never enters them."""
+"""Kernels for contacts between the trunk, a disc, and the house: the trunk slides along outlines."""
 
 import math
 
@@ -9,16 +9,18 @@ from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
 from mjsim.world.body.rig import VX, VY, X, Y
 
-_MAX_STEP = 0.05  # longest step in which a disc of 0.20 m cannot jump over a wall, m
+_MAX_STEP = (
+    0.05  # maximum length of a step, in metres, for which a disc of radius 0.20 m cannot jump over a wall
+)
 _MAX_ROUNDS = 12
-_TOUCHING = 1e-7  # m
+_TOUCHING = 1e-7  # tolerance in metres
 
 
 @kernel
 def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Return True if no outline is within the given distances along x and y."""
     if max(reach_x, reach_y) > radius + MARGIN:
-        return False  # a cell of the grid does not list outlines this far away
+        return False  # A cell of the grid does not list outlines this far away.
     start, end = _near(x, y, floor)
     for entry in range(start, end):
         box = floor.boxes[floor.near[entry]]
@@ -29,7 +31,6 @@ def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, 
 
 @kernel
 def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
-    """Return the first and the last entry of `Floor.near` for the cell of a point."""
     i, j = math.floor((x - floor.origin_x) / CELL), math.floor((y - floor.origin_y) / CELL)
     if not (0 <= i < floor.rows and 0 <= j < floor.columns):
         return 0, 0
@@ -39,7 +40,7 @@ def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
 
 @kernel
 def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
-    """Move the trunk of a body, (BODY_SIZE,), by its velocity for `h` seconds, sliding along outlines."""
+    """Move the trunk of a body (BODY_SIZE,) by its velocity for `h` seconds, sliding along outlines."""
     length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
     parts = 1 + int(length / _MAX_STEP)
     for _ in range(parts):
@@ -48,7 +49,7 @@ def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> N
         body[Y] += body[VY] * (h / parts)
         start, end = _near(x, y, floor)
         if start < end and not _push_out(body, radius, floor, start, end):
-            # Stuck between walls: stay at the previous position.
+            # The trunk is stuck between walls: stay at the previous position.
             body[X], body[Y], body[VX], body[VY] = x, y, 0.0, 0.0
 
 
@@ -85,7 +86,7 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 def gap_to(
     x: float, y: float, edges: NDArray[np.float64], first: int, last: int
 ) -> tuple[float, float, float]:
-    """Return the signed distance of a point to a convex polygon, m, negative inside, and the unit vector away from it.
+    """Return the signed distance from a point to a convex polygon, negative inside, and the unit vector away from it.
 
     `edges` are those of `Floor`, (e, 5), of which the polygon has `first` to `last`, exclusive.
     """

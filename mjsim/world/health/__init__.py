@@ -1,1 +1,1 @@
-"""Health of the physics at every control step: penetration, weld errors, ejections, tunnelling (docs/metrics.md)."""
+"""Health of the physics at every control step: penetration, weld errors, ejections and tunnelling (docs/metrics.md)."""

@@ -13,10 +13,12 @@ from mjsim.values.actions import EventKind
 from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.world.health.settle_times import SettlingObject
 
-CHECK_DISTANCE = 0.02  # distance from its anchor at which the path of an object is checked, m
+CHECK_DISTANCE = (
+    0.02  # The path of an object is checked once the object is this far from its anchor, in metres.
+)
 
-MAX_FLIGHT = 1.0  # largest horizontal distance from the release, m
-_MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # m
+MAX_FLIGHT = 1.0  # maximum horizontal distance from the point of release, in metres
+_MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # range of heights of an object inside the house, in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class AnomalyDetector:
     """Finds and counts ejections and tunnelling of objects.
 
     Attributes:
-        anchors: Centre of each object when its path was last checked, m, shape (n, 3).
+        anchors: Centre of each object when its path was last checked, in metres, shape (n, 3).
         ejections: Number of ejections so far.
         tunnellings: Number of objects so far that passed through something solid.
     """
@@ -48,7 +50,7 @@ class AnomalyDetector:
         self.ejections = self.tunnellings = 0
 
     def move_anchors(self, data: mujoco.MjData) -> None:
-        """Set the anchors to the current state, so that the paths up to it are not checked."""
+        """Move the anchors to the current positions, so that the paths up to there are not checked."""
         self.anchors[:] = data.xipos[self._bodies]
 
     def find(
@@ -58,7 +60,7 @@ class AnomalyDetector:
         settling: Mapping[int, SettlingObject],
         gripped: Collection[int],
     ) -> list[tuple[EventKind, int]]:
-        """Find ejections and tunnelling in this control step. Return each with the index of its object."""
+        """Find ejections and tunnelling in this control step. Return each event with the index of its object."""
         found = []
         self._ejected.difference_update(gripped)
         far = {item for item, release in settling.items() if self._flew_off(data, item, release)}
@@ -92,7 +94,7 @@ class AnomalyDetector:
         return bool(np.hypot(x - release.x, y - release.y) > MAX_FLIGHT)
 
     def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
-        """Return True if a static colliding geom is between the object's anchor and its centre."""
+        """Return True if a static colliding geom is between an object's anchor and its centre."""
         body = int(self._bodies[item])
         start = self.anchors[item]
         path = data.xipos[body] - start

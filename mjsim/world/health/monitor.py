@@ -1,7 +1,7 @@
 """Health monitor: checks warnings, penetration, weld errors, settle times and anomalies after every control step.
 
-docs/metrics.md defines all terms. An invalid state raises a `PhysicsError`. Anything less is counted, and reported as
-an event.
+docs/metrics.md defines all terms. An invalid state raises a `PhysicsError`. All other problems are counted, and
+reported as events.
 """
 
 import math
@@ -23,8 +23,8 @@ from mjsim.world.health.anomalies import CHECK_DISTANCE, AnomalyDetector, Anomal
 from mjsim.world.health.scan import NOT_FINITE, SUSPECT, WARNED, ScanArrays, scan, static_boxes
 from mjsim.world.health.settle_times import SettleTimer, SettleTimerState
 
-_KICK = 2.0  # speed of a light object that bounces off a walking person, as a multiple of the walking speed
-_FALL = 5.6  # speed after a fall from the height at which objects are carried, m/s
+_KICK = 2.0  # maximum speed of a light object kicked by a walking person, as a multiple of the walking speed
+_FALL = 5.6  # speed after a fall from the height at which objects are carried, in m/s
 _NO_GEOMS, _NO_DISTANCES = np.zeros((0, 2), np.int32), np.zeros(0)
 Pair = tuple[float, float]
 NOTHING: Pair = (math.nan, math.nan)
@@ -34,12 +34,12 @@ class HealthSample(NamedTuple):
     """Health of the physics after a control step.
 
     Attributes:
-        penetration_m: Deepest overlap of an object with anything but the person, m. Contacts of the person's foot do
-            not count because it is soft on purpose.
-        trunk_penetration_m: Deepest overlap of the person's trunk with the house, m.
-        weld_error_m: Distance between each hand and the grip in it, m, or NaN if it is empty.
-        weld_error_rad: Angle between each hand and the grip in it, rad, or NaN if it is empty.
-        settle_s: Longest time from release to rest of an object that came to rest in this step, s, or NaN.
+        penetration_m: Deepest overlap of an object with anything except the person, in metres. Contacts of the
+            person's foot do not count, because the foot is soft on purpose.
+        trunk_penetration_m: Deepest overlap of the person's trunk with the house, in metres.
+        weld_error_m: Distance in metres between each hand and the grip in it, or NaN for an empty hand.
+        weld_error_rad: Angle in radians between each hand and the grip in it, or NaN for an empty hand.
+        settle_s: Longest settle time in seconds of an object that came to rest in this step, or NaN if none did.
     """
 
     penetration_m: float = 0.0
@@ -50,7 +50,7 @@ class HealthSample(NamedTuple):
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The seven numbers in the order of the attributes, left hand before right."""
+        """The seven numbers in the order of the attributes, the left hand before the right."""
         overlaps = (self.penetration_m, self.trunk_penetration_m)
         return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
 
@@ -60,8 +60,8 @@ class Health:
     """Extremes and counts since the last reset.
 
     Attributes:
-        settle_times: Times from each release to rest, s, in order.
-        ejections: Number of objects that flew off, left the house, or were faster than falls and kicks can make them.
+        settle_times: Times in seconds from each release to rest, in order.
+        ejections: Number of objects that flew off, left the house, or moved faster than falls and kicks allow.
         tunnellings: Number of objects that passed through something solid.
         warnings: Number of MuJoCo warnings. Any warning ends the simulation with a `PhysicsError`.
     """
@@ -80,16 +80,16 @@ class Health:
 class HealthState:
     """State of a `HealthMonitor`."""
 
-    # Deepest overlap of an object and of the trunk, m, and largest weld errors, m and rad, shape (4,)
+    # Maximum overlaps of objects and of the trunk (metres), and weld errors (metres and radians), shape (4,).
     extremes: NDArray[np.float64]
     settle_times: tuple[float, ...]  # see `Health.settle_times`
-    sample: HealthSample  # latest control step
+    sample: HealthSample  # health after the latest control step
     anomalies: AnomalyState
     settling: SettleTimerState
 
 
 class HealthMonitor:
-    """Accumulates `Health` over control steps.
+    """Monitor that accumulates `Health` over control steps.
 
     Attributes:
         sample: Health after the latest control step.
@@ -137,7 +137,7 @@ class HealthMonitor:
         self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Include the latest control step. Return ejections and tunnelling, each with the index of its object.
+        """Process the latest control step. Return ejections and tunnelling, each with the index of its object.
 
         Raises:
             PhysicsError: MuJoCo warned, or a position or velocity is not finite.
@@ -188,10 +188,9 @@ class HealthMonitor:
         )
 
     def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
-        """Scan the control step and update sample and flags. Return True if an ejection or tunnelling is possible."""
         geoms, distances = _NO_GEOMS, _NO_DISTANCES
         if data.ncon:
-            # Contiguous copies, because kernels are compiled for a layout, which varies with the number of contacts
+            # Copy to contiguous arrays: kernels are compiled per layout, which varies with the number of contacts.
             geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
         found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
         if found == WARNED:

@@ -1,4 +1,4 @@
-"""A numba kernel that scans the state, objects, hands and contacts once after a control step."""
+"""A Numba kernel that scans the state, objects, hands and contacts after each control step."""
 
 import math
 from typing import Any, NamedTuple
@@ -16,18 +16,18 @@ from mjsim.world.body.grips import site_angle, site_gap
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-OUTSIDE = 0.3  # distance from the rooms that is still inside, because doorways are between rooms, m
+OUTSIDE = 0.3  # Positions up to this far from the rooms count as inside, in metres, because doorways are between rooms.
 
-_TOLERANCE = 1e-6  # m
+_TOLERANCE = 1e-6  # in metres
 
-# Results of a scan
+# Results of a scan.
 NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
-# Flags of an object: far from its anchor, fast, slow, and touched by the person's foot (see `ScanArrays.limits`)
+# Flags of an object: far from its anchor, fast, slow, or touched by the person's foot. See `ScanArrays.limits`.
 DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
 
 
 def static_boxes(scene: Scene) -> Floats:
-    """Return the lowest and highest corner of a box around each colliding geom of the house, m, (k, 6)."""
+    """Return the minimum and maximum corner of a box around each colliding geom of the house, shape (k, 6)."""
     return compiled_house(scene.catalogue).cached(("static boxes",), lambda: _static_boxes(scene.model))
 
 
@@ -43,39 +43,41 @@ def _static_boxes(model: mujoco.MjModel) -> Floats:
 
 
 class ScanArrays(NamedTuple):
-    """Inputs and outputs of scans of a simulation: views of its state, its model, and the results."""
+    """Inputs and outputs of scans: views of a simulation's state and model, and the results."""
 
-    qpos: Floats  # positions, (nq,)
-    qvel: Floats  # velocities, (nv,)
-    xipos: Floats  # centres of mass of all bodies, m, (nbody, 3)
-    site_xpos: Floats  # positions of all sites, m, (nsite, 3)
-    site_xmat: Floats  # frames of all sites, (nsite, 9)
-    warnings: Ints  # number of MuJoCo's warnings by kind, (nwarning,)
-    bodies: Ints  # body of each object, (n,)
-    dofs: Ints  # first degree of freedom of each object, (n,)
-    geom_owner: Ints  # object of each geom, or -1, (ngeom,)
+    qpos: Floats  # generalized positions, shape (nq,)
+    qvel: Floats  # generalized velocities, shape (nv,)
+    xipos: Floats  # centres of mass of all bodies in metres, shape (nbody, 3)
+    site_xpos: Floats  # positions of all sites in metres, shape (nsite, 3)
+    site_xmat: Floats  # orientations of all sites, shape (nsite, 9)
+    warnings: Ints  # number of MuJoCo warnings by type, shape (nwarning,)
+    bodies: Ints  # body id of each object, shape (n,)
+    dofs: Ints  # first degree of freedom of each object, shape (n,)
+    geom_owner: Ints  # object index of each geom, or -1, shape (ngeom,)
     trunk: int  # geoms of the person
     foot: int
-    # Squares of three limits: distance from the anchor beyond which an object is `DISPLACED`, m, speed beyond which
-    # it is `FAST`, and speed below which it is `SLOW`, m/s, (3,)
+    # Squares of three limits, shape (3,): distance from the anchor (metres) beyond which an object is `DISPLACED`,
+    # speed (m/s) above which it is `FAST`, and speed (m/s) below which it is `SLOW`.
     limits: Floats
-    boxes: Floats  # `static_boxes`
-    rooms: tuple[Floats, Floats, Floats]  # `RoomMap.rectangles`
-    grip_sites: NDArray[np.intp]  # `Grips.sites`
-    anchors: Floats  # `AnomalyDetector.anchors`, moved along if `boxes` show that the path is clear
-    flags: NDArray[np.uint8]  # flags of each object, (n,), overwritten
-    # Deepest overlap of an object with anything but the person, and of the trunk with the house, m, at least 0. Weld
-    # errors of the left and the right hand, m and then rad, or NaN for an empty hand. (6,), overwritten
+    boxes: Floats  # result of `static_boxes`
+    rooms: tuple[Floats, Floats, Floats]  # see `RoomMap.rectangles`
+    grip_sites: NDArray[np.intp]  # see `Grips.sites`
+    anchors: (
+        Floats  # see `AnomalyDetector.anchors`; an anchor moves along if `boxes` show that the path is clear
+    )
+    flags: NDArray[np.uint8]  # output: flags of each object, shape (n,)
+    # Output, shape (6,): both overlaps of a `HealthSample`, at least 0, then its weld errors in metres and in radians.
     sample: Floats
-    extremes: Floats  # largest overlaps and weld errors of either hand so far, m, m, m and rad, (4,), updated
+    # Updated: largest overlaps (metres) and weld errors (metres and radians) so far, shape (4,).
+    extremes: Floats
 
 
 @kernel
 def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
     """Scan the state, objects, hands and contacts. Return `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
 
-    `fields` are those of `ScanArrays` as a plain tuple, which numba unpacks in half the time. `geoms` (ncon, 2) and
-    `distances` (ncon,), m, are those of contacts. `left` and `right` are True for hands that hold an object.
+    `fields` are those of `ScanArrays` as a plain tuple, which Numba unpacks in half the time. `geoms` (ncon, 2) and
+    `distances` (ncon,), in metres, are those of the contacts. `left` and `right` are True if the hand holds an object.
     """
     arrays = ScanArrays(*fields)
     for count in arrays.warnings:
@@ -98,7 +100,7 @@ def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -
             sample[4 + hand] = site_angle(arrays.site_xmat, sites[hand, 0], sites[hand, 1])
     for k in range(6):
         extreme = k if k < 2 else k // 2 + 1
-        if sample[k] > arrays.extremes[extreme]:  # False for NaN
+        if sample[k] > arrays.extremes[extreme]:  # NaN compares as False
             arrays.extremes[extreme] = sample[k]
     return state
 
@@ -130,7 +132,7 @@ def _flag_objects(arrays: ScanArrays) -> int:
 
 @kernel
 def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
-    """Return True if the box around two points (3,), m, overlaps none of the boxes."""
+    """Return True if the bounding box of two points (3,) overlaps none of the boxes."""
     low_x, high_x = min(start[0], end[0]), max(start[0], end[0])
     low_y, high_y = min(start[1], end[1]), max(start[1], end[1])
     low_z, high_z = min(start[2], end[2]), max(start[2], end[2])
@@ -146,7 +148,6 @@ def is_path_clear(start: Floats, end: Floats, boxes: Floats) -> bool:
 
 @kernel
 def _overlaps(arrays: ScanArrays, geoms: Ints, distances: Floats) -> tuple[float, float]:
-    """Return the deepest overlap of an object and of the trunk, m, and flag objects that the foot touches."""
     trunk, foot, owner = arrays.trunk, arrays.foot, arrays.geom_owner
     deepest = deepest_trunk = 0.0
     for c in range(len(distances)):

@@ -16,11 +16,11 @@ from mjsim.world.health.scan import PUSHED, SLOW
 class SettlingObject:
     """An object between its release and rest."""
 
-    time: float  # time at which a hand last held it, s
-    x: float  # position of its centre at that time, m
+    time: float  # time at which a hand last held the object, in seconds
+    x: float  # position of the object's centre at that time, in metres
     y: float
-    still_steps: int = 0  # number of consecutive control steps for which it has been slow or asleep
-    still_since: float = 0.0  # time at the end of the first of these steps, s
+    still_steps: int = 0  # number of consecutive control steps in which the object has been slow or asleep
+    still_since: float = 0.0  # time at the end of the first of these steps, in seconds
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class SettleTimerState:
     objects: tuple[
         tuple[int, SettlingObject], ...
     ]  # index and state of released objects that are not at rest
-    # Index of each held object, when it was last seen in the hand, s, and position of its centre then, m, (3,)
+    # Index of each held object, when it was last in the hand, and where its centre (3,) was at that time.
     gripped: tuple[tuple[int, float, list[float]], ...]
 
 
 class SettleTimer:
-    """Tracks objects from release until they rest, a hand grips them again, or the person's foot pushes them."""
+    """Tracks objects from release until they rest, are gripped again, or are pushed by the person's foot."""
 
     def __init__(self, scene: Scene) -> None:
         self._bodies, self._trees = scene.index.bodies.tolist(), scene.index.trees
@@ -43,10 +43,12 @@ class SettleTimer:
 
     def reset(self) -> None:
         self.objects: dict[int, SettlingObject] = {}
-        self._gripped: dict[int, tuple[float, list[float]]] = {}  # latest time and position in a hand
+        self._gripped: dict[
+            int, tuple[float, list[float]]
+        ] = {}  # latest time and position in a hand, by object
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
-        """Return the settle times, s, of objects that came to rest in this step. `gripped` are the objects in hands."""
+        """Return the settle times in seconds of objects that came to rest. Objects in `gripped` are in hands."""
         if not (gripped or self._gripped or self.objects):
             return []
         for item, (last, (x, y, _)) in self._gripped.items():

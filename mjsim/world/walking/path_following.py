@@ -1,6 +1,6 @@
 """Kernels for walking along a polyline, one control step at a time.
 
-All tiers of fidelity run the same kernels, one or many steps per call, so results are bit-identical.
+All levels of fidelity run the same kernels, one or many steps per call, so results are bit-identical.
 """
 
 import math
@@ -23,22 +23,23 @@ from mjsim.world.walking.polyline import (
     rest_of,
 )
 
-ARRIVED_WITHIN = 0.06  # distance from the end of a path at which a walk ends, m
+ARRIVED_WITHIN = 0.06  # A walk ends at this distance from the end of its path, in metres.
 
 WALKING, TURNING, ARRIVED, BLOCKED, CHANGED = range(5)  # phases of a walk
-SHORTEST_LEFT, SINCE = range(2)  # indices of progress: shortest remaining distance so far, m, and its time, s
+# Indices into `progress`: shortest remaining distance so far (metres), and when it was reached (seconds)
+SHORTEST_LEFT, SINCE = range(2)
 
 Floats = NDArray[np.float64]
 
 
 class Pace(NamedTuple):
-    """Speeds and clearances of a person who walks."""
+    """Speeds and clearances of a walking person."""
 
-    speed: float  # preferred speed, m/s
-    braking: float  # planned deceleration, m/s^2
-    turning_speed: float  # fastest turn, rad/s
-    clearance: float  # distance kept from the middle of objects on the floor, m
-    patience: float  # time without progress after which the person is blocked, s
+    speed: float  # preferred speed in m/s
+    braking: float  # planned deceleration in m/s^2
+    turning_speed: float  # maximum turning speed in rad/s
+    clearance: float  # distance kept from the centre of objects on the floor, in metres
+    patience: float  # time without progress after which the person counts as blocked, in seconds
     walking: WalkingParameters
 
     @classmethod
@@ -52,14 +53,14 @@ class Pace(NamedTuple):
 class Obstacles(NamedTuple):
     """Objects and walls that a walking person avoids."""
 
-    positions: Floats  # positions of all objects, m, (n, 2 or more)
-    is_loose: NDArray[np.bool_]  # True for objects on the floor, (n,)
+    positions: Floats  # positions of all objects in metres, shape (n, 2) or wider
+    is_loose: NDArray[np.bool_]  # True for objects on the floor, shape (n,)
     target: int  # index of the object to pick or place, which is not an obstacle, or -1
-    walls: Floats  # edges x, y, x, y of the navigable floor, m, (e, 4)
+    walls: Floats  # edges (x, y, x, y) of the navigable floor in metres, shape (e, 4)
 
 
 class Walk(NamedTuple):
-    """`FollowPath` for kernels, with the person's pace and the obstacles."""
+    """A `FollowPath` action for kernels, with the person's pace and the obstacles."""
 
     path: Floats
     goal: tuple[float, float]
@@ -73,7 +74,7 @@ class Walk(NamedTuple):
 
 @kernel
 def wrap_angle(angle: float) -> float:
-    """Wrap an angle, rad, to [-pi, pi)."""
+    """Wrap an angle in radians to [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -81,7 +82,7 @@ def wrap_angle(angle: float) -> float:
 def turn_towards(
     heading: float, x: float, y: float, to_x: float, to_y: float, pace: Pace
 ) -> tuple[float, float]:
-    """Return the yaw rate, rad/s, for turning `heading` towards a point, and the remaining angle, rad."""
+    """Return the yaw rate (rad/s) for turning `heading` towards a point, and the remaining angle (rad)."""
     error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
     fastest = pace.turning_speed
     return min(max(pace.walking.turn_gain * error, -fastest), fastest), error
@@ -89,7 +90,7 @@ def turn_towards(
 
 @kernel
 def is_free(x: float, y: float, walls: Floats) -> bool:
-    """Return True if (x, y) is inside the outline of the navigable floor, m, (e, 4), or if there is no outline."""
+    """Return True if (x, y) is inside the outline of the navigable floor (e, 4), or if there is no outline."""
     inside = len(walls) == 0
     for k in range(len(walls)):
         if (walls[k, 1] > y) != (walls[k, 3] > y):
@@ -108,12 +109,12 @@ def sidestep(
     obstacles: Obstacles,
     pace: Pace,
 ) -> tuple[float, float]:
-    """Return the point to walk to, m, instead of straight to `target`, in order to pass objects on the floor.
+    """Return the point to walk to instead of `target`, in order to walk around objects on the floor.
 
-    The person at x, y, m, passes the nearest object ahead on its free side. If that side is blocked, the person
-    takes the other one unless it needs a detour, and otherwise walks straight over the object. `beyond`, a point
-    farther along the path, m, determines which object is in the way and on which side. It keeps the person on that side
-    because it is behind the object.
+    The person at (x, y) passes the nearest object ahead on its free side. If that side is blocked, the person takes the
+    other side unless it needs a detour, and otherwise walks straight over the object. `beyond`, a point farther along
+    the path, determines which object is in the way and on which side to pass it. Because `beyond` is behind the object,
+    the person does not change sides while passing it. All points are in metres.
     """
     clearance, walking = pace.clearance, pace.walking
     reach = distance(x, y, beyond[0], beyond[1])
@@ -151,11 +152,11 @@ def sidestep(
 def follow(
     path: Path, x: float, y: float, heading: float, obstacles: Obstacles, pace: Pace
 ) -> tuple[float, float, float]:
-    """Walk one control step along `path`, to its end. Return velocities forward and left, m/s, and yaw rate, rad/s.
+    """Walk one control step along `path`. Return velocities forward and left (m/s), and the yaw rate (rad/s).
 
-    The body turns towards the look-ahead point and walks straight to it, so it stays on the path at corners and while
-    it turns. The speed decreases with the remaining angle and the remaining distance. The path is (k, 2), k >= 1, m,
-    and the person at x, y, m, has a `heading`, rad.
+    The body turns towards the look-ahead point and walks straight to it, so that the person stays on the path at
+    corners and during turns. The speed decreases with the remaining angle and the remaining distance. The path has
+    shape (k, 2), k >= 1. Lengths are in metres, angles in radians.
     """
     arc, gap = project(path, x, y)
     left = max(path_length(path) - arc, 0.0) + gap
@@ -169,7 +170,7 @@ def follow(
 
 @kernel
 def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats, pace: Pace) -> bool:
-    """Return True if the remaining distance decreased within the person's patience. Updates `progress`, (2,)."""
+    """Return True if the remaining distance decreased within the person's patience. Updates `progress` (2,)."""
     arc, gap = project(path, x, y)
     left = path_length(path) - arc + gap
     if left < progress[SHORTEST_LEFT] - pace.walking.least_progress or left > progress[SHORTEST_LEFT] + 1.0:
@@ -182,9 +183,10 @@ def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floa
 def next_step(
     walk: Walk, x: float, y: float, heading: float, time: float, progress: Floats
 ) -> tuple[int, float, float, float]:
-    """Compute the next control step of a walk from x, y, m, with a `heading`, rad, at `time`, s.
+    """Compute the next control step of a walk.
 
-    Updates `progress` (2,). Returns the phase of the walk, velocities forward and left, m/s, and the yaw rate, rad/s.
+    `x` and `y` are in metres, `heading` in radians, `time` in seconds. Updates `progress` (2,). Returns the phase of
+    the walk, velocities forward and left (m/s), and the yaw rate (rad/s).
     """
     path = rest_of(walk.path, x, y) if walk.shown else walk.path
     at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
@@ -202,7 +204,7 @@ def next_step(
 def later_step(
     walk: Walk, x: float, y: float, heading: float, time: float, progress: Floats
 ) -> tuple[int, float, float, float]:
-    """Like `next_step`, for all but the first step. Return `CHANGED` if the person has left the path or is blocked."""
+    """Compute a control step after the first one. Return `CHANGED` if the person has left the path or is blocked."""
     if project(walk.path, x, y)[1] > walk.tolerance:
         return CHANGED, 0.0, 0.0, 0.0
     step = next_step(walk, x, y, heading, time, progress)
@@ -215,7 +217,8 @@ def step_from_python(
 ) -> tuple[int, float, float, float]:  # fmt: skip
     """Call `next_step` or `later_step`. Return `CHANGED` also if a loose object has moved since the walk was planned.
 
-    `walk` is from `plain`, as numba unpacks plain tuples in half the time. `places` (n, 3), m, are object positions.
+    `walk` is a result of `plain`, because Numba unpacks plain tuples in half the time. `places` (n, 3) are the current
+    object positions in metres.
     """
     path, goal, stop_distance, face_goal, shown, tolerance, pace, obstacles = walk
     speed, braking, turning_speed, clearance, patience, walking = pace
@@ -233,6 +236,6 @@ def step_from_python(
 
 
 def plain(walk: Walk) -> Any:
-    """Convert the named tuples of a walk to plain tuples, which `step_from_python` takes."""
+    """Convert the named tuples of a walk to plain tuples, as required by `step_from_python`."""
     pace = (*walk.pace[:-1], tuple(walk.pace.walking))
     return (*walk[:-2], pace, tuple(walk.obstacles))

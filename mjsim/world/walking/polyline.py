@@ -1,6 +1,6 @@
 """Kernels for polylines on the floor: lengths, projections and remainders.
 
-Points are passed as two numbers, polylines as arrays (k, 2), k >= 1, in m.
+A point is passed as two numbers, a polyline as an array (k, 2) with k >= 1, all in metres.
 """
 
 import math
@@ -12,7 +12,7 @@ from mjsim.support.kernels import kernel
 
 Path = NDArray[np.float64]
 
-AT_THE_END = 1e-9  # distances below this count as zero, m
+AT_THE_END = 1e-9  # Smaller distances count as zero, in metres.
 
 
 @kernel
@@ -22,7 +22,7 @@ def distance(x: float, y: float, to_x: float, to_y: float) -> float:
 
 @kernel
 def project(path: Path, x: float, y: float) -> tuple[float, float]:
-    """Return the arc length of the point of `path` nearest to (x, y), and the distance to it, both m."""
+    """Return the arc length in metres at the point of `path` nearest to (x, y), and the distance to that point."""
     nearest_arc, nearest_gap = 0.0, distance(x, y, path[0, 0], path[0, 1])
     arc = 0.0
     for k in range(len(path) - 1):
@@ -40,7 +40,7 @@ def project(path: Path, x: float, y: float) -> tuple[float, float]:
 
 @kernel
 def path_length(path: Path) -> float:
-    """Length of a polyline, m."""
+    """Return the length of a polyline in metres."""
     arc = 0.0
     for k in range(len(path) - 1):
         arc += distance(path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
@@ -49,7 +49,7 @@ def path_length(path: Path) -> float:
 
 @kernel
 def point_along(path: Path, arc: float) -> tuple[float, float]:
-    """Return the point of `path` at an arc length, m, clamped to its ends."""
+    """Return the point of `path` at an arc length in metres, clamped to the ends of the path."""
     passed = 0.0
     if arc <= 0.0:
         return path[0, 0], path[0, 1]
@@ -65,7 +65,7 @@ def point_along(path: Path, arc: float) -> tuple[float, float]:
 
 @kernel
 def rest_of(path: Path, x: float, y: float) -> Path:
-    """Return the part of `path` after its point nearest to (x, y), m, (k, 2)."""
+    """Return the part of `path` after its point nearest to (x, y), shape (k, 2)."""
     arc, _ = project(path, x, y)
     if path_length(path) - arc < AT_THE_END:
         return path[-1:].copy()
@@ -81,7 +81,7 @@ def rest_of(path: Path, x: float, y: float) -> Path:
 
 @kernel
 def first_off_path(path: Path, positions: NDArray[np.float64], first: int, gap: float) -> int:
-    """Return the index of the first position (n, 2), at `first` or later, more than `gap` m from `path`, or -1."""
+    """Return the index, from `first` on, of the first position (n, 2) more than `gap` metres off `path`, or -1."""
     for k in range(first, len(positions)):
         if project(path, positions[k, 0], positions[k, 1])[1] > gap:
             return k

@@ -1,4 +1,4 @@
-"""State of a walk between actions: its progress, and backing off if it is blocked."""
+"""State of a walk between actions: its progress, and stepping back if it is blocked."""
 
 import math
 
@@ -19,14 +19,15 @@ from mjsim.world.walking.path_following import (
 )
 
 BACK_OFF = Move(forward=-0.4, left=0.3)
-BACK_OFF_TIME = 0.6  # s
+BACK_OFF_TIME = 0.6  # in seconds
 
 
 class Walker:
     """Executes `FollowPath` actions, one after the other.
 
-    A walk to another pick or place starts again. A walk without one continues the previous walk. `walls` are the edges
-    x, y, x, y of the floor on which the person may walk around objects, m, (e, 4), or empty for the whole floor.
+    A walk to another pick or place starts again. A walk without one continues the previous walk. `walls` (e, 4) are the
+    edges (x, y, x, y), in metres, of the floor on which the person may walk around objects. Without edges, the whole
+    floor is available.
     """
 
     def __init__(self, person: PersonParameters, walls: NDArray[np.float64]) -> None:
@@ -44,8 +45,8 @@ class Walker:
     def walk(self, action: FollowPath, seen: Observation) -> Walk | None:
         """Return the walk for kernels, or None while the person backs off.
 
-        A person backs off only on the way to a pick or place. A participant that is blocked elsewhere takes another
-        path at once.
+        A person backs off only on the way to a pick or place. A participant that is blocked elsewhere chooses another
+        path immediately.
         """
         if action.then is not None and action.then != self._visit:
             self._visit = action.then
@@ -66,7 +67,7 @@ class Walker:
         )
 
     def record(self, phase: int, time: float) -> None:
-        """Record the phase that a walk's first control step returned. The step started at `time`, s."""
+        """Record the phase that the first control step of a walk returned. The step started at `time` seconds."""
         self.blocked = phase == BLOCKED
         if self.blocked:
             self._back_off_until = time + BACK_OFF_TIME
