@@ -1,4 +1,4 @@
-"""A live trial in a browser: server, worker processes, client, and pages that show recorded runs.
+"""Live trials in a browser: server, worker processes, client, and pages that show recorded runs.
 
-It serves visits of `mjsim play` and of studies, and imports neither.
+The package serves `mjsim play` and studies, but imports neither.
 """

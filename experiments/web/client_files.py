@@ -1,4 +1,4 @@
-"""Files and pages that browsers load: the client, scenes, and rendered templates."""
+"""Files and pages for browsers: the client, scenes and rendered templates."""
 
 import functools
 import gzip
@@ -22,14 +22,14 @@ CLIENT = Path(__file__).parent / "client"
 STATIC = CLIENT / "static"
 _IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
 IMMUTABLE = "public, max-age=31536000, immutable"
-CHECKED = "no-cache"  # revalidated by ETag
+CHECKED = "no-cache"  # browsers may cache the file but must revalidate it
 SCENE_HEADERS = {"Cache-Control": IMMUTABLE, "Vary": "Accept-Encoding"}
 _MEDIA_TYPES = {".glb": "model/gltf-binary", ".json": "application/json", ".webp": "image/webp"}
 _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
 def modules_of(entry: str) -> Mapping[str, str]:
-    """Return a module and all modules that it imports: sources by path, with imports rewritten to these paths."""
+    """Return the sources of a module and its imports by path. Import statements are rewritten to these paths."""
     found: dict[str, str] = {}
     waiting = [entry]
     while waiting:
@@ -42,8 +42,6 @@ def modules_of(entry: str) -> Mapping[str, str]:
 
 
 def _named_from(path: str, needs: list[str]) -> Callable[[re.Match[str]], str]:
-    """Return a function for `re.sub` that turns relative imports into paths and appends them to `needs`."""
-
     def named(match: re.Match[str]) -> str:
         target = ((STATIC / path).parent / match[2]).resolve()
         needs.append(target.relative_to(STATIC.resolve()).as_posix())
@@ -61,25 +59,25 @@ def _folder() -> str:
 
 
 def static_url(name: str) -> str:
-    """Return the URL of a file, in a folder named after the hash of all files."""
+    """Return the URL of a static file. Its folder is named after the hash of all files."""
     return f"{_folder()}/{name}"
 
 
 def static_routes() -> Sequence[Mount]:
-    """Serve the files at their URLs, and also at `/static/NAME`, whose URLs never change."""
+    """Serve static files at their URLs, and also at `/static/NAME`, which never changes."""
     files = GZipMiddleware(StaticFiles(directory=STATIC))
     return [Mount(_folder(), files), Mount("/static", files)]
 
 
 def static_caching(path: str) -> str | None:
-    """Return the `Cache-Control` header of a file's URL, or None for other paths."""
+    """Return the `Cache-Control` header for the URL of a static file, or None for other URLs."""
     if path.startswith(f"{_folder()}/"):
         return IMMUTABLE
     return CHECKED if path.startswith("/static/") else None
 
 
 def scene_route(folder: Path) -> Route:
-    """Serve the scenes in a folder written by `mjsim.formats.gltf.cache`. No token is needed."""
+    """Serve scenes from a folder that `mjsim.formats.gltf.cache` has written. No token is required."""
 
     def serve(request: Request) -> Response:
         scene, name = request.path_params["hash"], request.path_params["name"]
@@ -115,7 +113,7 @@ def _duration(seconds: float) -> str:
 
 @functools.cache
 def _modules(entry: str) -> tuple[str, ...]:
-    """Return the paths of a page's modules, which the browser can preload in parallel."""
+    """Return the paths of all modules that a page needs, so that the browser can preload them in parallel."""
     return tuple(modules_of(entry))
 
 
@@ -123,14 +121,13 @@ _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters.update(duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
-_templates.env.auto_reload = False  # do not check for a changed file on each request
+_templates.env.auto_reload = False  # do not check the template files on each request
 
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
-    """Render the template with this name."""
     return _templates.TemplateResponse(request, f"{name}.html", values, status)
 
 
 def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Select the trial page's texts from the sections of a language. Return them by name."""
+    """Return the texts of the trial page, by name. `sections` holds all texts of a language."""
     return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -1,7 +1,7 @@
-"""Converts a person's inputs into one action per control step.
+"""Conversion of a participant's inputs to one action per control step.
 
 A control step handles all inputs since the previous one, so that a short tap between two steps counts. The mouse sets a
-target angle, which body and head follow within their limits.
+target angle, which the body and head follow within their speed limits.
 """
 
 import math
@@ -18,31 +18,31 @@ from mjsim.values.person_parameters import PersonParameters
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # fraction of the maximum speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # radians
 Press = Literal["act", "left hand", "right hand"]
-MAX_PITCH = 1.2  # largest pitch set by the mouse, in radians
-MAX_PRESSES = 8  # maximum number of pending presses
-PRESS_LIFE = 0.5  # age after which a pending press is dropped, in seconds
-MAX_TURN_AHEAD = 2.8  # largest angle between the mouse's target and the body, in radians
+MAX_PITCH = 1.2  # maximum pitch that can be set with the mouse, in radians
+MAX_PRESSES = 8  # maximum number of queued key presses
+PRESS_LIFE = 0.5  # time after which a queued key press is dropped, in seconds
+MAX_TURN_AHEAD = 2.8  # maximum angle by which the mouse's target may be ahead of the body, in radians
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A change of the keyboard, mouse, gamepad or touch screen."""
 
-    # consecutive number, from 1
+    # number of the input, counted from 1
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-    # control step in which the input takes effect; None or a past step means the next one
+    # control step in which the input takes effect; if None or in the past, the next one
     step: Annotated[int, msgspec.Meta(ge=0, le=2**53)] | None = None
-    forward: Share = 0.0  # held: walking speed, negative to walk back
-    left: Share = 0.0  # held: speed to the left
-    turn: Share = 0.0  # held: turning speed to the left
-    look: Share = 0.0  # held: looking speed upwards
-    yaw: Angle = 0.0  # added to the target heading, in radians, counter-clockwise
-    pitch: Angle = 0.0  # added to the target pitch, in radians, upwards
-    press: Press | None = None  # key press: the action key, or the key of a hand
-    # rows to scroll the task list, positive towards its end
+    forward: Share = 0.0  # walking speed while held; negative values walk backwards
+    left: Share = 0.0  # speed to the left while held
+    turn: Share = 0.0  # turning speed to the left while held
+    look: Share = 0.0  # upward looking speed while held
+    yaw: Angle = 0.0  # change of the target heading, in radians, counter-clockwise
+    pitch: Angle = 0.0  # change of the target pitch, in radians, upwards
+    press: Press | None = None  # pressed key: the action key or the key of a hand
+    # number of rows to scroll the task list, positive towards its end
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
     def at_rest(self) -> "Input":
-        """Return the part of the input that counts while the clock is paused."""
+        """Return a copy with only the changes that take effect while the clock is paused."""
         return Input(number=self.number, scroll=self.scroll)
 
 
@@ -51,7 +51,7 @@ Answer = Callable[[Pick | Place], ActionResult]
 
 @dataclass(frozen=True)
 class Controls:
-    """Latest input, target angles of the mouse (radians or None), and pending presses with their age in seconds."""
+    """Latest input, target angles of the mouse in radians, and queued key presses with their ages in seconds."""
 
     held: Input | None = None
     heading: float | None = None
@@ -59,7 +59,6 @@ class Controls:
     presses: tuple[tuple[Press, float], ...] = ()
 
     def take(self, inputs: Sequence[Input], seen: Observation) -> "Controls":
-        """Return the controls after further inputs."""
         heading, pitch = self.heading, self.pitch
         for new in inputs:
             if new.yaw:
@@ -82,11 +81,12 @@ def control_step(
     person: PersonParameters,
     duration: float,
 ) -> tuple[Action, Controls]:
-    """Return the action of a control step of `duration` seconds, and the controls after it.
+    """Return the action of a control step that lasts `duration` seconds, and the updated controls.
 
-    The action key places an object if one belongs into a receptacle in reach. Otherwise it picks the nearest object in
-    reach. The key of a hand places the object in that hand, or picks if it is empty. Impossible actions are attempted
-    too, so that the message bar shows the reason. `answer` returns the world's answer to a pick or place.
+    The action key places a held object if its receptacle is within reach. Otherwise it picks up the nearest object
+    within reach. The key of a hand places the object in that hand, or picks up an object if the hand is empty.
+    Impossible actions are also attempted, so that the message bar can show the reason. `answer` returns the world's
+    answer to a pick or place.
     """
     controls = before.take(inputs, seen)
     if not controls.presses:
@@ -104,7 +104,7 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
 
 
 def act(answer: Answer) -> Pick | Place:
-    """Return the action of the action key: a place if possible, otherwise a pick."""
+    """Return a place if possible, otherwise a pick."""
     place = answer(Place())
     at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
     if place.applied or (at_another_receptacle and not answer(Pick()).applied):
@@ -115,14 +115,14 @@ def act(answer: Answer) -> Pick | Place:
 def _move(
     controls: Controls, inputs: Sequence[Input], seen: Observation, person: PersonParameters, duration: float
 ) -> Move:
-    """Return the move at the highest speeds requested since the previous step, turning to the mouse's target."""
+    """Return the move with the highest speeds requested since the previous step, turning to the mouse's target."""
     asked = inputs if controls.held is None else (*inputs, controls.held)
 
     def fastest(name: str) -> float:
         return max((float(getattr(new, name)) for new in asked), key=abs, default=0.0)
 
     forward, left = fastest("forward"), fastest("left")
-    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # walking diagonally is not faster
+    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # diagonal walking is not faster
     turn, look = fastest("turn") * person.turning_speed, fastest("look") * person.looking_speed
     if controls.heading is not None and not turn:
         turn = _rate(_gap(controls.heading, seen.heading) / duration, person.turning_speed)

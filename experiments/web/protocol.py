@@ -1,7 +1,7 @@
 """Messages between browser, server and worker (docs/protocol.md).
 
-A message is an object whose `type` is the tag of its class. Messages between browser and server are JSON, except
-binary frames. Messages between server and worker are MessagePack. The server forwards most of them.
+A message is an object whose `type` is the tag of its class. Messages between browser and server are JSON, except binary
+frames. Messages between server and worker are MessagePack. The server forwards most messages.
 """
 
 import struct
@@ -22,22 +22,22 @@ from experiments.web.state import (
     WireMessage,
 )
 
-HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable with the house that the fork server preloads
-VERSION = 1  # version of the header of frames
-MAX_TEXT = 64 * 1024  # maximum size of a message from the browser, in bytes
-MAX_INPUTS = 64  # maximum number of inputs per message
+HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable that names the house to preload
+VERSION = 1  # version of the frame header
+MAX_TEXT = 64 * 1024  # maximum size of a message from a browser, in bytes
+MAX_INPUTS = 64  # maximum number of inputs in a message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
-LENGTH = struct.Struct("!I")  # length prefix of messages between server and worker, in bytes
+LENGTH = struct.Struct("!I")  # length prefix of a message between server and worker
 CODECS = {"jpeg": 1, "h264": 2}
 BEAT_PERIOD = 0.5  # time between heartbeats, in seconds
 MAX_SILENCE = 1.0  # silence after which the connection is considered lost, in seconds
-MAX_STEPS_AHEAD = 25  # how far inputs and promises may be ahead of the last step, in control steps
-DISPLAY_PERIOD = 5.0  # time between `display` messages, in seconds
+MAX_STEPS_AHEAD = 25  # maximum lead of inputs and promises over the last step taken, in control steps
+DISPLAY_PERIOD = 5.0  # interval between `display` messages, in seconds
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSocket close codes
 
 Codec = Literal["jpeg", "h264", "none"]
-Drawer = Literal["browser", "server"]  # where the view is drawn
+Drawer = Literal["browser", "server"]  # program that draws the view
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # pixels
@@ -47,9 +47,9 @@ Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 
 
 class View(WireMessage, frozen=True):
-    """View requested by a page: size in CSS pixels, and the codec of frames. The codec is `none` if the page draws.
+    """Requested view: its size in CSS pixels, and the codec of frames, or `none` if the page draws.
 
-    `field_of_view` is the person's choice, limited to the `field_of_view_range` of the scene.
+    `field_of_view` is chosen by the participant, within the `field_of_view_range` of the scene.
     """
 
     width: Length
@@ -59,7 +59,7 @@ class View(WireMessage, frozen=True):
 
 
 class Hello(WireMessage, frozen=True):
-    """First message of a connection. `tab` is a random name of the page, which it keeps when it reconnects."""
+    """First message of a connection. `tab` is a random name of the page. It stays the same after a reconnection."""
 
     tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
     trial: Annotated[str, msgspec.Meta(max_length=20)]
@@ -67,20 +67,20 @@ class Hello(WireMessage, frozen=True):
 
 
 class TakeOver(WireMessage, frozen=True):
-    """Continue a session here that is open in another page. Answers `occupied`."""
+    """Continue here a session that is open in another page. This is the reply to `occupied`."""
 
 
 class RunMessage(WireMessage, frozen=True, tag="run"):
-    """Start or resume the clock. `until` is the page's promise (see `Inputs`), at first 0, or None."""
+    """Start or resume the clock. `until` is the page's first promise (see `Inputs`), or None without promises."""
 
     until: Count | None = None
 
 
 class Inputs(WireMessage, frozen=True):
-    """Inputs of the person, in order, each once.
+    """Inputs of the participant in chronological order. Each input is sent once.
 
-    `until` promises that all inputs for the control steps before it have been sent. The clock then waits for promises,
-    for at most 0.75 s.
+    With `until`, the page promises that it has sent all inputs for earlier control steps. The clock then waits up to
+    0.75 s for each further promise.
     """
 
     inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
@@ -88,7 +88,7 @@ class Inputs(WireMessage, frozen=True):
 
 
 class Seen(WireMessage, frozen=True):
-    """Number of a frame that the browser has shown."""
+    """Acknowledgement that the browser has shown a frame. `frame` is its number."""
 
     frame: Count
 
@@ -96,21 +96,21 @@ class Seen(WireMessage, frozen=True):
 class Beat(WireMessage, frozen=True):
     """Heartbeat. The server sends two per second, and the page answers each.
 
-    The clock stops after 1 s without any message from the page.
+    If the page sends no message for 1 s, the clock stops.
     """
 
 
 class Display(WireMessage, frozen=True):
-    """Display quality over the last 5 s. Only logged.
+    """Display quality over the last 5 s, which is written to the log.
 
     Attributes:
-        width: Width of the view, in CSS pixels. `height` likewise.
+        width: Width of the view in CSS pixels, like `height`.
         pixel_ratio: Device pixels per CSS pixel.
-        frame_ms: Median time between two pictures.
-        frame_ms_95: 95th percentile of the time between two pictures.
-        latency_ms: Median time from an input to its picture, or to the server's state with that input if the browser
-            draws. None without inputs.
-        field_of_view: Field of view of the picture if the person may choose it.
+        frame_ms: Median time between two pictures, in milliseconds.
+        frame_ms_95: 95th percentile of the time between two pictures, in milliseconds.
+        latency_ms: Median time from an input to the first picture that shows its effect, in milliseconds, or to the
+            first server state that includes it if the browser draws. None if there were no inputs.
+        field_of_view: Horizontal field of view, in radians, if the participant may choose it.
     """
 
     draw: Drawer
@@ -127,35 +127,35 @@ class Display(WireMessage, frozen=True):
 
 
 class Draw(WireMessage, frozen=True):
-    """Drawing has moved to the browser or to the server. Only logged, with the reason."""
+    """Change of the program that draws the view, and its reason. Both are written to the log."""
 
     draw: Drawer
     reason: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Pause(WireMessage, frozen=True):
-    """Stop the clock. The reason is logged."""
+    """Stop the clock. The reason is written to the log."""
 
     reason: PauseReason
 
 
 class Blur(WireMessage, frozen=True):
-    """The page lost or regained the keyboard focus. Only logged."""
+    """Loss or return of the keyboard focus, which is written to the log."""
 
     away: bool
 
 
 class Leave(WireMessage, frozen=True):
-    """End the trial now."""
+    """End the trial immediately."""
 
 
 class Open(WireMessage, frozen=True):
     """Open a session in a worker.
 
     Attributes:
-        restarted: True if the previous worker died.
-        as_inputs_come: True to take control steps as soon as their inputs are promised, as in a rehearsal.
-        texts: Texts of the HUD that replace those of the language, or empty.
+        restarted: True if the session's previous worker died.
+        as_inputs_come: True to take each control step as soon as its inputs have been promised, as in rehearsals.
+        texts: HUD texts that override those of the language.
     """
 
     folder: str
@@ -170,17 +170,17 @@ class Open(WireMessage, frozen=True):
 
 
 class Taken(WireMessage, frozen=True):
-    """All inputs and control steps up to these numbers are processed and on disk."""
+    """All inputs and control steps up to these numbers have been processed and are on disk."""
 
     input: int
     step: int
 
 
 class FrameMessage(WireMessage, frozen=True, tag="frame"):
-    """A frame of a control step, numbered from 1 in each view. `input` is the last input that has taken effect in it.
+    """A frame and its control step. Frames are numbered from 1 in each view. `input` is the last input in effect.
 
-    H.264 is in Annex B format, one access unit per frame. `key` frames can be decoded without earlier ones.
-    `milliseconds` is the time to draw and compress the frame.
+    H.264 is in Annex B format, one access unit per frame. A `key` frame can be decoded without earlier ones.
+    `milliseconds` is the time taken to draw and compress the frame.
     """
 
     number: int
@@ -200,23 +200,23 @@ class FrameMessage(WireMessage, frozen=True, tag="frame"):
 
 
 class Saved(WireMessage, frozen=True):
-    """The run directory of a finished session has been written."""
+    """The run directory of a finished session is complete."""
 
 
 class Queue(WireMessage, frozen=True):
-    """All slots are taken. The page must reload, and then shows the queue."""
+    """All slots are taken. The page must reload to show the queue."""
 
 
 class Occupied(WireMessage, frozen=True):
-    """The session is open in another page. `takeover` continues it here."""
+    """The session is open in another page. The reply `takeover` continues it here."""
 
 
 class Replaced(WireMessage, frozen=True):
-    """Another page took the session over. This connection is closed."""
+    """Another page has taken over the session, so this connection will be closed."""
 
 
 class Error(WireMessage, frozen=True):
-    """A message was rejected, with a code and a reason."""
+    """Rejection of a message, with an error code and a reason."""
 
     code: ErrorCode
     message: str
@@ -255,6 +255,6 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def packed(message: WireMessage) -> bytes:
-    """Encode a message between server and worker, preceded by its length."""
+    """Encode a message between server and worker, with its length as a prefix."""
     content = _encode(message)
     return LENGTH.pack(len(content)) + content

@@ -1,6 +1,6 @@
-"""States of a session with a person, the table of their transitions, and the messages that describe a state.
+"""States of a live session, the transitions between them, and the messages that describe a state.
 
-The worker owns the state. Server and page hold copies of what it sends.
+The worker owns the state. The server and the page keep copies.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from hud.state import HudState, Marker, MiniMap, Pointer
 
 
 class SessionPhase(StrEnum):
-    """State of a session. Its clock only advances while it is running."""
+    """State of a session. The clock advances only in the running state."""
 
     LOADING = auto()
     READY = auto()
@@ -42,28 +42,28 @@ TRANSITIONS: Mapping[tuple[SessionPhase, Trigger], SessionPhase] = {
     (RUNNING, Trigger.PAUSE): PAUSED,
     **{(phase, Trigger.END): OVER for phase in (LOADING, READY, RUNNING, PAUSED)},
     **{(phase, Trigger.FAIL): FAILED for phase in (LOADING, READY, RUNNING, PAUSED, OVER)},
-}  # other triggers have no effect
+}  # all other triggers have no effect
 
 
 class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """A message. Its `type` is its tag, by default the lower-case name of its class."""
+    """Base class of messages. The `type` of a message is its tag, by default its class name in lower case."""
 
 
 class State(WireMessage, frozen=True):
-    """State of the session, the reason if it is paused, over or failed, and the number of the last received input."""
+    """State of the session, the reason for a pause, end or failure, and the number of the last received input."""
 
     phase: SessionPhase = LOADING
     reason: str = ""
     input: int = 0
 
     def after(self, trigger: Trigger, reason: str = "") -> "State":
-        """Return the next state, or the same object if the trigger has no effect."""
+        """Return the next state, or this state if the trigger has no effect."""
         phase = TRANSITIONS.get((self.phase, trigger))
         return self if phase is None else State(phase, reason, self.input)
 
 
 class GaitParameters(msgspec.Struct, frozen=True):
-    """Limits and servos of walking in SI units, the fields of `mjsim.world.fidelity.kinematics.Gait`."""
+    """Parameters of walking in SI units. The fields are those of `mjsim.world.fidelity.kinematics.Gait`."""
 
     max_speed: float
     max_turn: float
@@ -90,7 +90,7 @@ class GaitParameters(msgspec.Struct, frozen=True):
 
 
 class Speeds(msgspec.Struct, frozen=True):
-    """Speeds of the person at full deflection of the controls, in m/s and rad/s."""
+    """Speeds of the participant at full deflection of the controls, in m/s and rad/s."""
 
     walking_speed: float
     turning_speed: float
@@ -98,13 +98,13 @@ class Speeds(msgspec.Struct, frozen=True):
 
 
 class SceneMessage(WireMessage, frozen=True, tag="scene"):
-    """Scene for clients that draw, sent once.
+    """Scene to be drawn by the client. It is sent once.
 
     Attributes:
-        path: URL path of the scene's files on this server. If None, the server draws.
-        floor: File of the obstacles for `gait`, or None if walking cannot be predicted.
-        field_of_view: Horizontal field of view for any shape of the view, in radians.
-        field_of_view_range: Limits of the person's choice of the field of view, or None.
+        path: URL path of the scene's files, or None if the server draws.
+        floor: Name of the file with obstacles, or None if the client cannot predict walking.
+        field_of_view: Horizontal field of view in radians, whatever the view's aspect ratio.
+        field_of_view_range: Smallest and largest field of view that the participant may choose, or None.
         step_duration: Duration of a control step, in seconds.
     """
 
@@ -118,18 +118,19 @@ class SceneMessage(WireMessage, frozen=True, tag="scene"):
 
 
 class Snapshot(WireMessage, frozen=True):
-    """State at the start of a control step for clients that draw, sent once per step.
+    """State at the start of a control step, for clients that draw. One is sent per control step.
 
     Attributes:
         step: Control step that starts with this state.
         input: Number of the last input that has taken effect.
-        body: Position, speeds, commands and servos of the body (docs/protocol.md).
-        eye: Position in metres, heading and pitch in radians.
+        body: Positions, speeds, commands and servo states of the body (docs/protocol.md).
+        eye: Position of the eyes in metres, heading and pitch in radians.
         hands: Positions of the left and right hand in the body's frame, in metres.
-        held: Instance names of the objects in the hands.
-        objects: Position in metres (3) and orientation wxyz (4) by instance name, if changed since the last snapshot.
-        models: Models by instance name, of objects that are new to the client or were `gone`.
-        gone: Instance names of objects without further updates.
+        held: Instance names of the held objects.
+        objects: Positions in metres (3) and quaternions wxyz (4) of objects that moved since the last snapshot, by
+            instance name.
+        models: Models of objects that are new to the client or were `gone`, by instance name.
+        gone: Instance names of objects that will not be updated.
     """
 
     step: int
@@ -146,28 +147,28 @@ class Snapshot(WireMessage, frozen=True):
 
 
 class Markers(WireMessage, frozen=True):
-    """Markers of the HUD for clients that draw, sent when they change."""
+    """Markers of the HUD, for clients that draw. They are sent when they change."""
 
     markers: tuple[Marker, ...]
 
 
 class Pictures(WireMessage, frozen=True):
-    """Pictures named by a `hud`, as data URLs by key. Sent once per page."""
+    """Pictures that a `hud` message refers to, as data URLs by key. They are sent once to each page."""
 
     pictures: dict[str, str]
 
 
 class Hud(WireMessage, frozen=True):
-    """State of the HUD, without its markers and without the values that a `moment` has."""
+    """State of the HUD, without markers and the values sent in `moment`."""
 
     state: HudState
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """Effect of the action key: the object, and the receptacle if the object would be placed.
+    """Effect of the action key: the object that it would pick up or place, and the receptacle when placing.
 
     `instance` is the object's instance name. `place` is the position of the object or the receptacle in metres. `at` is
-    that position in the view, as shares of its width and height, or None if it is out of view.
+    this position in the view, in fractions of its width and height, or None if it is not visible.
     """
 
     object: str
@@ -178,7 +179,7 @@ class Reach(msgspec.Struct, frozen=True):
 
 
 class Moment(WireMessage, frozen=True):
-    """Values that change as the person moves: clock in whole seconds, room, object in reach, pointer and map."""
+    """Values that change with movement: clock in whole seconds, room, object within reach, pointer and map."""
 
     step: int
     clock: float | None
@@ -189,6 +190,6 @@ class Moment(WireMessage, frozen=True):
 
 
 class Busy(WireMessage, frozen=True):
-    """Start or end of a pick or place, for clients that show frames. Keys pressed during it are handled afterwards."""
+    """Start or end of a pick or place, for clients that show frames. Key presses in between are handled afterwards."""
 
     busy: bool

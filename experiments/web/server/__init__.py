@@ -1,4 +1,4 @@
-"""The server of live trials: WebSockets, sessions, the queue for slots, and the pool of workers.
+"""Server of live trials: WebSockets, sessions, the queue for slots, and the pool of workers.
 
-It simulates nothing and validates everything that browsers send.
+The server validates all messages from browsers. Simulation takes place in the workers.
 """

@@ -1,4 +1,4 @@
-"""The WebSocket of a browser, which validates messages and never blocks on a slow browser."""
+"""WebSocket of a browser, which validates messages and never waits for a slow browser."""
 
 import asyncio
 import time
@@ -13,16 +13,16 @@ from experiments.web.protocol import BEAT_PERIOD, Beat, Error, Hello, Inputs, Oc
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.state import OVER, State, WireMessage
 
-HELLO_TIMEOUT = 10.0  # timeout of the first message, in seconds
-OCCUPIED_TIMEOUT = 60.0  # timeout of the answer to `occupied`, in seconds
-CLOSE_TIMEOUT = 0.5  # how long to wait for an earlier connection to close, in seconds
-MAX_WAITING = 300  # maximum number of queued messages
-RATE, BURST = 200.0, 1200.0  # messages and inputs per second; bursts repeat inputs after a failure
-MAX_ERRORS = 50  # maximum number of rejected messages per connection
+HELLO_TIMEOUT = 10.0  # timeout for the first message, in seconds
+OCCUPIED_TIMEOUT = 60.0  # timeout for the reply to `occupied`, in seconds
+CLOSE_TIMEOUT = 0.5  # how long to wait for a connection to close, in seconds
+MAX_WAITING = 300  # maximum number of messages in the send queue
+RATE, BURST = 200.0, 1200.0  # maximum number of messages and inputs per second, and in a burst
+MAX_ERRORS = 50  # number of rejected messages after which a connection is closed
 
 
 class BrowserSocket:
-    """An accepted WebSocket. A separate task sends messages in order."""
+    """An accepted WebSocket connection. A separate task sends the queued messages in order."""
 
     def __init__(self, socket: WebSocket) -> None:
         self.tab = ""
@@ -32,7 +32,7 @@ class BrowserSocket:
         self._errors = 0
 
     def send(self, message: WireMessage) -> None:
-        """Queue a message. A browser that does not keep up is disconnected."""
+        """Queue a message. Disconnect a browser that falls behind."""
         waiting = self._waiting.qsize()
         if waiting < MAX_WAITING:
             self._waiting.put_nowait(message)
@@ -40,11 +40,10 @@ class BrowserSocket:
             self.close(protocol.SLOW, "too slow")
 
     def close(self, code: int, reason: str) -> None:
-        """Close the connection after the queued messages."""
         self._waiting.put_nowait((code, reason))
 
     async def serve(self, session: PlayedSession) -> None:
-        """Serve until the browser disconnects."""
+        """Serve a participant's page until it disconnects."""
         sending = asyncio.create_task(self._send_all())
         receiving = asyncio.create_task(self._receive_all(session))
         beating = asyncio.create_task(self._beat(session))
@@ -52,7 +51,7 @@ class BrowserSocket:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
             session.detach(self)
             self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # until the last message is sent
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # let the last message be sent
         finally:
             session.detach(self)
             for task in (sending, receiving, beating):
@@ -61,7 +60,7 @@ class BrowserSocket:
                     await task
 
     async def watch(self, session: PlayedSession) -> None:
-        """Show a session to a spectator until the page disconnects or sends anything."""
+        """Show a session to a spectator until their page disconnects or sends a message."""
         sending = asyncio.create_task(self._send_all())
         receiving = asyncio.create_task(self._socket.receive())
         session.spectators.join(self)
@@ -77,7 +76,7 @@ class BrowserSocket:
                     await task
 
     async def _send_all(self) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser is gone
+        with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser has disconnected
             while isinstance(item := await self._waiting.get(), WireMessage):
                 if isinstance(item, protocol.FrameMessage):
                     await self._socket.send_bytes(item.packed())
@@ -132,7 +131,7 @@ class BrowserSocket:
             return
 
     async def _receive(self) -> WireMessage:
-        """Return the next well-formed message. Raises WebSocketDisconnect once the browser is gone."""
+        """Return the next well-formed message. Raises WebSocketDisconnect if the browser has disconnected."""
         while True:
             event = await self._socket.receive()
             if event["type"] != "websocket.receive":

@@ -1,4 +1,4 @@
-"""Request checks, response headers and connection limits of the server."""
+"""Checks of requests, response headers and limits on connections."""
 
 import asyncio
 import re
@@ -21,9 +21,9 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from experiments.web.client_files import static_caching
 
-MAX_BODY = 4096  # maximum size of a form, in bytes
+MAX_BODY = 4096  # maximum size of a request body, in bytes
 HOST = re.compile(r"([A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(:\d{1,5})?")
-UNCACHED = "no-store"  # `Cache-Control` header of pages
+UNCACHED = "no-store"  # `Cache-Control` header of rendered pages
 Address = IPv4Address | IPv6Address
 Network = IPv4Network | IPv6Network
 HEADERS = {
@@ -39,12 +39,12 @@ POLICY = (
     "connect-src 'self' blob: {sockets}; base-uri 'none'; form-action {forms}; frame-ancestors {frames}"
 )
 MAX_FIELDS = 500
-REQUEST_TIMEOUT = 10.0  # timeout for receiving a request, in seconds
-MAX_OPEN = 2000  # maximum number of connections, WebSockets excluded
+REQUEST_TIMEOUT = 10.0  # timeout for receiving a complete request, in seconds
+MAX_OPEN = 2000  # maximum number of open connections, without WebSockets
 
 
 def allowed_hosts(host: str, public: str | None) -> Sequence[str]:
-    """Return the valid host names of a server that listens at `host`. Other names could be DNS rebinding."""
+    """Return the host names accepted by a server at `host`. Others are rejected to prevent DNS rebinding."""
     addresses = {host, "127.0.0.1", "::1"}
     if host in ("0.0.0.0", "::"):
         addresses |= _own_addresses()
@@ -58,16 +58,15 @@ def _own_addresses() -> set[str]:
     for family, target in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as probe:
-                probe.connect((target, 9))  # selects the outgoing interface without sending anything
+                probe.connect((target, 9))  # selects the outgoing interface, but sends no packet
                 found.add(str(probe.getsockname()[0]))
             found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, family)}
         except OSError:
-            continue  # the machine has no network with such addresses
+            continue  # no network with this type of address
     return found
 
 
 def middleware(host: str, public: str | None, proxies: Sequence[Network], **options: Any) -> list[Middleware]:
-    """Return the middleware of a server that listens at `host`. `options` are passed to `Guards`."""
     hosts = allowed_hosts(host, public)
     return [
         Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False),
@@ -76,10 +75,10 @@ def middleware(host: str, public: str | None, proxies: Sequence[Network], **opti
 
 
 class Guards:
-    """ASGI middleware that checks `Host` and `Origin`, limits bodies, sets the client's address and adds headers.
+    """ASGI middleware that checks requests, limits their size, sets the client's address and adds response headers.
 
-    The X-Forwarded-For header is trusted for requests from `proxies`. Only sites in `embedded_by`, such as
-    https://example.org, may embed the pages in frames and receive their forms.
+    The headers `Host` and `Origin` are checked. X-Forwarded-For is trusted only in requests from `proxies`. Only sites
+    in `embedded_by`, such as https://example.org, may embed pages in frames and receive submitted forms.
     """
 
     def __init__(
@@ -116,7 +115,7 @@ class Guards:
         if scope["type"] == "http" and refusal is None:
             whole = await _whole(receive)
             if whole is None:
-                return  # the client disconnected
+                return
             receive = whole
         app = self._app if refusal is None else PlainTextResponse(f"{refusal[1]}\n", refusal[0])
         await app({**scope, "client": (self._sender(scope, headers), 0)}, receive, send_guarded)
@@ -124,13 +123,13 @@ class Guards:
     def _sender(self, scope: Scope, headers: Headers) -> str:
         peer = address_of((scope.get("client") or ("",))[0])
         if any(peer is not None and peer in proxy for proxy in self._proxies):
-            # the proxy appends the last address; clients can forge the others
+            # Use the last address, which is set by the proxy. Clients can forge the others.
             forwarded = ",".join(headers.getlist("x-forwarded-for")).rpartition(",")[2]
             peer = address_of(forwarded.strip()) or peer
         return machine_of(peer)
 
     def _origin(self, host: str) -> str:
-        """Return the origin of pages served under a `Host` header, or an empty string if it is not valid."""
+        """Return the origin of pages served for a `Host` header, or an empty string if the header is not valid."""
         if not HOST.fullmatch(host):
             return ""
         public = host == self._public.netloc and self._public.scheme == "https"
@@ -138,14 +137,14 @@ class Guards:
 
 
 class Rate:
-    """Limits requests per address to `count` in `period` seconds."""
+    """Rate limit of `count` requests per address in `period` seconds."""
 
     def __init__(self, count: int, period: float) -> None:
         self._count, self._period = count, period
         self._log: list[tuple[float, str]] = []
 
     def allows(self, address: str) -> bool:
-        """Count a request, and return True if it is allowed."""
+        """Count a request. Return True if it is within the limit."""
         now = time.monotonic()
         self._log = [(at, who) for at, who in self._log if now - at < self._period]
         allowed = sum(who == address for _, who in self._log) < self._count
@@ -154,7 +153,6 @@ class Rate:
 
 
 def address_of(text: str) -> Address | None:
-    """Parse an IP address, or return None."""
     try:
         found = ip_address(text)
     except ValueError:
@@ -163,12 +161,12 @@ def address_of(text: str) -> Address | None:
 
 
 def machine_of(address: Address | None) -> str:
-    """Return an IPv4 address, or the /64 network of an IPv6 address, since one machine can have all its addresses."""
+    """Return an IPv4 address, or the /64 network of an IPv6 address, whose addresses can all belong to one machine."""
     return str(ip_network((address, 64), strict=False) if isinstance(address, IPv6Address) else address)
 
 
 async def _whole(receive: Receive) -> Receive | None:
-    """Receive the whole body, and return a `receive` that yields it. None if the client disconnected."""
+    """Read the whole request body. Return a `receive` function that yields it, or None if the client disconnected."""
     body = b""
     while (message := await receive())["type"] == "http.request":
         body += message.get("body", b"")
@@ -200,7 +198,7 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
     for name, value in HEADERS.items():
         headers[name] = value
     if embedded_by:
-        del headers["X-Frame-Options"]  # cannot name other sites
+        del headers["X-Frame-Options"]  # this header cannot allow other sites
     headers.setdefault("Cache-Control", cache)
     headers["Content-Security-Policy"] = POLICY.format(
         sockets=origin.replace("http", "ws", 1),
@@ -210,7 +208,7 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
 
 
 async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
-    """Return the fields of a submitted form. Empty if it is malformed or has too many."""
+    """Return the fields of a submitted form, or no fields if the form is malformed or too large."""
     text = (await request.body()).decode("utf-8", "replace")
     try:
         return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))
@@ -219,9 +217,9 @@ async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
 
 
 class TimedConnection(H11Protocol):
-    """A uvicorn connection with timeouts. Above the limit, the oldest one of the busiest address is closed."""
+    """A uvicorn connection with timeouts. If there are too many, the busiest address loses its oldest connection."""
 
-    _open: ClassVar[dict["TimedConnection", str]] = {}  # clients by connection, oldest first
+    _open: ClassVar[dict["TimedConnection", str]] = {}  # address of each open connection, oldest first
     _timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -244,7 +242,7 @@ class TimedConnection(H11Protocol):
             self._watch()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Exempt the connection, since WebSockets have their own limits."""
+        """Exempt the connection, because WebSockets have separate limits."""
         self._forget()
         super().handle_websocket_upgrade(event)
 

@@ -1,25 +1,25 @@
-"""The limit of concurrent sessions, and the queue of pages that wait for a slot."""
+"""Limit on concurrent sessions, and the queue of pages that wait for a slot."""
 
 import time
 from collections import deque
 from collections.abc import Collection
 from statistics import fmean
 
-ADMITTED_S = 60.0  # how long an admitted page may take to start its session
-FORGOTTEN_S = 3600.0  # silence after which a page loses its position in the queue
+ADMITTED_S = 60.0  # how long the slot of an admitted page is reserved, in seconds
+FORGOTTEN_S = 3600.0  # silence after which a page loses its position in the queue, in seconds
 
 
 class SessionLimit:
-    """Limits the number of concurrent sessions, first come, first served. Sessions have names.
+    """Limits the number of concurrent sessions, first come, first served. Every session has a name.
 
-    A waiting page polls for a slot (:meth:`ask`). While it is silent, others go first. When it polls again, it regains
-    its position. The session of an admitted page takes the slot (:meth:`hold`).
+    A waiting page polls for a slot by :meth:`ask`. If it stops polling, later pages may overtake it, but it regains its
+    position when it polls again. The session of an admitted page occupies the slot by :meth:`hold`.
     """
 
     def __init__(self, count: int) -> None:
         self._count = count
-        self._held: dict[str, float] = {}  # expiry times of slots, by name
-        self._queue: dict[str, float] = {}  # deadlines for the next poll, by name
+        self._held: dict[str, float] = {}  # expiry time of each slot, by name
+        self._queue: dict[str, float] = {}  # deadline of each page's next poll, by name
         self._durations: deque[float] = deque(maxlen=100)
 
     @property
@@ -37,18 +37,18 @@ class SessionLimit:
     def expected_wait(self, position: int, default: float) -> float:
         """Return the expected wait at a position in the queue, in seconds.
 
-        `default` is the assumed duration of a session until one has ended, in seconds.
+        Until a session has ended, sessions are assumed to last `default` seconds.
         """
         return position * (fmean(self._durations) if self._durations else default) / self._count
 
     def resize(self, count: int) -> None:
-        """Change the number of slots. Sessions keep theirs."""
+        """Change the number of slots. Running sessions keep their slots."""
         self._count = count
 
     def ask(self, name: str, patience: float) -> int | None:
         """Request a slot for a page. Return its position in the queue, or None if it has a slot.
 
-        The page must ask again within `patience` seconds.
+        The page must repeat the request within `patience` seconds.
         """
         self._tidy()
         now = time.monotonic()
@@ -63,7 +63,7 @@ class SessionLimit:
         return None
 
     def hold(self, name: str) -> bool:
-        """Take a slot for a session until :meth:`release`. Return False if its page has to wait first."""
+        """Occupy a slot for a session until :meth:`release`. Return False if its page has to wait first."""
         self._tidy()
         if name not in self._held and (name in self._queue or len(self._present()) >= self._free):
             return False
@@ -71,7 +71,7 @@ class SessionLimit:
         return True
 
     def release(self, name: str, duration: float | None = None) -> None:
-        """Release a slot. `duration` is the duration of a session that ended, in seconds."""
+        """Release a slot. `duration` is given if the session has ended, and is measured in seconds."""
         if duration is not None:
             self._durations.append(duration)
         self._held.pop(name, None)

@@ -1,4 +1,4 @@
-"""A session under way, which connects a participant, a worker and a browser."""
+"""A live session, which connects a participant, a worker and a browser."""
 
 import asyncio
 import logging
@@ -46,23 +46,23 @@ from experiments.web.state import (
 )
 
 LOG = logging.getLogger("mjsim.play")
-MAX_CRASHES = 3  # consecutive worker crashes after which a session fails; saved control steps reset the count
+MAX_CRASHES = 3  # worker crashes without progress after which a session fails
 MAX_AHEAD = 1000  # maximum number of unprocessed inputs
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
 class Browser(Spectator, Protocol):
-    """A connection to a page that plays. `tab` is the name of the page."""
+    """Connection to a participant's page. `tab` is the name of the page."""
 
     tab: str
 
 
 class PlayedSession:
-    """The trials of a participant, one after the other.
+    """Plays a participant's trials, one after the other.
 
     Attributes:
-        heard: Time of the person's last activity, as of `time.monotonic`.
-        display: Display quality as last reported by the page, or None.
+        heard: Time of the participant's last activity, as returned by `time.monotonic`.
+        display: Display quality last reported by the page, or None.
     """
 
     def __init__(
@@ -89,18 +89,18 @@ class PlayedSession:
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
         self._taken = self._step = 0  # last input on disk, and next control step
-        self._lost = False  # True if a worker died and the browser may not know yet
-        self._came = deque[tuple[int, float]](maxlen=MAX_AHEAD)  # unsaved inputs, with arrival times
+        self._lost = False  # True if a worker died and the browser may not have noticed
+        self._came = deque[tuple[int, float]](maxlen=MAX_AHEAD)  # numbers and arrival times of unsaved inputs
 
     @property
     def processor_time(self) -> float | None:
-        """CPU time of the worker in seconds, or None while the clock is stopped."""
+        """CPU time of the worker in seconds, or None if the clock is stopped."""
         if self._worker is None or self.state.phase is not RUNNING:
             return None
         return self._worker.processor_time()
 
     def attach(self, browser: Browser, view: View) -> None:
-        """Connect a browser, in place of the previous one."""
+        """Connect a browser and disconnect the previous one."""
         if self.browser is not None:
             self.browser.send(protocol.Replaced())
             self.browser.close(protocol.REPLACED, "the session is open elsewhere")
@@ -113,7 +113,7 @@ class PlayedSession:
             browser.send(self.state)
 
     def detach(self, browser: Browser) -> None:
-        """Disconnect a browser, and pause the session."""
+        """Disconnect a browser and pause the session."""
         if self.browser is not browser:
             return
         self.browser = None
@@ -121,7 +121,7 @@ class PlayedSession:
         self._pause("disconnected")
 
     def take(self, message: Any) -> Error | None:
-        """Handle a message from the browser. Return an error if it is rejected."""
+        """Handle a message from the browser. Return an error if the message is rejected."""
         by_itself = isinstance(message, Seen | Beat | Display | Draw) or (
             isinstance(message, Inputs) and not message.inputs
         )
@@ -131,7 +131,7 @@ class PlayedSession:
             case View():
                 self._view = message
             case Inputs(inputs) if self.state.phase is LOADING or self._lacks_some_before(inputs):
-                return None  # ignored, because the browser sends the inputs again
+                return None  # ignored, because the browser will send the inputs again
             case Inputs(inputs):
                 if (error := self._input_error(message)) is not None:
                     return error
@@ -154,7 +154,7 @@ class PlayedSession:
         return None
 
     async def release(self) -> None:
-        """Stop the session, and release worker and slot. The journal has everything."""
+        """Stop the session and release its worker and slot. The journal keeps its state."""
         self.spectators.close()
         task, self._task = self._task, None
         if task is not None:
@@ -163,10 +163,7 @@ class PlayedSession:
                 await task
 
     def _lacks_some_before(self, inputs: Sequence[Input]) -> bool:
-        """Return True if inputs are missing that were lost with a dead worker.
-
-        The browser may not know of the loss yet. Accepting its later inputs would acknowledge the missing ones.
-        """
+        """Return True if earlier inputs were lost with a dead worker, so that later ones must be rejected."""
         return self._lost and len(inputs) > 0 and inputs[0].number > self.state.input + 1
 
     def _input_error(self, message: Inputs) -> Error | None:
@@ -254,7 +251,7 @@ class PlayedSession:
                         raise OSError(reason)
                     case State(input=number):
                         if self.state.phase is LOADING:
-                            self._taken = number  # in a restored session
+                            self._taken = number  # number of the last input in a restored session
                         message = msgspec.structs.replace(message, input=max(number, self.state.input))
                         self.state = message
                     case Taken(number, step):

@@ -1,4 +1,4 @@
-"""The interface between the server of trials and the participant."""
+"""Interfaces between the server of live trials and the code that schedules a participant's trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,13 +8,13 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class LiveTrial:
-    """A trial to be played.
+    """A trial to be played in a browser.
 
     Attributes:
-        run: Run directory that the trial will become.
-        before: Phases before the trial, as fields of `phase_ended` events.
-        leave_at: Time of the monotonic clock from which the participant may end the trial, in seconds. May be infinite.
-        texts: Texts that replace those of the HUD in this language.
+        run: Path of the run directory to be written.
+        before: Fields of the `phase_ended` events of earlier phases.
+        leave_at: Monotonic time from which the participant may end the trial, in seconds, or infinity.
+        texts: HUD texts that override those of the language.
     """
 
     phase: str
@@ -32,25 +32,25 @@ class Player(Protocol):
     """A participant who plays trials.
 
     Attributes:
-        key: Name of the participant's slot and session, the same for every connection.
+        key: Name of the participant's slot and session, which is the same in all connections.
     """
 
     key: str
 
     async def trial(self) -> LiveTrial | None:
-        """Return the next or current trial. None if the current phase is not a trial."""
+        """Return the next or current trial, or None if the current phase is not a trial."""
         ...
 
     async def over(self, trial: LiveTrial) -> None:
-        """Record that the trial's run directory has been written, and advance to the next phase."""
+        """Record that the trial's run directory is complete, and advance to the next phase."""
         ...
 
 
 class Meter:
-    """Receives session metrics. This one discards them."""
+    """Receiver of session metrics. This implementation discards them."""
 
     def acknowledged(self, seconds: float) -> None:
-        """Record the time from the arrival of inputs until they were on disk."""
+        """Record how long inputs took from their arrival until they were on disk."""
 
     def worker_lost(self) -> None:
         """Record that the worker of a session has died."""

@@ -15,17 +15,17 @@ from experiments.web.state import WireMessage
 
 PRELOADED = "experiments.web.worker.preload"
 SETTINGS = {
-    "MALLOC_ARENA_MAX": "1",  # one heap per thread would keep each thread's peak memory
-    "LP_NUM_THREADS": "1",  # threads of software rendering; many workers share the machine
+    "MALLOC_ARENA_MAX": "1",  # with one heap per thread, each thread would keep its peak memory
+    "LP_NUM_THREADS": "1",  # threads of the software renderer; many workers share the machine
 }
-END_TIMEOUT = 5.0  # timeout for the end of a process, in seconds
+END_TIMEOUT = 5.0  # timeout for a process to exit, in seconds
 RETRY = 0.1  # delay before retrying to start a worker, in seconds
 
 
 class WorkerProcess:
-    """A worker process and its socket. The constructor blocks until it runs, so call it in a thread, then `connect`.
+    """A worker process and its socket. Create it in a thread, because the constructor blocks, and then call `connect`.
 
-    The socket belongs to the event loop. With threads for reading and writing, 50 workers delayed the loop by 60 ms.
+    The socket is read in the event loop. With threads for reading and writing, 50 workers delayed the loop by 60 ms.
     """
 
     def __init__(self) -> None:
@@ -38,17 +38,17 @@ class WorkerProcess:
             theirs.close()
 
     async def connect(self) -> None:
-        """Open the connection in this event loop."""
+        """Open the connection in the running event loop."""
         self._loop = asyncio.get_running_loop()
         self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
 
     def send(self, message: WireMessage) -> None:
-        """Queue a message. If the worker is dead, `receive` reports it."""
+        """Queue a message. If the worker has died, `receive` reports it."""
         if not self._writer.is_closing():
             self._writer.write(packed(message))
 
     async def receive(self) -> Any:
-        """Return the next message, or None if the worker is dead."""
+        """Return the next message, or None if the worker has died."""
         try:
             (length,) = LENGTH.unpack(await self._reader.readexactly(LENGTH.size))
             return decode_from_worker(await self._reader.readexactly(length))
@@ -56,7 +56,7 @@ class WorkerProcess:
             return None
 
     def processor_time(self) -> float | None:
-        """Return the CPU time of the process in seconds, or None if it is unknown."""
+        """Return the CPU time of the process in seconds, or None if unknown."""
         try:
             fields = Path(f"/proc/{self._process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         except OSError:
@@ -64,31 +64,30 @@ class WorkerProcess:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def end(self) -> None:
-        """Terminate the process and wait for it. The journal keeps all acknowledged inputs."""
+        """Terminate the process and wait for it. All acknowledged inputs are in the journal."""
         self._process.terminate()
         self._process.join(END_TIMEOUT)
         self._process.kill()
         self._process.join()
-        with suppress(RuntimeError):  # the event loop is closed
+        with suppress(RuntimeError):  # the event loop has been closed
             self._loop.call_soon_threadsafe(self._writer.close)
 
 
 class WorkerPool:
-    """Starts and ends workers, which share a preloaded house and load others if needed."""
+    """Starts and ends workers. They share a preloaded house, and load other houses when needed."""
 
     def __init__(self, house: str) -> None:
-        os.environ.update({**SETTINGS, HOUSE: house})  # for child processes
+        os.environ.update({**SETTINGS, HOUSE: house})  # inherited by child processes
         self._ending: set[asyncio.Future[None]] = set()
 
     def warm_up(self) -> None:
-        """Start the fork server if it does not run."""
         multiprocessing.set_forkserver_preload([PRELOADED])
         forkserver.ensure_running()
 
     async def start(self) -> WorkerProcess:
-        """Start a worker.
+        """Start a worker, retrying for some seconds.
 
-        Retry for some seconds, since a killed fork server accepts connections until it is replaced.
+        Retries are needed because a killed fork server accepts connections until it is replaced.
         """
         until = time.monotonic() + END_TIMEOUT
         while True:
@@ -124,6 +123,6 @@ async def _started_worker() -> WorkerProcess:
 
 
 def _run_worker(connection: socket.socket) -> None:
-    from experiments.web.worker.main import Worker  # not loaded by the server
+    from experiments.web.worker.main import Worker  # the server must not load this module
 
     Worker(connection).run()

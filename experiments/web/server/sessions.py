@@ -1,4 +1,4 @@
-"""All sessions under way, the release of idle ones, and the number that the machine can run."""
+"""All live sessions, the release of idle sessions, and the estimated capacity of the machine."""
 
 import asyncio
 import os
@@ -15,29 +15,29 @@ from experiments.web.server.played_session import PlayedSession
 from experiments.web.server.player import Meter, Player
 from experiments.web.server.pool import WorkerPool
 
-WATCH_PERIOD = 5.0  # period of looking for abandoned sessions, in seconds
-MAX_AWAY = 20.0  # how long a session without a page keeps its slot while others wait, in seconds
-SHARE = 0.7  # usable share of the cores; the rest is a reserve for peaks
-MOST = 1 / 3  # cores of a session whose frames are drawn on the server, assumed for new sessions
-SERVER = 0.7  # load of the server's own core above which no session is admitted
-WINDOWS = 6  # number of recent measurements per session, of which the largest counts
-QUOTA = Path("/sys/fs/cgroup/cpu.max")  # CPU time per period of a container, and the period, in microseconds
+WATCH_PERIOD = 5.0  # interval between searches for abandoned sessions, in seconds
+MAX_AWAY = 20.0  # how long a session without a page keeps its slot while other pages wait, in seconds
+SHARE = 0.7  # usable fraction of the cores; the rest is reserved for load peaks
+MOST = 1 / 3  # assumed load of a new session whose frames are drawn on the server, in cores
+SERVER = 0.7  # load of the server's core above which no session is admitted
+WINDOWS = 6  # number of recent measurements per session, of which the largest is used
+QUOTA = Path("/sys/fs/cgroup/cpu.max")  # quota and period of a container's CPU time, in microseconds
 
 
 class Capacity:
-    """Estimates how many sessions fit on the machine."""
+    """Estimates how many sessions can run on the machine."""
 
     def __init__(self, cores: float) -> None:
         self._cores = cores
-        self._seen: dict[str, tuple[float, float]] = {}  # time and CPU time at a session's last measurement
+        self._seen: dict[str, tuple[float, float]] = {}  # time and CPU time of each last measurement
         self._shares: dict[str, deque[float]] = {}
         self._own = time.monotonic(), time.process_time()
 
     def measure(self, sessions: Mapping[str, PlayedSession], held: Collection[str]) -> int:
-        """Return the number of sessions that fit, at least one. Call this every few seconds.
+        """Return the number of sessions that can run, at least one. Call this every few seconds.
 
         Args:
-            held: Names of the sessions with a slot.
+            held: Names of the sessions that occupy a slot.
         """
         now = time.monotonic()
         before, self._own = self._own, (now, time.process_time())
@@ -62,9 +62,9 @@ class Capacity:
 
 
 class Sessions:
-    """All sessions under way. A session without activity for `idle` seconds releases its worker.
+    """All live sessions. A session without activity for `idle` seconds releases its worker.
 
-    With a `capacity`, the limit follows the machine's measured capacity.
+    If `capacity` is given, the limit of concurrent sessions follows its estimates.
     """
 
     def __init__(
@@ -77,13 +77,13 @@ class Sessions:
     ) -> None:
         self._pool, self.limit, self._idle = pool, limit, idle
         self._meter, self._capacity = meter, capacity
-        self.under_way: dict[str, PlayedSession] = {}  # by participant key
-        self._scenes: dict[str, str] = {}  # URL paths of scenes, by house, as reported by workers
+        self.under_way: dict[str, PlayedSession] = {}  # sessions by participant key
+        self._scenes: dict[str, str] = {}  # URL path of each house's scene, as reported by workers
 
     def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:
-        """Return the session of a participant.
+        """Return a participant's session, and create it if needed.
 
-        With `as_inputs_come`, its clock follows the inputs instead of real time.
+        If `as_inputs_come` is true, its clock advances with the inputs instead of in real time.
         """
         if player.key not in self.under_way:
             self.under_way[player.key] = PlayedSession(
@@ -97,11 +97,11 @@ class Sessions:
         return self.under_way[player.key]
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
-        """Return the URL path of the scene that a trial's page will probably draw, or None if unknown."""
+        """Return the URL path of the scene that a trial's page is expected to draw, or None if unknown."""
         return None if settings["draw"] == "server" else self._scenes.get(settings["house"])
 
     async def watch(self) -> None:
-        """Until cancelled, release abandoned sessions and update the capacity estimate."""
+        """Release abandoned sessions and update the capacity estimate until cancelled."""
         while True:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
@@ -109,7 +109,6 @@ class Sessions:
             self.limit.resize(learnt or self.limit.count)
 
     async def release(self, which: Callable[[PlayedSession], bool] = lambda _: True) -> None:
-        """Release the sessions selected by `which`."""
         for session in [session for session in self.under_way.values() if which(session)]:
             if session.browser is not None:
                 session.browser.send(protocol.Error("idle", "nothing was received for a long time"))
@@ -118,18 +117,18 @@ class Sessions:
             self.under_way.pop(session.player.key, None)
 
     def _is_idle(self, session: PlayedSession) -> bool:
-        """Return True if the person is away for too long.
+        """Return True if the participant has been inactive for too long.
 
-        The limit is shorter if the page is closed and others wait.
+        The limit is shorter if the page is closed and other pages wait.
         """
         closed = session.browser is None and self.limit.waiting > 0
         return time.monotonic() - session.heard > (min(MAX_AWAY, self._idle) if closed else self._idle)
 
 
 def usable_cores() -> float:
-    """Return the number of usable cores, by the process's affinity and its container's quota."""
+    """Return the number of usable cores, from the process's CPU affinity and the container's quota."""
     cores = float(len(os.sched_getaffinity(0)))
     with suppress(OSError, ValueError):
         quota, period = QUOTA.read_text().split()
-        cores = min(cores, float(quota) / float(period))  # a ValueError for "max", which is no limit
+        cores = min(cores, float(quota) / float(period))  # ValueError for "max", which means no limit
     return cores

@@ -1,4 +1,4 @@
-"""Spectators of a session, who see what its page shows."""
+"""Spectators of a session, who see the participant's page."""
 
 from typing import Any, Protocol
 
@@ -14,21 +14,21 @@ KEPT = (
     Hud,
     Markers,
     Moment,
-)  # messages that replace earlier ones of the same type
+)  # each of these replaces the previous message of its type
 
 
 class Spectator(Protocol):
-    """A connection to a watching page."""
+    """Connection to a spectator's page."""
 
     def send(self, message: WireMessage) -> None:
         """Queue a message."""
 
     def close(self, code: int, reason: str) -> None:
-        """Close the connection after the queued messages."""
+        """Close the connection after sending all queued messages."""
 
 
 class Spectators:
-    """The spectators of a session, and the messages that a new one gets first."""
+    """The spectators of a session, and the messages to send to a new spectator."""
 
     def __init__(self) -> None:
         self._all: set[Spectator] = set()
@@ -54,12 +54,12 @@ class Spectators:
         self._all.discard(spectator)
 
     def close(self) -> None:
-        """Disconnect all spectators, whose pages reconnect."""
+        """Disconnect all spectators. Their pages reconnect."""
         for spectator in self._all:
             spectator.close(IDLE, "the session has stopped")
 
     def tell(self, message: Any) -> None:
-        """Forward a message of the session's page to all spectators, and keep it for new ones."""
+        """Forward a message to all spectators, and keep it for new ones."""
         match message:
             case Snapshot(objects=objects, models=models, gone=gone):
                 self._snapshot = message
@@ -68,7 +68,7 @@ class Spectators:
                 for name in gone:
                     self._objects.pop(name, None)
                     self._models.pop(name, None)
-            case SceneMessage() | FrameMessage():  # earlier snapshots are obsolete
+            case SceneMessage() | FrameMessage():  # discard earlier snapshots
                 self._snapshot = None
                 self._objects, self._models = {}, {}
         if isinstance(message, KEPT):

@@ -1,1 +1,1 @@
-"""Pages that show recorded runs (`mjsim view`) and many homes (`mjsim house gallery`)."""
+"""Pages that show recorded runs (`mjsim view`) or many homes (`mjsim house gallery`)."""

@@ -1,4 +1,4 @@
-"""A folder that shows many homes: contact sheets, an index page, and a page per home."""
+"""Gallery of homes: a folder with contact sheets, an index page, and a page for each home."""
 
 import errno
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,13 +20,13 @@ from mjsim.values.errors import MjsimError, RenderError
 HOMES, SHEET = "homes", "sheet_{}.png"
 COLUMNS, ROWS = 2, 5
 GAP, CAPTION = 24, 44  # pixels
-WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of a home's card
+WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of a home's card in pixels
 INK, QUIET, PAPER = (22, 33, 43), (74, 85, 96), 255
 Image = NDArray[np.uint8]
 
 
 def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
-    """Return the houses by their folders in the gallery, each once, in order.
+    """Return the name of each home by its folder in the gallery, without duplicates.
 
     Raises:
         AssetError, HouseError: A source is not a house.
@@ -43,14 +43,14 @@ def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
 def write_gallery(
     homes: Mapping[str, str], out: Path, *, workers: int, on_home: Callable[[str | None], None]
 ) -> int:
-    """Draw the missing homes of a gallery, then its sheets and its page. Return the number of homes that failed.
+    """Draw all missing homes of a gallery, then its contact sheets and index page. Return the number of failures.
 
     Args:
-        out: A new folder, or that of a gallery.
-        on_home: Called for each home, with None or an error message.
+        out: A new folder, or the folder of an existing gallery.
+        on_home: Called after each home with None, or with an error message if drawing failed.
 
     Raises:
-        ConfigError: `workers` is below 1, or `out` holds something else.
+        ConfigError: `workers` is below 1, or `out` contains other files.
         RenderError: This machine cannot render.
         OSError: A file cannot be written.
     """
@@ -70,7 +70,7 @@ def write_gallery(
         with replacing(out / SHEET.format(count)) as temporary:
             cv2.imwrite(str(temporary), sheet[..., ::-1])
     number = count + 1
-    while (old := out / SHEET.format(number)).is_file():  # left over from a larger gallery
+    while (old := out / SHEET.format(number)).is_file():  # remains of a larger gallery
         old.unlink()
         number += 1
     page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
@@ -94,7 +94,7 @@ def _drawn(
 
 
 def sheets(homes: Sequence[tuple[GalleryHome, Path]]) -> Iterator[Image]:
-    """Yield RGB contact sheets of up to ten homes. `homes` has each home with the folder of its pictures."""
+    """Yield RGB contact sheets of up to ten homes. Each home is paired with the folder of its pictures."""
     for first in range(0, len(homes), COLUMNS * ROWS):
         cards = [_card(home, folder) for home, folder in homes[first : first + COLUMNS * ROWS]]
         rows = -(-len(cards) // COLUMNS)

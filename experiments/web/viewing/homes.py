@@ -1,4 +1,4 @@
-"""A home of a gallery: its pictures, description, and page with a tour, in its own folder."""
+"""A home in a gallery: its pictures, description, and page with a tour."""
 
 import functools
 import hashlib
@@ -29,9 +29,9 @@ from mjsim.values.person_parameters import PersonParameters
 PLAN, VIEW = (480, 400), (300, 200)  # sizes in pixels
 PAGE, ABOUT = "index.html", "home.json"
 _WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
-INTERVAL = 0.2  # time between two poses, which the page interpolates, in seconds
-NEAR = 0.05  # distance at which a viewpoint is reached, in metres
-INSIDE = (0.0, 0.0, 0.8) * 2  # positions of the idle hands in metres, hidden in the body
+INTERVAL = 0.2  # time between two poses of the tour, in seconds; the page interpolates between them
+NEAR = 0.05  # distance at which a viewpoint counts as reached, in metres
+INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands in metres, hidden inside the body
 _HUD = HudState("", (), (), (None, InventorySlot()))
 
 
@@ -39,10 +39,10 @@ class GalleryHome(msgspec.Struct, frozen=True):
     """Description of a home in a gallery.
 
     Attributes:
-        name: Full name of a generated house, or the name or path as given.
-        area: Floor area, in m2.
-        pictures: Files of the floor plan and of views at eye height.
-        digest: Hash of everything that determines the files.
+        name: Full name of a generated house, otherwise the given name or path.
+        area: Floor area in square metres.
+        pictures: File names of the floor plan and of views at eye height.
+        digest: Hash of all inputs that determine the files.
     """
 
     name: str
@@ -58,7 +58,7 @@ class GalleryHome(msgspec.Struct, frozen=True):
 
     @property
     def origin(self) -> str:
-        """Seed and version of a generated home, or the name of any other home."""
+        """Seed and version of a generated home, or the name of another home."""
         found = re.fullmatch(r"generated:(\d+)\?rooms=\d+&version=(\d+)", self.name)
         return f"seed {found[1]}, version {found[2]}" if found else self.name
 
@@ -68,7 +68,7 @@ def home_key(name: str) -> str:
 
     Raises:
         AssetError: The catalogue of a house that is not generated cannot be read.
-        ConfigError: No folder can be named after the house.
+        ConfigError: The name of the house cannot be turned into a folder name.
         HouseError: The name of a generated house is not valid.
     """
     named = parse_house(name)
@@ -84,7 +84,7 @@ def home_key(name: str) -> str:
 
 
 def draw_home(name: str, folder: Path) -> GalleryHome:
-    """Write pictures and page of a home into `folder` atomically, unless they are up to date.
+    """Write the pictures and the page of a home to `folder` atomically, unless they are up to date.
 
     Raises:
         AssetError: The house cannot be read or used.
@@ -120,7 +120,7 @@ def _draw(house: House, folder: Path) -> tuple[str, ...]:
     compiled, rooms = compiled_house(house.catalogue), house.rooms
     areas = dict.fromkeys(house.viewpoints, 0.0)
     for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
-        if key in areas:  # a person can stand in it
+        if key in areas:  # large enough for a person to stand in
             areas[key] += float(half.prod())
     largest = sorted(areas, key=lambda key: -areas[key])[:2]
     views = list(room_views(house, largest).values())
@@ -143,18 +143,18 @@ def _kept(folder: Path) -> GalleryHome | None:
 
 @functools.cache
 def _code() -> str:
-    """Return a hash of the Python sources and the page's, which determine the files of all homes."""
+    """Return a hash of the source files that determine the contents of a gallery."""
     page = run_page("", {}, {}, tour="")
     return source_digest("mjsim", "experiments") + hashlib.sha256(page.encode()).hexdigest()
 
 
 def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
-    """Return the HTML of a self-contained page that shows a home from outside, from above, and on a tour."""
+    """Return a self-contained HTML page that shows a home from outside, from above, and on a tour."""
     return run_page(house.catalogue.label, _tour(house), scene, tour=caption)
 
 
 def _tour(house: House) -> dict[str, Any]:
-    """Return the tour as a `Run` of view/run.js."""
+    """Return the tour in the format `Run` of view/run.js."""
     path, person = camera_path(house), PersonParameters()
     times = np.arange(0.0, path.duration, INTERVAL)
     rows = path.at(times)

@@ -1,4 +1,4 @@
-"""A self-contained HTML file that shows a run, with the client's modules, the scene and the recorded run."""
+"""Self-contained HTML page of a recorded run, with the client's modules, the scene and the data."""
 
 import base64
 import gzip
@@ -36,16 +36,16 @@ def view_page(
     catalogue: str | None = None,
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> str:
-    """Replay a run, and return the HTML of a page that shows it.
+    """Replay a run and return an HTML page that shows it.
 
     Args:
-        directory: Directory of a run, or of a failed run.
-        catalogue: Current path of its house's catalogue, if it has moved.
-        on_progress: Called with the numbers of replayed and recorded control steps.
+        directory: Directory of a complete or failed run.
+        catalogue: Current path of the house's catalogue if it was moved after the run.
+        on_progress: Called repeatedly with the number of replayed control steps and their total number.
 
     Raises:
         RecordError: `directory` is not a run directory.
-        ReplayError: The run cannot be replayed, or differs from the record.
+        ReplayError: The run cannot be replayed, or the replay differs from the record.
     """
     watched: list[tuple[Replayer, RunRecorder]] = []
 
@@ -61,7 +61,7 @@ def view_page(
 
 
 def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
-    """Return the HTML of a page that shows a run in a scene of these files. `values` are passed to the template."""
+    """Return an HTML page that shows a run. `scene` holds the scene's files, and `values` go to the template."""
     urls = {name: _data_url(name, content) for name, content in scene.items()}
     texts = trial_texts(read_words())
     packed = {"run": _packed(run), "scene": _packed(urls)}
@@ -69,7 +69,7 @@ def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **v
 
 
 def own_page(template: str, entry: str, **values: Any) -> str:
-    """Return the HTML of a self-contained page that runs the client's module `entry`."""
+    """Return a self-contained HTML page that runs the client's module `entry`."""
     modules = {name: _data_url(name, source.encode()) for name, source in modules_of(entry).items()}
     page: str = (
         Environment(loader=FileSystemLoader(CLIENT / "templates"), autoescape=True, trim_blocks=True)
@@ -85,7 +85,7 @@ def own_page(template: str, entry: str, **values: Any) -> str:
 
 
 def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
-    """Return the page's data, which are a `Run` of view/run.js."""
+    """Return the data of the page in the format `Run` of view/run.js."""
     person = record.person
     catalogue = house.catalogue.objects
     return {

@@ -1,4 +1,4 @@
-"""Recording of poses and HUD states for a page that shows a run."""
+"""Recorder of poses and HUD states for a page that shows a run."""
 
 import dataclasses
 from typing import Any
@@ -16,19 +16,21 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-DECIMALS = 4  # decimal places of stored metres, radians and quaternions
-HEIGHT = 480  # height of the picture for which pointers are computed, in pixels
+DECIMALS = 4  # number of decimal places of metres, radians and quaternions
+HEIGHT = 480  # assumed height of the picture when placing pointers, in pixels
 
 
 class RunRecorder(Viewer):
-    """A session viewer that stores what it is shown.
+    """A session viewer that records all states that it shows.
 
     Attributes:
-        body: Position in metres, heading and pitch in radians, flat, four numbers per control step.
-        hands: Positions of the left and right hand in the body's frame in metres, flat, six numbers per control step.
-        objects: Changed poses by object: step, position in metres and quaternion wxyz, flat, eight numbers each.
-        hud: Step and state without markers, whenever the state changed.
-        shown: Step and indices into `markers`, whenever they changed.
+        body: Flat list with four numbers per control step: position in metres, heading and pitch in radians.
+        hands: Flat list with six numbers per control step: positions of the left and right hand in metres, in the
+            body's frame.
+        objects: Flat list for each object with eight numbers per changed pose: control step, position in metres, and
+            quaternion wxyz.
+        hud: Control step and new state, without markers, of each change of the HUD.
+        shown: Control step and indices into `markers` of each change of the visible markers.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -44,12 +46,12 @@ class RunRecorder(Viewer):
         self._poses: dict[str, list[float]] = {}
 
     def camera(self, world: World) -> CameraView:
-        """Return the eye camera with the aspect ratio of the person's picture."""
+        """Return the eye camera with the aspect ratio of the participant's picture."""
         pose = camera_pose(world.model, world.data, avatar.EYE, PICTURE_ASPECT)
         return CameraView(pose.position, pose.rotation, pose.fovy, round(PICTURE_ASPECT * HEIGHT), HEIGHT)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Store the current state, unless it was shown before."""
+        """Record the current state unless it has been recorded."""
         if self.time and self.time[-1] == observation.time:
             return
         step = len(self.time)

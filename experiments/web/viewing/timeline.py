@@ -1,4 +1,4 @@
-"""Events and plans of a run, for the timeline of its page."""
+"""Events and plans for the timeline on the page of a run."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ DONE = {"pick": "in the hand", "place": "in its bin"}
 
 
 def moments(record: Record, house: House) -> list[dict[str, Any]]:
-    """Return the timeline's events: time `t` in seconds, `kind` as in the log, and `text`."""
+    """Return the events of the timeline: time `t` in seconds, `kind` as in the log, and `text`."""
     words = _words(record, house)
     return [
         {"t": event["t"], "kind": event["event"], "text": words[event["event"]](event)}
@@ -23,7 +23,7 @@ def moments(record: Record, house: House) -> list[dict[str, Any]]:
 
 
 def plans(record: Record, house: House) -> list[dict[str, Any]]:
-    """Return all plans: time `t` in seconds, `cost_m`, `status`, and the points of their `path` in metres, flat."""
+    """Return all plans: time `t` in seconds, `cost_m`, `status`, and `path`, a flat list of coordinates in metres."""
     found = []
     for event, step in zip(record.events, record.steps_of_events, strict=True):
         if event["event"] == "plan":

@@ -1,4 +1,4 @@
-"""A worker process with the world, clock, frames and journal of one session.
+"""Worker process with the world, clock, frames and journal of one session.
 
-The server starts a worker per session, and forwards its messages to the browser.
+The server starts one worker per session and forwards its messages to the browser.
 """

@@ -1,4 +1,4 @@
-"""The clock of a session: 25 control steps per second, none skipped, each acknowledged once it is on disk."""
+"""Clock of a session, which takes 25 control steps per second and acknowledges each step once it is on disk."""
 
 import time
 from collections.abc import Callable
@@ -9,19 +9,19 @@ from experiments.web.state import OVER, READY, RUNNING, Trigger, WireMessage
 from experiments.web.worker.control import Promise, SessionControl
 from experiments.web.worker.live_session import LiveSession
 
-LATE = 0.02  # delay from which a control step counts as late, in seconds
-MAX_LAG = 1.0  # delay after which the process must have been suspended and the clock restarts, in seconds
-MAX_UNWRITTEN = 10  # maximum number of unsynced control steps without an input
-SHOW_PERIOD = 0.1  # polling period of a session that is not running, in seconds
+LATE = 0.02  # delay above which a control step counts as late, in seconds
+MAX_LAG = 1.0  # delay after which the clock restarts, as after a suspension of the process, in seconds
+MAX_UNWRITTEN = 10  # maximum number of unsynced control steps if there are no inputs
+SHOW_PERIOD = 0.1  # interval between polls of a session that is not running, in seconds
 
 Send = Callable[[WireMessage], None]
 
 
 class Clock:
-    """Steps a session in real time. `sync` syncs its journal to disk, and `show` shows its state.
+    """Runs a session in real time. `sync` writes the journal to disk, and `show` shows the current state.
 
-    With `as_inputs_come`, a control step is due as soon as its inputs are promised, and states in between are not
-    shown.
+    If `as_inputs_come` is true, each control step is due as soon as its inputs have been promised, and intermediate
+    states are not shown.
     """
 
     def __init__(
@@ -38,12 +38,12 @@ class Clock:
         self._live, self._control, self._show = live, control, show
         self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
-        self._missed = False  # True if the last step was taken without its promised inputs
+        self._missed = False  # True if the last step lacked its promised inputs
 
     def run(self) -> str:
-        """Run the session to its end, and return the reason.
+        """Run the session until it ends, and return the reason for its end.
 
-        After a failure, run until the server ends this process.
+        A failed session continues to run until the server terminates the process.
         """
         live, control = self._live, self._control
         try:
@@ -67,7 +67,7 @@ class Clock:
         return control.state.reason
 
     def _wait_and_step(self) -> None:
-        """Take a control step once it is due and its inputs have arrived, unless the session stops first."""
+        """Take a control step when it is due and its inputs have arrived, unless the session stops before that."""
         live, schedule = self._live, self._schedule
         session, step = live.session, live.session.record.step
         if self._as_inputs_come:
@@ -83,7 +83,7 @@ class Clock:
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
         if not self._follows_at_once():
-            self._show()  # if the next step follows at once, only the state after that is shown
+            self._show()  # if the next step follows at once, this state is skipped
         self._acknowledger.request(live.input, session.record.step)
 
     def _follows_at_once(self) -> bool:
@@ -97,7 +97,7 @@ class Clock:
         return self._schedule.wait(time.monotonic(), promised=True) <= 0.0
 
     def _note_lateness(self, promise: Promise) -> None:
-        """Log a control step delayed by this machine, and the first one without its promised inputs."""
+        """Log a control step that this machine delayed, and the first one that lacks its promised inputs."""
         due, now = self._schedule.due, time.monotonic()
         late = now - (due if promise.came is None else max(due, promise.came))
         if promise.missing:
@@ -116,7 +116,7 @@ class Clock:
 
 
 class _Acknowledger:
-    """Syncs the journal in a separate thread, then acknowledges its contents."""
+    """Syncs the journal in a separate thread, then acknowledges the synced inputs and control steps."""
 
     def __init__(self, sync: Callable[[], None], send: Send) -> None:
         self._sync, self._send = sync, send
@@ -125,7 +125,7 @@ class _Acknowledger:
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Acknowledge all inputs and control steps up to these, or later if there is no new input."""
+        """Request acknowledgement of all inputs and control steps up to these. Steps without a new input may wait."""
         if number == self._number and step < self._newest + MAX_UNWRITTEN:
             return
         self._number, self._newest = number, step
@@ -140,7 +140,7 @@ class _Acknowledger:
 
     def _acknowledge(self, number: int, step: int) -> None:
         if step < self._newest or self._error is not None:
-            return  # a later request includes these steps
+            return  # a later request will include these steps
         try:
             self._sync()
         except OSError as error:
@@ -150,16 +150,16 @@ class _Acknowledger:
 
 
 PATIENCE = 0.75  # how long a control step waits for its promised inputs, in seconds
-WINDOW = 25  # period of adjustments to the page's clock, in control steps
-PULL = 0.05  # largest relative speed-up by an adjustment
+WINDOW = 25  # interval between adjustments to the page's clock, in control steps
+PULL = 0.05  # maximum speed-up per adjustment, as a fraction of the clock's rate
 
 
 class Schedule:
-    """Due times of control steps, every `period` seconds.
+    """Schedule of control steps, one every `period` seconds.
 
-    A page that promises its inputs has its own clock, and its promises take time to arrive. If all promises of a period
-    arrive after their steps are due, later steps are delayed. If all arrive before, they are advanced. A single late
-    promise is waited for, and the steps that have become due follow at once.
+    The clock of a page that promises its inputs may differ from this one, and promises take time to arrive. If all
+    promises in an interval arrive after their steps are due, the schedule is delayed. If all arrive before, it is
+    advanced. After a single late promise, the steps that have become due follow immediately.
 
     Attributes:
         due: Due time of the next control step, in seconds.
@@ -168,19 +168,19 @@ class Schedule:
     def __init__(self, period: float, now: float) -> None:
         self.due = now
         self._period = period
-        self._late: list[float] = []  # delays of promises after their steps were due, in seconds
+        self._late: list[float] = []  # delay of each promise relative to the due time of its step, in seconds
 
     def start(self, now: float) -> None:
-        """Restart. A control step is due now."""
+        """Restart the schedule, so that a control step is due now."""
         self.due = now
         self._late.clear()
 
     def wait(self, now: float, *, promised: bool) -> float:
-        """Return the time until the next control step, in seconds. `promised` is True if its inputs have arrived."""
+        """Return the time until the next control step in seconds. `promised` is True if its inputs have arrived."""
         return max(0.0, self.due + (0.0 if promised else PATIENCE) - now)
 
     def take(self, came: float | None) -> None:
-        """Record a control step. `came` is the arrival time of its inputs, or None without promises."""
+        """Record a control step. `came` is the arrival time of its inputs, or None if no inputs were promised."""
         if came is None:
             self._late.clear()
         else:

@@ -1,4 +1,4 @@
-"""State and inputs of a session, shared by a receiving and a stepping thread."""
+"""State and queued inputs of a session, shared by the receiving thread and the stepping thread."""
 
 import threading
 import time
@@ -12,40 +12,41 @@ from experiments.web.controls import Input
 from experiments.web.protocol import MAX_SILENCE
 from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, State, Trigger
 
-MAX_NOTES = 1000  # maximum number of pending events
+MAX_NOTES = 1000  # maximum number of queued log events
 MAX_PROMISES = 64  # maximum number of stored promises
-Note = tuple[str, dict[str, Any]]  # name and fields of an event to be logged
+Note = tuple[str, dict[str, Any]]  # name and fields of an event for the log
 
 
 class Promise(NamedTuple):
-    """Arrival of a control step's promised inputs. `came` is the monotonic time, or None without arrival."""
+    """Arrival of a control step's promised inputs. `came` is the monotonic arrival time, or None."""
 
     came: float | None
-    missing: bool  # True if inputs were promised but have not arrived
+    missing: bool  # True if promised inputs have not arrived
 
 
 class SessionControl:
-    """Thread-safe queue of inputs, and state machine of a session. `announce` is called with every new state."""
+    """Thread-safe state machine and input queue of a session. `announce` is called with each new state."""
 
     def __init__(self, announce: Callable[[State], None], now: Callable[[], float] = time.monotonic) -> None:
         self.state = State()
         self._now = now
         self._announce = announce
         self._inputs: list[Input] = []
-        # promises, oldest first: (control step before which all inputs have arrived, time of the promise)
+        # Promises, oldest first: (control step before which all inputs have arrived, arrival time of the promise)
         self._promises: deque[tuple[int, float]] = deque(maxlen=MAX_PROMISES)
         self._notes: list[Note] = []
         self._changed = threading.Condition()
-        self._asked = False  # a frame was requested
-        self._ready = 0.0  # monotonic time at which the session became ready to start, or 0
-        self._heard = now()  # time of the last message from the page
+        self._asked = False  # True if a frame was requested
+        self._ready = 0.0  # monotonic time at which the session became ready, or 0
+        self._heard = now()  # monotonic time of the page's last message
 
     def apply(
         self, trigger: Trigger, reason: str = "", *, last: int | None = None, until: int | None = None
     ) -> None:
         """Change the state according to the table of transitions.
 
-        `last` is the last input of a restored session. `until` is the promise of a page that starts the clock.
+        `last` is the number of the last input in a restored session. `until` is the first promise of a page that starts
+        the clock.
         """
         with self._changed:
             before = self.state if last is None else msgspec.structs.replace(self.state, input=last)
@@ -69,9 +70,9 @@ class SessionControl:
             self._changed.notify_all()
 
     def add(self, inputs: list[Input], until: int | None = None) -> None:
-        """Queue inputs, ignoring repeated ones from a reconnected browser.
+        """Queue inputs. Those that a reconnected browser sends again are ignored.
 
-        `until` promises that all inputs for the control steps before it have arrived.
+        `until` promises that all inputs for earlier control steps have arrived.
         """
         with self._changed:
             running = self.state.phase is RUNNING
@@ -89,19 +90,18 @@ class SessionControl:
             self._heard = self._now()
 
     def pause_if_silent(self) -> None:
-        """Pause if the page has been silent for too long."""
         with self._changed:
             if self.state.phase is RUNNING and self._now() - self._heard > MAX_SILENCE:
                 self.apply(Trigger.PAUSE, "silent")
 
     def note(self, event: str, **fields: Any) -> None:
-        """Record an event of the page for the log. Excess events are dropped."""
+        """Queue an event of the page for the log. Drop it if the queue is full."""
         with self._changed:
             if len(self._notes) < MAX_NOTES:
                 self._note(event, **fields)
 
     def take_inputs(self, step: int) -> tuple[Input, ...]:
-        """Take all inputs from the queue up to the first one that is stamped with a later step."""
+        """Remove and return all queued inputs up to the first one for a later control step."""
         with self._changed:
             later = (i for i, new in enumerate(self._inputs) if new.step is not None and new.step > step)
             count = next(later, len(self._inputs))
@@ -109,9 +109,9 @@ class SessionControl:
         return taken
 
     def wait_for_promise(self, step: int, seconds: float) -> Promise:
-        """Wait until all inputs for a control step have arrived or the session stops, for at most `seconds`.
+        """Wait up to `seconds` until all inputs for a control step have arrived or the session stops.
 
-        Return at once if the page makes no promises.
+        Return immediately if the page makes no promises.
         """
         with self._changed:
             self._changed.wait_for(
@@ -127,20 +127,20 @@ class SessionControl:
             return Promise(came, missing=False) if until > step else Promise(None, missing=True)
 
     def take_notes(self) -> list[Note]:
-        """Return all events to be logged since the last call."""
+        """Remove and return all queued events for the log."""
         with self._changed:
             taken, self._notes = self._notes, []
         return taken
 
     def ask_to_show(self) -> None:
-        """Request a frame for a new connection or view."""
+        """Request a frame after a new connection or a change of the view."""
         with self._changed:
             self._asked = True
             self._ready = self._ready or self._now()
             self._changed.notify_all()
 
     def wait_for_change(self, phase: SessionPhase, seconds: float) -> None:
-        """Wait until the session has left a phase or a frame is requested, for at most `seconds`."""
+        """Wait up to `seconds` until the session has left a phase or a frame is requested."""
         with self._changed:
             self._changed.wait_for(lambda: self._asked or self.state.phase is not phase, seconds)
             self._asked = False

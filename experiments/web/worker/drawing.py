@@ -1,4 +1,4 @@
-"""Drawing of the person's view: always the latest state, as large and as often as possible."""
+"""Drawing of the participant's view, which is as large and frequent as the browser and the worker allow."""
 
 import dataclasses
 import threading
@@ -18,15 +18,15 @@ from mjsim.render import FAST, Renderer
 from mjsim.world.world import World
 
 COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile of the smallest frame size
-MAX_IN_FLIGHT = 3  # maximum number of sent frames that are not yet shown
+MAX_IN_FLIGHT = 3  # maximum number of frames sent but not yet shown
 
 
 class _Moment(NamedTuple):
-    data: Any  # copy of the simulator's data
+    data: Any  # copy of the simulator's `MjData`
     markers: tuple[Marker, ...]
     step: int
     input: int
-    hidden: bool  # True to send a black frame, because the clock is stopped
+    hidden: bool  # True for a black frame while the clock is stopped
 
     def content(self) -> object:
         return self.hidden or (self.data.qpos.tobytes(), self.markers)
@@ -36,11 +36,11 @@ class _Job(NamedTuple):
     moment: _Moment
     view: View
     key: bool
-    waited: float  # time waiting for the connection, in seconds
+    waited: float  # time spent waiting for the connection, in seconds
 
 
 class Drawer:
-    """Draws and sends frames in a thread until it is closed. The session fails if drawing fails."""
+    """Draws and sends frames in a thread. If drawing fails, the session fails."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Drawer:
         self._drawn: object = None
         self._sent = self._seen = 0
         self._key = self._closed = False
-        self._spare: list[Any] = []  # simulator data for reuse
+        self._spare: list[Any] = []  # simulator data to be reused
         self._renderers: dict[int, Renderer] = {}
         self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
         self._thread.start()
@@ -79,11 +79,10 @@ class Drawer:
 
     @property
     def hidden(self) -> bool:
-        """True while the clock is stopped and nothing is shown."""
         return self._control.state.phase is not RUNNING
 
     def draw(self, world: World, state: HudState, step: int, number: int, hidden: bool) -> None:
-        """Queue a state for drawing. It replaces a queued state that has not been drawn yet."""
+        """Queue a state for drawing. It replaces a queued state that has not been drawn."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
@@ -101,7 +100,7 @@ class Drawer:
     def _run(self) -> None:
         try:
             self._draw_all()
-        except Exception as error:  # the session cannot continue without frames
+        except Exception as error:  # a session cannot continue without frames
             self._control.apply(Trigger.FAIL, describe(error))
         for renderer in self._renderers.values():
             renderer.close()
@@ -146,8 +145,8 @@ class Drawer:
             self._spare.append(moment.data)
 
     def _next(self) -> _Job | None:
-        """Wait for a new state and for the browser to keep up. Return None once closed."""
-        ready: float | None = None  # time since which a state waits for the connection
+        """Wait for a new state and until the browser has caught up. Return None after `close`."""
+        ready: float | None = None  # time since which a state has been waiting for the connection
         with self._changed:
             while not self._closed:
                 moment, view = self._moment, self._view

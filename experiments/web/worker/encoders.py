@@ -1,4 +1,4 @@
-"""Compression of frames for a browser, by JPEG or low-latency H.264."""
+"""Compression of frames as JPEG or low-latency H.264."""
 
 import base64
 import statistics
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
-QUALITY = 75  # JPEG quality
+QUALITY = 75
 H264_OPTIONS = {
     "preset": "superfast",
     "tune": "zerolatency",
@@ -27,12 +27,12 @@ class Encoder(Protocol):
     """Compresses frames of one size."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:
-        """Compress a uint8 RGB frame (h, w, 3). Return the bytes, and True for a key frame. `key` requests one."""
+        """Compress a uint8 RGB frame (h, w, 3). Return the bytes, and True for a key frame, which `key` can request."""
         ...
 
 
 class JpegEncoder:
-    """JPEG, in which each frame is a key frame."""
+    """JPEG encoder. Each frame is a key frame."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:  # noqa: ARG002 - each is a key frame
         _, data = cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
@@ -40,7 +40,7 @@ class JpegEncoder:
 
 
 class H264Encoder:
-    """H.264 without delay: one Annex B packet per frame. Width and height must be even."""
+    """Low-latency H.264 encoder with one Annex B packet per frame. Width and height must be even."""
 
     def __init__(self, width: int, height: int) -> None:
         self._codec: Any = av.CodecContext.create("libx264", "w")
@@ -61,27 +61,24 @@ class H264Encoder:
 
 
 def data_url(picture: Image) -> str:
-    """Return a uint8 RGBA picture (h, w, 4) as the data URL of a WebP."""
+    """Return a uint8 RGBA picture (h, w, 4) as a data URL in WebP format."""
     _, data = cv2.imencode(
         ".webp", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_WEBP_QUALITY, 85]
     )
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
-SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # pixels
+SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # width and height in pixels
 FIRST_SIZE = 2
-FRAMES = 20  # number of frames between changes of the size
-SLOW, QUICK = (
-    0.033,
-    0.022,
-)  # frame times above which the size decreases and below which it increases, in seconds
-HELD_UP = 0.06  # wait for the connection above which the size decreases, in seconds
-SHARE = 0.65  # share of time for drawing; the rest is left to other sessions
+FRAMES = 20  # number of frames from which median times are computed
+SLOW, QUICK = 0.033, 0.022  # frame times above and below which the frame size changes, in seconds
+HELD_UP = 0.06  # wait for the connection above which frames become smaller, in seconds
+SHARE = 0.65  # fraction of time spent on drawing; the rest is left to other sessions
 RETRY = 30.0  # time until a size that was too large is tried again, in seconds
 
 
 class FrameSize:
-    """Index of the next frame's size in `SIZES`. It decreases when frames take long or wait for the connection."""
+    """Adapts the size of frames. `index` selects it from `SIZES`. Slow drawing or a slow connection decreases it."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self.index, self._largest = FIRST_SIZE, len(SIZES) - 1
@@ -91,13 +88,13 @@ class FrameSize:
         self._retry_at = 0.0
 
     def limit(self, width: int, height: int) -> None:
-        """Limit frames to the size of a view in pixels, but at least to the smallest size."""
+        """Limit frames to the size of a view in pixels. The smallest size is always allowed."""
         fitting = [i for i, (w, h) in enumerate(SIZES) if w <= width and h <= height]
         self._largest = max(fitting, default=0)
         self._set(min(self.index, self._largest))
 
     def note(self, took: float, waited: float) -> None:
-        """Record the time for drawing and compressing a frame, and its wait for the connection, in seconds."""
+        """Record the time for drawing and compressing a frame, and the wait for the connection. Both are in seconds."""
         self._frames.append((took, waited))
         if len(self._frames) < FRAMES:
             return
@@ -115,5 +112,5 @@ class FrameSize:
 
 
 def pause_after(took: float) -> float:
-    """Return the pause after a frame that took `took` seconds, in seconds."""
+    """Return how long to pause after a frame that took `took` seconds."""
     return took / SHARE - took

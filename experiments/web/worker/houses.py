@@ -15,7 +15,7 @@ from mjsim.formats.gltf.cache import cached_floor, cached_scene
 from mjsim.formats.gltf.store import scenes_folder
 from mjsim.render import render_house_map, render_pictures
 
-DRAWING_TIMEOUT = 60.0  # seconds
+DRAWING_TIMEOUT = 60.0  # timeout in seconds
 _pictures: dict[str, dict[str, Image]] = {}
 
 
@@ -32,7 +32,7 @@ def pictures(name: str) -> dict[str, Image]:
 
 @functools.cache
 def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
-    """Return a house's pictures as data URLs, and its floor plan if needed. Call this where OpenGL is available."""
+    """Return a house's pictures as data URLs, with the floor plan if requested. OpenGL must be available."""
     found = dict(pictures(name))
     if floor_plan:
         found[FLOORPLAN] = render_house_map(house(name).catalogue, house(name).bounds)
@@ -40,9 +40,7 @@ def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
 
 
 def scene_files(house: House) -> tuple[str, str]:
-    """Return the URL paths of a house's scene and of its floor file, creating the files if needed.
-
-    Creating them takes seconds.
+    """Return the URL paths of a house's scene and floor file. Missing files are created, which takes seconds.
 
     Raises:
         AssetError: Part of the house cannot be exported.
@@ -54,28 +52,29 @@ def scene_files(house: House) -> tuple[str, str]:
 
 
 def preload(name: str) -> None:
-    """Load a house, its pictures and the kernels before workers are forked. Workers retry and report failures.
+    """Load a house, its pictures and the kernels before workers are forked. Failures are left to the workers.
 
-    Threads and OpenGL do not survive a fork. So a child process draws the pictures, and another one exports the scene.
+    Threads and OpenGL contexts do not survive a fork. One child process therefore draws the pictures, and another one
+    exports the scene.
     """
     with suppress(Exception):
         loaded = house(name)
         _begin(scene_files, loaded)
         with get_context("fork").Pool(1) as drawing:
             drawn = drawing.apply_async(render_pictures, (loaded.catalogue,))
-            warmup.compile_kernels(loaded)  # this also caches hashes and versions
+            warmup.compile_kernels(loaded)  # also caches hashes and versions
             _pictures[name] = drawn.get(DRAWING_TIMEOUT)
         encoded_pictures(name, False)
-    gc.freeze()  # garbage collection would copy shared pages
+    gc.freeze()  # garbage collection would copy shared memory pages
 
 
 def _begin(work: Callable[[House], object], house: House) -> None:
-    """Run `work` in a detached process, because only workers may be children of the fork server."""
+    """Run `work` in a detached process, because the fork server may only have workers as children."""
     between = os.fork()
     if not between:
         try:
             if not os.fork():
                 work(house)
-        finally:  # callers retry and report errors
+        finally:  # the workers retry and report errors
             os._exit(0)
     os.waitpid(between, 0)

@@ -1,4 +1,4 @@
-"""A session with a person: stepped from outside, journalled at each step, and resumable after a crash."""
+"""Live session with a participant, which is journalled at each step and can resume after a crash."""
 
 import json
 import logging
@@ -41,18 +41,18 @@ from mjsim.world.world import World
 from planner.service import Mode, Planner
 
 LOG = logging.getLogger("mjsim.play")
-MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; about 7 h with 6 objects, 3 h with 24
+MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; reached after 7 h with 6 objects
 
 
 class InputState(msgspec.Struct):
-    """State of a participant, stored in the journal."""
+    """State of a participant's inputs, which is stored in the journal."""
 
     controls: Controls = Controls()
     input: int = 0
 
 
 class BrowserParticipant:
-    """The participant of a session with a person.
+    """Participant of a live session, controlled by a person.
 
     Attributes:
         inputs: Inputs for the next control step.
@@ -84,21 +84,21 @@ class BrowserParticipant:
 
 
 class LiveSession:
-    """A session of the trial in a journal, continued from its last control step.
+    """Live session of a trial, continued from the last control step in its journal.
 
     Args:
-        journal: Journal of all control steps. An empty one starts with `config`.
-        config: Settings of the trial, or None for those in the journal.
-        before: Earlier phases, as fields of `phase_ended` events.
-        texts: Texts of the HUD, or None for those of the language.
+        journal: Journal of all control steps. If it is empty, `config` is written first.
+        config: Settings of the trial, or None to use those in the journal.
+        before: Fields of the `phase_ended` events of earlier phases.
+        texts: HUD texts, or None for the default texts of the language.
 
     Attributes:
         config: Settings of the trial.
-        shown: House with labels in the language.
-        resumed: True if an earlier process started it.
+        shown: House with labels in the participant's language.
+        resumed: True if another process started the session.
 
     Raises:
-        RecordError: The journal is empty, the session is over, or a replay of the journal reaches different states.
+        RecordError: The journal is empty, the session is over, or replaying the journal leads to different states.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class LiveSession:
             journal.append(Header(config.settings(), self.scene.episode.to_json()))
             journal.sync()
         record = read_journal(journal.entries) if len(journal.entries) > 1 else None
-        journal.entries = ()  # free the memory: an hour of entries takes about 80 MB
+        journal.entries = ()  # free memory: the entries of an hour take about 80 MB
         self.resumed = record is not None
         options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
@@ -150,7 +150,7 @@ class LiveSession:
             user=self._human,
             journal=journal,
         )
-        self.session.shows_each_step = False  # the clock decides which steps are shown
+        self.session.shows_each_step = False  # the clock decides which states are shown
         Familiarisation(tuple(before), None).log(log)
         if record is None:
             self.session.begin()
@@ -163,20 +163,19 @@ class LiveSession:
 
     @property
     def input(self) -> int:
-        """Number of the last input that took effect."""
+        """Number of the last input in effect."""
         return self._human.state.input
 
     @property
     def end_reason(self) -> str | None:
-        """Reason why the task is over, or None."""
+        """Reason for the end of the task, or None."""
         return self.session.end_reason or (INTERRUPTED if self._journal.size > MAX_JOURNAL else None)
 
     def release(self) -> None:
-        """Release all controls."""
         self._human.state.controls = Controls()
 
     def step(self, inputs: Sequence[Input]) -> None:
-        """Take a control step, which is durable once the journal is synced. Raises PhysicsError or OSError."""
+        """Take a control step. It is durable once the journal is synced. Raises PhysicsError or OSError."""
         for new in inputs:
             if new.scroll:
                 self.session.scroll(new.scroll)
@@ -185,7 +184,7 @@ class LiveSession:
         self.session.record.commit(self._human.state)
 
     def end(self, reason: str) -> None:
-        """End the session. The run directory can then be made from the journal."""
+        """End the session, after which `save_run` can write the run directory."""
         self.session.end(reason)
         self.session.record.commit(self._human.state)
         self._journal.sync()
@@ -201,7 +200,6 @@ def _config_in(journal: Journal) -> TrialConfig | None:
 
 
 def is_over(journal: Journal) -> bool:
-    """Return True if the session recorded in an open journal has ended."""
     last = journal.entries[-1] if journal.entries else None
     return (
         isinstance(last, JournalEntry) and bool(last.events) and json.loads(last.events[-1])["event"] == "end"
@@ -209,26 +207,26 @@ def is_over(journal: Journal) -> bool:
 
 
 def open_journal(folder: Path) -> Journal:
-    """Open the journal in a folder, creating both if needed."""
+    """Open the journal in a folder. Create the folder and the journal if needed."""
     folder.mkdir(parents=True, exist_ok=True)
     return Journal(folder / JOURNAL)
 
 
 def journal_of(run: Path) -> Path | None:
-    """Return the folder of the journal for a missing run directory, or None."""
+    """Return the folder that contains a run's journal, or None if there is no journal."""
     folders = (run, run.parent / JOURNALS / run.name)
     return next((folder for folder in folders if (folder / JOURNAL).is_file()), None)
 
 
 def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan: bool = True) -> None:
-    """Make the run directory of a finished or unfinished session, and then its floor plan.
+    """Write the run directory of a session from its journal, and then the floor plan. The session may be unfinished.
 
     Args:
-        run: The run directory. Existing parts are kept.
+        run: Path of the run directory. Existing parts are kept.
         house: House of the trial, or None to load it.
 
     Raises:
-        RecordError: There is no journal or control step, or the run directory cannot be made.
+        RecordError: There is no journal or control step, or the run directory cannot be written.
         ReplayError: The existing run directory cannot be read.
         OSError: The journal cannot be read.
     """
@@ -246,9 +244,9 @@ def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan:
 
 
 def remove_journal(folder: Path, run: Path) -> None:
-    """Delete the journal of a finished session, once its run directory holds the same record on disk.
+    """Delete the journal of a finished session if its run directory holds the same record.
 
-    A journal that differs from its run directory, or cannot be compared, is kept with a warning in the log.
+    If they differ or cannot be compared, the journal is kept and a warning is logged.
     """
     if not (folder / JOURNAL).is_file():
         return
@@ -267,6 +265,6 @@ def remove_journal(folder: Path, run: Path) -> None:
     except (RecordError, ReplayError, OSError) as error:
         LOG.warning("%s is kept: %s", folder / JOURNAL, error)
         return
-    with suppress(OSError):  # the folder has the journal of another trial
+    with suppress(OSError):  # the folder contains the journal of another trial
         folder.rmdir()
         folder.parent.rmdir()

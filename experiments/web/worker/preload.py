@@ -1,4 +1,4 @@
-"""Module imported by the fork server, which loads everything that workers share."""
+"""Module imported by the fork server to load everything that workers share."""
 
 import os
 

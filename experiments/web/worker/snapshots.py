@@ -1,4 +1,4 @@
-"""Snapshots of a session for clients that draw: the objects that a client may know, and their changes."""
+"""Snapshots of a session for clients that draw: objects that may come into view, and their changes."""
 
 import logging
 
@@ -14,14 +14,14 @@ from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
-HORIZON = 0.3  # an object is sent once it may come into view within this time, in seconds
-LINGERING = 25  # how long an object is sent after it could last come into view, in control steps
-LOOK_EVERY = 3  # period of updating the objects to send, in control steps
-DECIMALS = 4  # decimal places of positions in metres and of orientations
+HORIZON = 0.3  # time ahead for which visible objects are predicted, in seconds
+LINGERING = 25  # how long objects that are out of view are still sent, in control steps
+LOOK_EVERY = 3  # interval between updates of the set of objects to send, in control steps
+DECIMALS = 4  # number of decimal places of positions in metres and of quaternions
 
 
 def field_of_view(live: LiveSession, view: View) -> float:
-    """Return the field of view in radians: the person's choice within the study's limits, or the default."""
+    """Return the field of view in radians: the participant's choice if the study allows it, or the default."""
     own, limits = live.scene.person.field_of_view, live.config.view_limits
     if limits is None or view.codec != "none":
         return own
@@ -30,7 +30,6 @@ def field_of_view(live: LiveSession, view: View) -> float:
 
 
 def scene_of(live: LiveSession, view: View) -> SceneMessage:
-    """Return the scene message of a session."""
     person, options = live.scene.person, live.world.options
     path: str | None
     floor: str | None
@@ -56,15 +55,14 @@ class SnapshotStream:
     def __init__(self, live: LiveSession, view: View) -> None:
         self._live, self._aspect = live, view.width / view.height
         self._potential_visibility = PotentialVisibility(live.scene, HORIZON, field_of_view(live, view))
-        self._until: dict[str, int] = {}  # control steps until which objects are sent
+        self._until: dict[str, int] = {}  # control step until which each object is sent
         self._models = {item.name: item.model for item in live.scene.episode.objects}
-        self._looked = -LOOK_EVERY  # control step of the last update
-        self._hands: tuple[str | None, str | None] = (None, None)  # hands at that update
+        self._looked = -LOOK_EVERY  # control step of the last update of this set
+        self._hands: tuple[str | None, str | None] = (None, None)  # objects in the hands at that update
         self._poses = np.full((len(self._models), 7), np.nan)
         self._sent: dict[str, list[float]] = {}
 
     def next(self, seen: Observation, step: int) -> Snapshot:
-        """Return the snapshot before a control step."""
         world, names = self._live.world, seen.object_names
         if step >= self._looked + LOOK_EVERY or seen.hands != self._hands:
             self._look(seen, step)

@@ -1,4 +1,4 @@
-"""A session viewer for the browser, which sends frames or snapshots, and the HUD next to the picture."""
+"""Session viewer for the browser, which sends the HUD and either frames or snapshots."""
 
 import dataclasses
 import math
@@ -25,8 +25,8 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-HUD_EVERY = 4  # HUD update period for clients that draw, in control steps; picks and places update it at once
-HEIGHT = 480  # height of the picture for projections, in pixels; the value is arbitrary
+HUD_EVERY = 4  # HUD update interval for clients that draw, in control steps
+HEIGHT = 480  # assumed height of the picture for projections, in pixels
 
 
 class BrowserViewer(Viewer):
@@ -43,16 +43,16 @@ class BrowserViewer(Viewer):
         self._snapshots: SnapshotStream | None = None
         self._step = -1  # control step of the last snapshot
         self._looked = -HUD_EVERY  # control step of the last HUD update
-        self._glance: object = None  # state at that update
+        self._glance: object = None  # state at the last HUD update
 
     def set_view(self, view: View | None) -> None:
-        """Send everything to a new connection, in this view or, if it is None, in the last one."""
+        """Send everything to a new connection. If `view` is None, keep the previous view."""
         self.view = view or self.view
         if self.drawer is not None and self.view is not None:
             self.drawer.set_view(self.view)
 
     def camera(self, world: World) -> CameraView | None:
-        """Return the eye camera for off-screen pointers, in the view's aspect ratio."""
+        """Return the eye camera with the view's aspect ratio, for pointers to objects outside the view."""
         view = self.view
         if view is None:
             return None
@@ -66,7 +66,7 @@ class BrowserViewer(Viewer):
         return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def look(self) -> None:
-        """Show the current state. A client that draws gets the HUD less often."""
+        """Show the current state. Clients that draw receive the HUD less often."""
         live = self.live
         if live is None:
             return
@@ -80,7 +80,7 @@ class BrowserViewer(Viewer):
             self._send_snapshot(self._snapshots, seen, step)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Send the changes since the last call."""
+        """Send all changes since the last call."""
         view, live = self.view, self.live
         if live is None or self.drawer is None or view is None:
             return
@@ -153,7 +153,7 @@ class BrowserViewer(Viewer):
 
 
 def page_hud(state: HudState) -> Hud:
-    """Return the HUD state without its markers and without the values that a `Moment` has."""
+    """Return the HUD state without markers and the values sent in `Moment`."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None
