@@ -1,4 +1,4 @@
-"""Sessions, simulated participants, metrics, records and the command line."""
+"""Sessions, simulated participants, metrics, run records and the command line."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Error types of the experiments, and functions that describe any error.
+"""Exceptions of the package `experiments`, and functions that describe any exception.
 
 ExperimentError
 ├── ConfigError     an option of a run or batch is not usable
@@ -19,17 +19,17 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
-# Environment variable with the time limit for one call of custom code, in seconds. Workers inherit it.
+# Environment variable with the time limit of one call of user code, in seconds. Worker processes inherit it.
 CALL_LIMIT = "MJSIM_CALL_LIMIT"
-MAX_SHOWN = 300  # longest message or value in an error, in characters
+MAX_SHOWN = 300  # maximum length of a value in an error message, in characters
 
 
 class ExperimentError(Exception):
-    """Base of every error raised by :mod:`experiments`."""
+    """Base class of all exceptions raised by :mod:`experiments`."""
 
 
 class ConfigError(ExperimentError):
-    """An option of a run or batch is not usable."""
+    """An option of a run or batch is not valid."""
 
 
 class SessionError(ExperimentError):
@@ -37,7 +37,7 @@ class SessionError(ExperimentError):
 
 
 class RecordError(ExperimentError):
-    """A run directory is missing, incomplete or in the way."""
+    """A run directory is missing, incomplete, or exists although a new one is needed."""
 
 
 class UserCodeError(ExperimentError):
@@ -45,19 +45,19 @@ class UserCodeError(ExperimentError):
 
 
 class StatisticsError(ExperimentError):
-    """The data do not allow a statistical test; the message says why."""
+    """The data do not allow a statistical test. The message states the reason."""
 
 
 class StoreError(ExperimentError):
-    """The database of a study is not usable, or a request contradicts its content. The message says what to do."""
+    """The database of a study cannot be used, or a request contradicts its contents. The message proposes a remedy."""
 
 
 class ReplayError(ExperimentError):
-    """A recorded run cannot be replayed, or differs from its record.
+    """A recorded run cannot be replayed, or the replay differs from the record.
 
     Attributes:
-        step: First bad control step, or None if no step is to blame.
-        verdicts: One line for each file that was checked.
+        step: First control step with a difference, or None if the cause is not a single step.
+        verdicts: Results of the comparison, one line per file.
     """
 
     def __init__(self, message: str, step: int | None = None, verdicts: Sequence[str] = ()) -> None:
@@ -67,15 +67,15 @@ class ReplayError(ExperimentError):
 
 
 def describe(error: BaseException) -> str:
-    """Describe an error in one line. The type precedes the message unless it is one of this project's errors."""
-    # Imported late because `mjsim doctor` must work if another distribution shadows one of these packages.
+    """Describe an exception in one line. The type is included unless the exception is defined by this project."""
+    # Import late: `mjsim doctor` must work even if another distribution shadows one of these packages.
     from hud.errors import HudError
     from mjsim.values.errors import MjsimError
     from planner.errors import PlannerError
 
     try:
         message = " ".join(str(error).split()).encode(errors="backslashreplace").decode()
-    except Exception:  # raised by a custom error type
+    except Exception:  # custom exceptions may fail to format
         message = ""
     if isinstance(error, ExperimentError | HudError | MjsimError | PlannerError):
         return message
@@ -83,10 +83,10 @@ def describe(error: BaseException) -> str:
 
 
 def shown(value: object) -> str:
-    """Format a value of any type for a message."""
+    """Return the representation of a value, shortened for a message."""
     try:
         return _cut(" ".join(repr(value).encode(errors="backslashreplace").decode().split()))
-    except Exception:  # raised by a custom type
+    except Exception:  # custom classes may fail to format
         return f"a {type(value).__name__}"
 
 
@@ -95,7 +95,7 @@ def _cut(text: str) -> str:
 
 
 def user_code_location(error: BaseException | None) -> str:
-    """Return file and line of the innermost frame in custom code, or an empty string."""
+    """Return the file and line of the innermost frame in user code, or an empty string."""
     trace, found = error.__traceback__ if error is not None else None, ""
     while trace is not None:
         file, module = trace.tb_frame.f_code.co_filename, str(trace.tb_frame.f_globals.get("__name__", ""))
@@ -106,15 +106,15 @@ def user_code_location(error: BaseException | None) -> str:
 
 
 def _is_user_file(file: str) -> bool:
-    if not Path(file).is_absolute() or file.startswith(LIBRARIES):  # compiled libraries name relative files
+    if not Path(file).is_absolute() or file.startswith(LIBRARIES):  # compiled libraries use relative names
         return False
     return not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
 
 
 def definition(code: object) -> str:
-    """Return file and line of a function's definition, or an empty string if they are unknown."""
+    """Return the file and line at which a function is defined, or an empty string if unknown."""
     try:
         found = inspect.unwrap(code).__code__  # type: ignore[arg-type]
         return f" ({found.co_filename}, line {found.co_firstlineno})"
-    except Exception:  # another kind of callable
+    except Exception:  # not a Python function
         return ""

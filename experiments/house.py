@@ -1,4 +1,4 @@
-"""A house prepared for many episodes: catalogue, navmesh, geodesics, rooms and receptacles."""
+"""A house prepared for many episodes, with its catalogue, navmesh, geodesics, rooms and receptacles."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -28,20 +28,21 @@ from planner.geodesics import Geodesics
 from planner.navmesh import NavMesh
 
 TEXTS = Path(__file__).with_name("texts")  # folder with one TOML file per language
-VIEWPOINT_SPACING = 2.2  # distance from a viewpoint within which furniture hides no objects, in metres
+VIEWPOINT_SPACING = 2.2  # maximum distance from any point of a room to a viewpoint, in metres
 VIEWPOINT_CANDIDATES = 3000
-WALL_GAP = 0.05  # extra distance of planned paths from walls, in metres, so that walkers can cut corners
+WALL_GAP = 0.05  # additional distance of planned paths from walls, for cutting corners, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class House:
-    """The parts of a house that no episode changes. Participants know them from the familiarisation (PAPER section 7).
+    """The parts of a house that are the same in all episodes. Participants know them from the familiarisation.
 
     Attributes:
-        sampling_floor: Navmesh of the default person, on which objects and start positions are sampled for all persons.
-        navmesh: Navmesh of this house's person.
-        geodesics: Shortest paths for planning and guidance, slightly away from walls. An object may be off the navmesh
-            but within reach.
+        sampling_floor: Navmesh of the default person, on which objects and start positions are sampled for every
+            person.
+        navmesh: Navmesh of the person who walks in this house.
+        geodesics: Shortest paths for planning and guidance, slightly away from the walls. Objects may be off the
+            navmesh, but within reach of a path.
         receptacles: Geometry by receptacle key.
         bounds: (x_min, y_min, x_max, y_max) of the floor, in metres.
         texts: HUD texts in the language of the catalogue's labels.
@@ -61,14 +62,14 @@ class House:
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":
-        """Compile a house and build the default person's navmesh.
+        """Compile a house and build the navmesh of the default person.
 
         Args:
-            name: Name under `models/houses`, path of a `catalogue.toml`, its folder or a recipe, or a generated home
-                such as `generated:7`.
+            name: Name of a house in `models/houses`, path of a recipe, a `catalogue.toml` or its folder, or a generated
+                home such as `generated:7`.
 
         Raises:
-            AssetError: The house cannot be read or compiled, or breaks a convention of docs/models.md.
+            AssetError: The house cannot be read or compiled, or violates a convention of docs/models.md.
             HouseError: The home cannot be generated.
         """
         return cls.of(load_catalogue(name))
@@ -94,10 +95,10 @@ class House:
         )
 
     def in_language(self, language: str, texts: HudTexts | None = None) -> "House":
-        """Return this house with labels and HUD texts in another language; `texts` overrides the HUD texts.
+        """Return this house with labels and HUD texts in another language. `texts` overrides the language's HUD texts.
 
         Raises:
-            ConfigError: There are no texts in the language.
+            ConfigError: The language is not available.
             AssetError: A file of labels cannot be used.
         """
         texts = texts or HudTexts(**read_words(language)["hud"])
@@ -106,7 +107,7 @@ class House:
         return dataclasses.replace(self, catalogue=catalogue, rooms=rooms, texts=texts)
 
     def for_person(self, person: PersonParameters) -> "House":
-        """Return this house, with the same episodes, for a person of another size or reach.
+        """Return this house for a person of a different size or reach. The episodes stay the same.
 
         Raises:
             ConfigError: A receptacle would be out of reach.
@@ -130,19 +131,19 @@ class House:
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
-        """Shortest paths of a person whose trunk touches the walls. They are lower bounds on walking distances."""
+        """Shortest paths for a person whose trunk touches the walls, which give lower bounds on walking distances."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(_navmesh(floor, self.person.body_radius))
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
-        """Navigable point from which to use each receptacle, in metres, shape (2,), by receptacle key."""
+        """For each receptacle, the navigable point from which it can be used. Shape (2,), in metres."""
         return {key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()}
 
     @cached_property
     def viewpoints(self) -> Mapping[str, NDArray[np.float64]]:
-        """Points from which a whole room can be seen, in metres, shape (k, 2), by room key."""
-        # The seed is fixed because viewpoints are a property of the house, not of a trial.
+        """For each room, points from which all of the room can be seen. Shape (k, 2), in metres."""
+        # Use a fixed seed, because the viewpoints must be the same in all trials in the house.
         floor = self.navmesh.sample(np.random.default_rng(0), VIEWPOINT_CANDIDATES)
         rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
         return {
@@ -154,7 +155,7 @@ class House:
     def sample_episode(
         self, *, objects: int, seed: int, points: int = POINTS, disorder: Disorder | None = None
     ) -> Episode:
-        """Sample an episode, which is a disorganized state of the house (PAPER section 4).
+        """Sample a disorganized state of the house (PAPER section 4).
 
         Raises:
             SamplingError: `objects` is out of range, or the house is too small for the points.
@@ -165,7 +166,7 @@ class House:
         )
 
     def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
-        """Sample points at which objects may lie, in metres, shape (points, 2).
+        """Sample points at which objects may lie. They have shape (points, 2), in metres.
 
         Raises:
             SamplingError: The house is too small for the points.
@@ -174,10 +175,10 @@ class House:
 
 
 def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
-    """Read all texts in a language, by section and name.
+    """Read all texts of a language, by section and name.
 
     Raises:
-        ConfigError: There are no texts in the language.
+        ConfigError: The language is not available.
     """
     path = TEXTS / f"{language}.toml"
     if not path.is_file():
@@ -191,7 +192,7 @@ def _navmesh(floor: Footprint, radius: float) -> NavMesh:
 
 
 def _farthest_points(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Sample points (m, 2) farthest-first until every point is within `spacing` metres of a sampled one."""
+    """Sample points (m, 2) farthest-first until every point has a sampled point within `spacing` metres."""
     chosen = [int(np.argmin(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     gap = np.linalg.norm(points - points[chosen[0]], axis=1)
     while gap.max() > spacing:
