@@ -1,4 +1,4 @@
-"""Options of commands that run the trials of a design, with progress bars and shards (docs/batches.md)."""
+"""Options, progress bars and shards for commands that run the trials of a design (docs/batches.md)."""
 
 import argparse
 import os
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from experiments.trials.trial_reader import OnRead
 
-MAX_SHARDS_SHOWN = 100  # length limit of the list of shards to rerun
+MAX_SHARDS_SHOWN = 100  # maximum number of shards that are listed for a rerun
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +53,7 @@ def run_with_progress(
     what: str = "trials",
     shard: Shard | None = None,
 ) -> tuple[list[Mapping[str, Any]], int]:
-    """Run the unfinished trials of a design. Return all rows of the folder and the number of failed trials."""
+    """Run the unfinished trials of a design. Return all rows of the batch and the number of failed trials."""
     from experiments.trials.batch import BatchProgress, run_batch
 
     failed = 0
@@ -86,7 +86,7 @@ def run_with_progress(
 
 @contextmanager
 def _progress_bars() -> "Iterator[tuple[Progress, OnRead]]":
-    """Yield progress bars, and a callback that shows the progress of reading finished trials."""
+    """Yield progress bars, and a callback that shows how many finished trials have been read."""
     from experiments.cli.terminal import counting_bars
 
     with counting_bars("{task.description}") as bars:
@@ -125,7 +125,7 @@ def _shard(text: str) -> Shard:
 
 
 def run_share(design: Design, arguments: argparse.Namespace, what: str = "trials") -> int | None:
-    """Run a shard or merge shards, as the options say. Return the exit code, or None if neither option is given."""
+    """Run a shard or merge shards, depending on the options. Return the exit code, or None without these options."""
     from experiments.cli.terminal import error_console
 
     out: Path = arguments.out

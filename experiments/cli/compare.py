@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval
 
 METRICS = ("completion_time_s", "task_distance_m", "ipl_locations", "nd_feasible", "total_regret_m")
-FORMATS = (".png", ".svg", ".pdf")  # suffixes of a figure
-WIDTH = 160  # width of the output without a terminal, in characters
+FORMATS = (".png", ".svg", ".pdf")  # file formats for figures
+WIDTH = 160  # output width in characters if there is no terminal
 
 DESCRIPTION = """\
 Compare each pair of assistance conditions in a batch. Two trials form a pair if they differ only in the assistance:

@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     import shtab
 
-    from experiments.cli.main import COMMANDS, parser  # imported here because it loads this module
+    from experiments.cli.main import COMMANDS, parser  # imported here, because it imports this module
 
     top = parser(*COMMANDS)
     _complete_files(top, shtab.FILE)

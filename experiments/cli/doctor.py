@@ -1,4 +1,4 @@
-"""`mjsim doctor`, and checks for what a command needs beyond the base installation."""
+"""`mjsim doctor`, and checks for packages that a command needs in addition to the base installation."""
 
 import argparse
 import importlib
@@ -12,7 +12,7 @@ Show versions, the EGL vendor, the GL renderer, and whether rendering happens in
 to install it, and other installed packages that are also named planner, hud or experiments. The exit code is 1 if
 frames cannot be rendered, software is missing, or Python imports another package in place of one of ours."""
 
-# Extra -> modules that it installs
+# Modules that each extra installs
 EXTRAS = {
     "study": ("matplotlib", "statsmodels"),
     "people": ("argon2", "httpx", "prometheus_client"),
@@ -45,13 +45,16 @@ def require_extra(extra: str) -> None:
 
 
 def add_checkout_command(commands: Any, name: str, module: str) -> None:
-    """Add a subcommand of the source checkout. If its module is not installed, the subcommand reports this."""
+    """Add a subcommand that exists only in the source checkout.
+
+    In an installed package, it reports this when called.
+    """
     try:
         importlib.import_module(module).add_parser(commands)
     except ModuleNotFoundError as error:
         if not module.startswith(str(error.name)):
             raise
-        # No argument starts with a null character, so the parser accepts all options as positional arguments.
+        # No argument starts with a null character, so the parser accepts options as positional arguments.
         parser = commands.add_parser(
             name, help="needs the source checkout", add_help=False, prefix_chars="\0"
         )

@@ -1,4 +1,4 @@
-"""Error handling of commands: an error line, an exit code and, for faults in mjsim or custom code, a report."""
+"""Errors of commands: a one-line message, an exit code and, for faults in mjsim or custom code, a report."""
 
 import os
 import platform
@@ -14,25 +14,27 @@ from pathlib import Path
 FAILED = 1
 USAGE_ERROR = 2
 INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
-_NULL = ("embedded null byte", "embedded null character")  # Python's errors for a path with a null character
-BROKEN_PIPE = 141  # shells' exit code for a program ended by SIGPIPE
+# Python's messages for a path with a null character
+_NULL = ("embedded null byte", "embedded null character")
+BROKEN_PIPE = 141  # exit code that shells use for a program ended by SIGPIPE
 
 DISTRIBUTIONS = ("mjsim", "mujoco", "numpy", "numba", "ortools", "opencv-python-headless", "pyarrow")
 _SECRET = re.compile(r"(--?[\w-]*(?:token|password|secret|key)[\w-]*)(=|\x00)[^\x00]+", re.IGNORECASE)
 
 
 def end_with(error: Exception, words: Sequence[str]) -> int:
-    """Print an error in one line to standard error. Return the exit code. `words` is the command line, for a report."""
-    if isinstance(error, BrokenPipeError):  # the reader of the output closed it
+    """Print an error to standard error in one line, and return the exit code.
+
+    A report includes the command line `words`.
+    """
+    if isinstance(error, BrokenPipeError):
         drop_output()
         return BROKEN_PIPE
     flush_output()
     from experiments.errors import UserCodeError, user_code_location
 
     code, text = exit_code(error), message(error)
-    if code == USAGE_ERROR and (
-        location := user_code_location(error.__cause__)
-    ):  # the custom code could not be loaded
+    if code == USAGE_ERROR and (location := user_code_location(error.__cause__)):
         code, text = FAILED, f"{text}{location}; traceback in {_report(error, words)}"
     elif code is None:
         text = f"internal error ({type(error).__name__}: {text}); please send in the report {_report(error, words)}"
@@ -43,7 +45,7 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
 
 
 def exit_code(error: Exception) -> int | None:
-    """Return the exit code of an error whose message is enough for the user, or None for a bug in mjsim."""
+    """Return the exit code of an error whose message suffices for the user, or None for a bug in mjsim."""
     # Imported only after an error, so that `mjsim plan` starts fast.
     from experiments.errors import ExperimentError, ReplayError, UserCodeError
     from hud.errors import HudError

@@ -179,7 +179,7 @@ def _export(arguments: argparse.Namespace) -> int:
         write_text_atomically(out, json.dumps(procthor_house(plan), indent=1) + "\n")
         print(f"{out} ({len(plan.rooms)} rooms, {len(plan.doors)} doors, {len(plan.windows)} windows)")
         return 0
-    require_extra()  # before trimesh is imported
+    require_extra()
     from mjsim.formats.habitat_writer import export_habitat
 
     if arguments.episodes < 0:
@@ -199,7 +199,7 @@ def _export(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _replaced(out: Path) -> Iterator[Path]:
-    """Yield a working folder that takes the place of `out` atomically when the block succeeds."""
+    """Yield a working folder that replaces `out` atomically when the block succeeds."""
     from mjsim.support.files import exchange, work_folder
 
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -130,7 +130,7 @@ def _add_house(kinds: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    require_extra()  # before trimesh, CoACD and OpenGL are imported
+    require_extra()
     from mjsim.importing.object.house_extension import CatalogueEntry, HouseExtension
     from mjsim.importing.object.mesh_import import add_mesh
 

@@ -1,4 +1,4 @@
-"""The `mjsim` command, which loads a module of `experiments.cli`, or of the source checkout, for each subcommand."""
+"""The `mjsim` command. It loads only the module of the requested subcommand."""
 
 import argparse
 import faulthandler
@@ -36,8 +36,9 @@ COMMANDS = {
     "doctor": "show versions and check that rendering works",
     "completion": "print a completion script for a shell",
 }
-MODULES = {"import": "import_"}  # command that is a Python keyword -> its module
-CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}  # not in the wheel
+MODULES = {"import": "import_"}  # subcommands whose name is a Python keyword
+# Subcommands that the wheel does not include
+CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}
 
 DESCRIPTION = """\
 A MuJoCo physics-grounded rearrangement simulator for augmented-reality assistance research.
@@ -70,7 +71,7 @@ examples:
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """Return the parser with the options of the `loaded` commands. If there are none, it only lists all commands."""
+    """Return the parser with the options of the `loaded` commands. Without any, it only lists the commands."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -91,7 +92,7 @@ def parser(*loaded: str) -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Prints the version. It is looked up only on request because that takes time."""
+    """Prints the version, which is slow to look up and therefore looked up only on request."""
 
     def __init__(self, option_strings: Sequence[str], dest: str) -> None:
         super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
@@ -147,7 +148,7 @@ def _run(words: list[str]) -> int:
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
-        sys.path.append(here)  # for custom participants, conditions and planners
+        sys.path.append(here)  # lets users name custom participants, conditions and planners
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
         commands.error(f"{bad} has no value")  # argparse would parse it as an empty list

@@ -1,4 +1,4 @@
-"""Option types and options of several subcommands. Nothing here loads the simulator, so that `--help` is fast."""
+"""Option types and options shared by subcommands. This module does not load the simulator, so that `--help` is fast."""
 
 import argparse
 import math
@@ -27,7 +27,7 @@ PERSON_VALUES = {  # the most common parameters of a person, each with its own o
     "field_of_view": "horizontal field of view of the picture and of the participant's perception",
     "reading_time": "how long the participant stands and reads before each visit",
 }
-PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the browser page of `mjsim play`
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the page of `mjsim play`
 # Settings shared by run, batch and play
 TRIAL_OPTIONS = tuple(
     name
@@ -38,7 +38,7 @@ _TYPES = typing.get_type_hints(TrialConfig)
 
 
 def int_list(text: str) -> list[int]:
-    """Parse `6,12`, `0:10` (which excludes 10), or a mix of both."""
+    """Parse integers: `6,12`, `0:10` (where the end is excluded), or a mix of both."""
     try:
         return numbers(text)
     except ConfigError as error:
@@ -50,7 +50,7 @@ def text_list(text: str) -> list[str]:
 
 
 def frame_size(text: str) -> tuple[int, int]:
-    """Parse `640x480`. Both numbers must be even, as H.264 requires."""
+    """Parse a frame size such as `640x480`. Both numbers must be even, as H.264 requires."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
@@ -63,7 +63,7 @@ def frame_size(text: str) -> tuple[int, int]:
 
 
 def seconds(text: str) -> float:
-    """Parse a finite time of at least 0 s."""
+    """Parse a finite time in seconds, at least 0."""
     try:
         value = float(text)
     except ValueError:
@@ -89,7 +89,7 @@ def add_command(
     description: str,
     summary: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a subcommand. `summary` is its line in the parent's help, except for `mjsim`, which uses `COMMANDS`."""
+    """Add a subcommand. `summary` describes it in its parent's help. The help of `mjsim` uses `COMMANDS` instead."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=summary, description=description, formatter_class=HelpFormatter
     )
@@ -120,7 +120,7 @@ class _CallLimit(argparse.Action):
 
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:
-    """Add the option of a setting, described as in `TrialConfig`. Its value is None if it is not given."""
+    """Add the option of a setting, with its description in `TrialConfig`. Its value is None if it is not given."""
     extra, option = dict(SETTINGS[name].extra or {}), f"--{name.replace('_', '-')}"
     text = f"{str(SETTINGS[name].description).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text
@@ -135,7 +135,7 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     parser.add_argument(option, **{**arguments, **changes})
 
 
-NAMES: dict[str, Callable[[], str]] = {  # setting -> function that lists its possible values for the help
+NAMES: dict[str, Callable[[], str]] = {  # functions that list the possible values of a setting for the help
     "user": lambda: (
         f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
         "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
@@ -165,7 +165,7 @@ def add_task_options(parser: argparse.ArgumentParser, objects: int) -> None:
 
 
 def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
-    """Add the settings shared by run, batch and play. Options without a default are None if not given."""
+    """Add the settings shared by run, batch and play. An option without a default is None if it is not given."""
     for name in TRIAL_OPTIONS:
         add_setting(parser, name, **({"default": defaults[name]} if name in defaults else {}))
     usual = PersonParameters()
@@ -184,10 +184,10 @@ def given_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[s
 
 
 def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the given options of `add_trial_options` as arguments of `TrialConfig`.
+    """Return the options of `add_trial_options` that the user gave, as arguments of `TrialConfig`.
 
     Raises:
-        ConfigError: An option contradicts the episode, or no such person is possible.
+        ConfigError: An option contradicts the episode, or the person's parameters are impossible.
         EpisodeError: The episode cannot be read.
     """
     options = given_options(arguments, tuple(name for name in TRIAL_OPTIONS if name != "person"))
@@ -211,7 +211,7 @@ def add_frame(
     profile: str = FAST.name,
     otherwise: str = "",
 ) -> None:
-    """Add `--size` and `--profile` with these defaults. `otherwise` tells in the help what applies without a size."""
+    """Add `--size` and `--profile` with these defaults. `otherwise` is appended to the help of `--size`."""
     default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
         "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"

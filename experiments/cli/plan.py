@@ -21,7 +21,7 @@ from planner.solvers import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, S
 
 T = TypeVar("T")
 GRACE_S = 0.15  # how long a planner may take to stop after the time limit
-REPORT_PERIOD_S = 5.0  # between progress reports
+REPORT_PERIOD_S = 5.0  # interval between progress reports
 
 DESCRIPTION = """\
 Solve a capacitated pickup-and-delivery problem with an open tour. The input comes from FILE.json, or from standard
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise
     finally:
         search.end()
-        gc.freeze()  # saves 0.2 s at exit, when Python would collect the garbage of numba
+        gc.freeze()  # saves 0.2 s at exit, because Python then skips the garbage of numba
     if not search.answered:
         print(
             f"mjsim: {arguments.planner} gave no plan in time; this tour always visits the nearest place next",
@@ -126,11 +126,11 @@ def _planner(name: str) -> Solver:
 
 
 class _PlanningThread(threading.Thread):
-    """A thread that plans, so that time limits and signals take effect while a planner computes.
+    """A thread that runs the planner, so that time limits and signals can take effect while it computes.
 
     Attributes:
         best: The last plan, or None.
-        answered: True if the planner itself gave a plan in time.
+        answered: True if the planner itself returned a plan in time.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class _PlanningThread(threading.Thread):
         self.answered = False
         self._error: BaseException | None = None
         self._stop_planning = threading.Event()
-        self._over = threading.Event()  # used instead of `join`, which a signal would end
+        self._over = threading.Event()  # used instead of `join`, which a signal would interrupt
         self._planner, self._problem = planner, problem
         self._since, self._seconds = started, seconds
 
@@ -150,15 +150,15 @@ class _PlanningThread(threading.Thread):
             for plan in self._plans():
                 self.answered = (
                     self.best is not None or self._seconds is None
-                )  # with a time limit, the first plan is greedy and does not count
+                )  # with a time limit, the first plan comes from a greedy heuristic
                 self.best = plan
-        except BaseException as error:  # custom planners can raise anything
+        except BaseException as error:  # custom planners can raise any error
             self._error = error
         finally:
             self._over.set()
 
     def _plans(self) -> Iterator[Plan]:
-        """Yield successively better plans, within the time limit or a large limit on the exact planner's work."""
+        """Yield successively better plans, within the time limit or a high limit on the exact planner's work."""
         seconds = self._seconds
         if seconds is not None:
             from planner.greedy_solver import first_plan  # imported late for a fast start
@@ -173,7 +173,7 @@ class _PlanningThread(threading.Thread):
             yield self._planner.solve(self._problem, limit=limit)
 
     def wait(self) -> Plan:
-        """Return the best plan when the search has ended or timed out. Raises an `Exception` if the planner failed."""
+        """Return the best plan once the search has ended or timed out. Raises the planner's error if it failed."""
         self.start()
         ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE_S
         report = self._since + REPORT_PERIOD_S
@@ -189,7 +189,7 @@ class _PlanningThread(threading.Thread):
         return self.best
 
     def end(self) -> None:
-        """Stop planning. A planner in the middle of a step may take a moment."""
+        """Stop planning. The planner may take a moment to finish its current step."""
         self._stop_planning.set()
         self._over.wait(1.0)
 

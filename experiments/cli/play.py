@@ -131,7 +131,7 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
-    if task.planner not in SOLVERS:  # the workers load those
+    if task.planner not in SOLVERS:  # the workers load built-in planners
         solver(task.planner)
     return task
 
@@ -180,14 +180,14 @@ def _minimum(text: str) -> dict[str, float]:
 
 
 def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Return the phases of a visit. The fly-through is left out without a film."""
+    """Return the phases of a visit. Without a film, the fly-through is skipped."""
     return tuple(
         name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
     )
 
 
 def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
-    """Read the questions of --questions: tables [[question]] with `text`, `choices` and `answer`."""
+    """Read the file of --questions, which has tables [[question]] with `text`, `choices` and `answer`."""
     path: Path | None = arguments.questions
     named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
     if missing := [name for name in named if name not in shown_phases(arguments)]:

@@ -1,4 +1,4 @@
-"""The plan of a visit of `mjsim play`: a minimal study with an open link and without payments."""
+"""The plan of a visit to `mjsim play`: a minimal study with an open link and without payments."""
 
 import argparse
 import math
@@ -23,7 +23,7 @@ NAME = "play"  # name of the study in the database
 MINUTES = 15.0
 DAY_S = 86400.0
 MAX_VISITS = 1_000_000
-PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # in the texts of studies
+PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # placeholders in the texts of studies
 _NOTHING = Section({})
 
 
@@ -64,7 +64,10 @@ def plan_of_play(
     again = task.episode is None
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
-        """Give each visit its own order seed, so that the order of the task list varies."""
+        """Return the settings of a visit's trials.
+
+        Each visit has its own order seed, so that task lists differ in order.
+        """
         order, house = task.order_seed + place.person_id - 1, place.house_seed
         seeds = {"order_seed": order % (MAX_SEED + 1), "house_seed": house % (MAX_SEED + 1)}
         return trials_of(msgspec.structs.replace(task, **seeds))

@@ -77,7 +77,7 @@ def add_parser(commands: Any) -> None:
 
 
 def point(text: str) -> tuple[float, float, float]:
-    """Parse `1.5,2,8`."""
+    """Parse a point such as `1.5,2,8`."""
     try:
         x, y, z = (float(part) for part in text.split(","))
         if not all(map(math.isfinite, (x, y, z))):

@@ -22,8 +22,8 @@ from urllib.parse import urlsplit
 from experiments.errors import ConfigError, RecordError
 
 PORT = 8000
-BACKLOG = 1024  # connections that wait to be accepted
-MAX_FILES = 16384  # limit on open files, sockets included
+BACKLOG = 1024  # maximum number of connections waiting to be accepted
+MAX_FILES = 16384  # limit on open files, including sockets
 
 
 def add_server_options(group: Any) -> None:
@@ -44,7 +44,7 @@ def add_server_options(group: Any) -> None:
 
 
 def prepare_process() -> None:
-    """Make new files private to this user, and raise the limit on open files."""
+    """Make new files private to the current user, and raise the limit on open files."""
     os.umask(0o077)  # participants' data are confidential
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
@@ -70,7 +70,7 @@ async def serve(
 
 
 def http_server(app: Any) -> Any:
-    """Return an HTTP server for an ASGI application, with the limits common to all servers of mjsim."""
+    """Return an HTTP server for an ASGI application, with the limits that all servers of mjsim use."""
     import uvicorn  # imported late for a fast start
 
     from experiments.web.protocol import MAX_TEXT
@@ -80,10 +80,10 @@ def http_server(app: Any) -> Any:
         uvicorn.Config(
             app,
             log_config=None,
-            access_log=False,  # paths contain tokens
+            access_log=False,  # URL paths contain tokens
             log_level="warning",
             server_header=False,
-            proxy_headers=False,  # handled by our middleware, which trusts only named proxies
+            proxy_headers=False,  # our middleware handles these headers and trusts only named proxies
             http=TimedConnection,
             ws="websockets-sansio",
             ws_max_size=MAX_TEXT,
@@ -109,7 +109,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder against other servers."""
+    """Lock a folder, so that no other server can use it."""
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -122,7 +122,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def check_public_url(url: str | None) -> None:
-    """Raise a `ConfigError` unless the URL is None or that of a whole site."""
+    """Raise a `ConfigError` if a public URL is not of the form `https://play.example.org`."""
     if url is None:
         return
     parts = urlsplit(url)
@@ -131,7 +131,7 @@ def check_public_url(url: str | None) -> None:
 
 
 def url_of(listener: socket.socket) -> str:
-    """Return the URL of a listening socket on this machine."""
+    """Return the URL at which this machine can reach a listening socket."""
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
@@ -145,7 +145,7 @@ def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
 
 
 def number(smallest: int, largest: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers in a range."""
+    """Return a parser for integers in a range."""
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not smallest <= int(text) <= largest:
@@ -158,7 +158,7 @@ def number(smallest: int, largest: int) -> Callable[[str], int]:
 class JsonLines(logging.Formatter):
     """Formats log records as JSON objects with time, level, logger and message.
 
-    Of an exception, only type and traceback are logged, because its message may contain personal data.
+    Only the type and traceback of an exception are logged, because its message may contain personal data.
     """
 
     def format(self, record: logging.LogRecord) -> str:

@@ -1,4 +1,4 @@
-"""Progress bars and results on standard error."""
+"""Progress bars and consoles on standard error."""
 
 import contextlib
 import os
@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
 
 class _TolerantStream:
-    """A stream that drops output after its reader has closed it."""
-
     def __init__(self, stream: Any) -> None:
         self._stream = stream
 
@@ -30,7 +28,7 @@ class _TolerantStream:
 
 
 def error_console() -> "Console":
-    """Return a console on standard error that never fails, even if the stream is closed."""
+    """Return a console on standard error whose output never fails, even if the stream is closed."""
     from rich.console import Console
 
     stream = open(os.devnull, "w") if sys.stderr is None else sys.stderr  # noqa: PTH123, SIM115 - as long as the process
@@ -45,7 +43,7 @@ def progress_bars(console: "Console", *columns: "str | ProgressColumn") -> "Prog
 
 
 def counting_bars(label: str, *columns: "str | ProgressColumn") -> "Progress":
-    """Return progress bars with a label, a count, elapsed and remaining time, and further columns."""
+    """Return progress bars with a label, a count, the elapsed and remaining time, and further columns."""
     from rich.progress import BarColumn, MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
 
     counting = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())

@@ -6,7 +6,7 @@ from typing import Any
 from experiments.cli.doctor import add_checkout_command
 from experiments.cli.options import HelpFormatter
 
-# Modules with `add_parser(commands)`, in the order of the help. The wheel lacks those of `studies`.
+# Modules with `add_parser(commands)`, in the order of the help. The wheel does not include those of `studies`.
 MODULES = (
     "experiments.cli.study.prepare",
     "experiments.cli.study.check",

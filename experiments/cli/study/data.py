@@ -1,4 +1,4 @@
-"""Subcommands of `mjsim study` for the data of a study: collect, export, backup, restore, erase and forget."""
+"""Subcommands of `mjsim study` for study data: collect, export, backup, restore, erase and forget."""
 
 import argparse
 import asyncio

@@ -1,4 +1,4 @@
-"""The study file and the database of a study, as arguments of commands."""
+"""Arguments and helpers for commands that use a study file and its database."""
 
 import argparse
 import os
@@ -26,13 +26,11 @@ def add_study_file(parser: argparse.ArgumentParser, **settings: Any) -> None:
 
 
 def add_served_study(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments STUDY.toml and DIR."""
     add_study_file(parser)
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the study")
 
 
 def people_study(arguments: argparse.Namespace) -> "Study":
-    """Read the study file of a command."""
     require_extra("people")
     from experiments.study.file import read_people_study
     from experiments.trials.designs import study_path
@@ -46,7 +44,10 @@ def with_store(
     work: "Callable[[Store], Awaitable[T]]",
     url: str | None = None,
 ) -> T:
-    """Run `work` with the database of a study, which is closed afterwards, even after a signal. Return the result."""
+    """Run `work` with the database of a study and return its result.
+
+    The database is always closed, even after a signal.
+    """
     from experiments.visit.store import Store
 
     async def opened() -> T:

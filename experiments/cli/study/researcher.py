@@ -1,4 +1,4 @@
-"""`mjsim study researcher`: manage the accounts of researchers."""
+"""`mjsim study researcher`: manage researcher accounts."""
 
 import argparse
 import getpass
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from experiments.visit.store import Store
 
 ROLES = ("owner", "assistant", "viewer")
-MIN_PASSWORD = 12  # characters
+MIN_PASSWORD = 12  # minimum length in characters
 DESCRIPTION = f"""\
 Manage the accounts for the researcher's page (`mjsim study serve --researcher-port`). `add` creates an account,
 `change` changes its role or password and ends its logins, `disable` and `enable` switch it off and on, and `list` lists
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     arguments.folder.mkdir(
         parents=True, exist_ok=True
-    )  # the first account may be created before the study is served
+    )  # the first account may be created before the study is first served
     url = arguments.database or sqlite_url(arguments.folder / DATABASE)
     with_store(study, arguments, lambda store: _do(store, arguments), url)
     return 0
@@ -78,7 +78,7 @@ async def _do(store: "Store", arguments: argparse.Namespace) -> None:
 
 
 def _password(arguments: argparse.Namespace) -> str:
-    """Ask for a password, which must not be an option: other users could read it from the command line."""
+    """Ask for a password. It is not an option, because other users could read it from the command line."""
     if arguments.generate:
         password = secrets.token_urlsafe(18)
         print(password)

@@ -119,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
     phases_of(plan_of(study))  # fails early if a custom phase or a completion code is missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
-    prepare_process()  # before the folder is created
+    prepare_process()  # before the folder is created, so that it is private
     arguments.out.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         listener = stack.enter_context(listen(arguments.host, arguments.port))
