@@ -1,4 +1,4 @@
-"""File formats of houses and scenes, with their readers and writers. All readers return a `SourceScene`."""
+"""Readers and writers for file formats of houses and scenes. Every reader returns a `SourceScene`."""
 
 import lazy_loader
 

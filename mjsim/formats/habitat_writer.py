@@ -1,4 +1,4 @@
-"""Export of a house as a Habitat scene dataset: stage, objects, scene instance, rooms, and rearrangement episodes.
+"""Export of a house as a Habitat scene dataset: stage, objects, scene instance, rooms and rearrangement episodes.
 
 Habitat has y up and the camera along -z, so x, y, z in mjsim are x, -z, y in Habitat. The stage is everything
 that cannot move. Receptacles and objects are templates with their own origins, so that mjsim's poses apply to them.
@@ -33,13 +33,13 @@ from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 
 _UPRIGHT = np.linalg.inv(Y_TO_Z)
-_CEILING = 2.6  # height of regions, in metres
+_CEILING = 2.6  # height of regions in metres
 _OBJECT, _SCENE = ".object_config.json", ".scene_instance.json"
-_AIR = 0.05  # clearance between body and walls on a path, in metres
+_AIR = 0.05  # clearance between a person's body and walls on a path, in metres
 
 
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
-    """Write a house and episodes in it into an existing folder. Return the name of the scene."""
+    """Write a house and its episodes into an existing folder. Return the name of the scene."""
     house = compiled_house(catalogue)
     name = _slug(catalogue.name if catalogue.ref.kind == "generated" else catalogue.label)
     axes = {"up": [0, 1, 0], "front": [0, 0, -1]}
@@ -72,7 +72,7 @@ def _save_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def _save_model(folder: Path, name: str, source: Path, kind: str, about: Mapping[str, Any]) -> None:
-    """Write the drawn and the colliding meshes of a model, and the template that names them."""
+    """Write the visual and collision meshes of a model, and the template that refers to them."""
     pieces = read_mjcf(source, HouseOptions()).pieces
     assets = {"render_asset": f"{name}.glb", "collision_asset": f"{name}_collision.glb"}
     folder.mkdir(exist_ok=True)
@@ -83,7 +83,7 @@ def _save_model(folder: Path, name: str, source: Path, kind: str, about: Mapping
 
 
 def _seen(pieces: Iterable[ScenePiece]) -> bytes:
-    """A GLB file of the drawn geoms, with one mesh for each name and material."""
+    """Return a GLB file of the visual geoms, with one mesh for each name and material."""
     materials: dict[tuple[int, tuple[float, ...]], PBRMaterial] = {}
     groups: dict[tuple[str, int, tuple[float, ...]], list[ScenePiece]] = {}
     for piece in pieces:
@@ -113,7 +113,7 @@ def _material(images: Sequence[Floats], colour: Sequence[float]) -> PBRMaterial:
 
 
 def _solid(pieces: Iterable[ScenePiece]) -> bytes:
-    """A GLB file of the colliding geoms, with one convex mesh each."""
+    """Return a GLB file of the collision geoms, with one convex mesh each."""
     scene = trimesh.Scene()
     for number, piece in enumerate(piece for piece in pieces if piece.solid):
         name = f"{piece.name} {number}"
@@ -122,7 +122,7 @@ def _solid(pieces: Iterable[ScenePiece]) -> bytes:
 
 
 def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of an object template apart from its meshes. Its frame is the model's."""
+    """Return the fields of an object template except its meshes. The template's frame is the model's frame."""
     mass = float(read_model(path).compile().body_mass.sum())
     return {
         "mass": round(mass, 4),
@@ -134,7 +134,7 @@ def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pose(position: Floats, rotation: Floats) -> Floats:
-    """An mjsim pose as Habitat's transform (4, 4)."""
+    """Convert a pose of mjsim to a transform (4, 4) of Habitat."""
     own = np.eye(4)
     own[:3, :3], own[:3, 3] = rotation, position
     return np.asarray(_UPRIGHT @ own @ Y_TO_Z)
@@ -147,13 +147,13 @@ def _turned(quaternion: Sequence[float]) -> Floats:
 
 
 def _mount(house: CompiledHouse, key: str) -> tuple[Floats, Floats]:
-    """Position, m, and rotation (3, 3) of a receptacle's frame."""
+    """Return the position (3,) in metres and the rotation (3, 3) of a receptacle's frame."""
     site = house.model.site(f"mount:{key}").id
     return house.data.site_xpos[site].copy(), house.data.site_xmat[site].reshape(3, 3).copy()
 
 
 def _volume(house: CompiledHouse, key: str) -> dict[str, Any]:
-    """The volume of a receptacle in its own frame as Habitat annotates it: centre and half sizes, m."""
+    """Return Habitat's description of a receptacle's volume: centre and half sizes in its own frame, in metres."""
     geometry = house.receptacles[key]
     position, rotation = _mount(house, key)
     middle = _UPRIGHT[:3, :3] @ rotation.T @ (geometry.center - position)
@@ -220,7 +220,7 @@ def _dataset() -> dict[str, Any]:
 
 
 def _navmesh() -> dict[str, Any]:
-    """Settings that make Habitat's navmesh similar to mjsim's walkable floor."""
+    """Return settings that make Habitat's navmesh similar to mjsim's walkable floor."""
     return {
         "cellSize": 0.05,
         "cellHeight": 0.05,
@@ -232,7 +232,7 @@ def _navmesh() -> dict[str, Any]:
 
 
 def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) -> dict[str, Any]:
-    """A `RearrangeEpisode`: poses at the start, and goals in the middle of receptacles."""
+    """Return a `RearrangeEpisode` with poses at the start, and goals in the middle of receptacles."""
     counts: dict[str, int] = {}
     objects, targets, goals = [], {}, []
     for placed in episode.objects:

@@ -1,4 +1,4 @@
-"""Reader of MJCF scenes: geoms in their poses at the start. Joints, actuators and sensors are ignored."""
+"""Reader for MJCF scenes. Geoms are read in their start poses. Joints, actuators and sensors are ignored."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,15 +28,16 @@ from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")
 _SEEN = (0, 1, 2)  # geom groups that viewers show
-_CLEAR = 0.9  # opacity below which a colliding geom is a marker that is not drawn
-_OPAQUE = 250  # out of 255; a texture with lower alpha everywhere is a drawn shadow, which is ignored
-_COVER = 0.02  # m
+_CLEAR = 0.9  # a colliding geom with lower opacity is a marker that is not drawn
+# Minimum alpha, out of 255; a texture with lower alpha everywhere is a drawn shadow, which is ignored.
+_OPAQUE = 250
+_COVER = 0.02  # distance in metres by which a visual geom may end inside a collision geom that it covers
 _ENDLESS = 15.0  # half of the side given to an infinite plane, in metres
 _GEOM = mujoco.mjtGeom
 
 
 def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene. Raise `AssetError` if it does not compile or names a missing mesh."""
+    """Read a scene. Raise `AssetError` if it does not compile or refers to a missing mesh."""
     spec = read_model(path)
     missing = MissingFiles(options.skip_missing)
     _without_missing_meshes(spec, path, missing)
@@ -56,7 +57,7 @@ def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _rooms(model: Any) -> tuple[NamedRoom, ...]:
-    """Rooms of an mjsim house, which are marked by box sites. Other scenes have none."""
+    """Return the rooms of an mjsim house, which are marked by box sites. Other scenes have none."""
     if not any(model.site(site).name.startswith(PREFIX) for site in range(model.nsite)):
         return ()
     rooms = RoomMap.from_model(model)
@@ -70,11 +71,9 @@ def _rooms(model: Any) -> tuple[NamedRoom, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """The texture of a material."""
-
-    image: Floats  # RGB from 0 to 1, (height, width, 3)
-    repeat: Floats  # (2,)
-    uniform: bool  # on primitives, `repeat` counts per metre
+    image: Floats  # RGB from 0 to 1, shape (height, width, 3)
+    repeat: Floats  # number of repetitions along each axis, shape (2,)
+    uniform: bool  # True if `repeat` counts per metre on primitives
 
 
 def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFiles) -> None:
@@ -112,7 +111,7 @@ def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]
             try:
                 with Image.open(files[name]) as picture:
                     if "A" in picture.getbands() and np.asarray(picture.getchannel("A")).max() < _OPAQUE:
-                        material.rgba[3] = 0.0  # a drawn shadow
+                        material.rgba[3] = 0.0  # a drawn shadow, which is not imported
                         continue
                     small = picture.convert("RGB")
                     small.thumbnail((TEXTURE_SIDE, TEXTURE_SIDE))
@@ -134,7 +133,7 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
     alpha = np.where(model.geom_matid >= 0, material_alpha, model.geom_rgba[:, 3])
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
-    # In many scenes, bodies have visual and collision geoms. If a body has no collision geoms, visual ones are solid.
+    # In many scenes, bodies have visual and collision geoms. Visual geoms are solid if the body has no collision geoms.
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
     decor = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):
@@ -150,7 +149,7 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
 
 
 def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
-    """True if a geom that is only drawn covers a colliding one, which is then not drawn."""
+    """Return True if a visual geom covers a collision geom, which is then not drawn."""
     low, high = _extent(model, data, geom)
     for look in looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]].tolist():
         first, last = _extent(model, data, look)
@@ -160,7 +159,7 @@ def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
 
 
 def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
-    """Lower and upper corner of a geom's bounding box, m."""
+    """Return the lower and upper corner of a geom's bounding box, in metres."""
     rotation = data.geom_xmat[geom].reshape(3, 3)
     centre = data.geom_xpos[geom] + rotation @ model.geom_aabb[geom, :3]
     reach = np.abs(rotation) @ model.geom_aabb[geom, 3:]
@@ -176,7 +175,7 @@ def _name(model: Any, geom: int) -> str:
 
 
 def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | None:
-    """A geom's surface in its own frame; None if it has none, such as a height field."""
+    """Return a geom's surface in its own frame, or None for a geom without one, such as a height field."""
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
     picture = pictures.get(model.material(material).name) if material >= 0 else None
@@ -191,7 +190,7 @@ def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | 
         return surface
     sides = np.ones(3) if picture.uniform else np.maximum(made.extents, 1e-3)
     axis = np.abs(made.face_normals).argmax(axis=1)
-    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the axes along which a face lies
+    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the two axes parallel to a face
     places = surface.corners / sides
     # A texture that does not repeat covers a side from edge to edge.
     uv = (np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) + 0.5) * picture.repeat
@@ -208,7 +207,7 @@ def _mesh(model: Any, mesh: int, colour: Floats, picture: _Picture | None) -> Su
         return surface
     places = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
     uv = places[model.mesh_facetexcoord[start : start + faces]].astype(np.float64) * picture.repeat
-    uv[..., 1] = 1.0 - uv[..., 1]  # MuJoCo counts from the top
+    uv[..., 1] = 1.0 - uv[..., 1]  # MuJoCo counts rows from the top
     return _painted(surface, uv, picture)
 
 

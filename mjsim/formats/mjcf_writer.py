@@ -1,4 +1,4 @@
-"""Export of a composed house as plain MJCF for stock MuJoCo: one XML file with its assets next to it."""
+"""Export of a composed house as plain MJCF for stock MuJoCo: one XML file and a folder of assets."""
 
 import hashlib
 import xml.etree.ElementTree as ET
@@ -27,7 +27,7 @@ def export_house(scene: Scene, path: Path) -> None:
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
     try:
         root = ET.fromstring(scene.spec.to_xml())
-    except ValueError as error:  # MuJoCo compiles it again, from the files
+    except ValueError as error:  # MuJoCo compiles the model again from its files
         raise AssetError(f"cannot export to {path}: {error}") from error
     for compiler in root.findall("compiler"):
         for folder in ("meshdir", "texturedir", "assetdir"):
@@ -41,7 +41,7 @@ def export_house(scene: Scene, path: Path) -> None:
 
 
 def _copy_asset(source: Path, folder: Path) -> str:
-    """Copy an asset file. Return its path relative to `folder`."""
+    """Copy an asset file into a folder. Return its path relative to the folder of the XML file."""
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -56,7 +56,7 @@ def _copy_asset(source: Path, folder: Path) -> str:
 
 
 def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
-    """Write the poses that determine `qpos0` with all digits, because MuJoCo writes only six."""
+    """Write the poses that determine `qpos0` with full precision, because MuJoCo writes only six digits."""
     world = root.find("worldbody")
     for body in [] if world is None else _top_level_bodies(world):
         if body.find("joint") is not None or body.find("freejoint") is not None:
@@ -71,7 +71,7 @@ def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
 
 
 def _top_level_bodies(parent: ET.Element) -> list[ET.Element]:
-    """Bodies directly below the world, including those in frames without a pose."""
+    """Return the bodies directly below the world, including those in frames without a pose."""
     bodies = parent.findall("body")
     for frame in parent.findall("frame"):
         if not set(frame.attrib) & {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"}:

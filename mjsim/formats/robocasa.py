@@ -1,4 +1,4 @@
-"""Reader of RoboCasa's kitchen layouts (YAML): walls, floors and fixtures as boxes, since layouts have no meshes."""
+"""Reader for RoboCasa's kitchen layouts (YAML). Walls, floors and fixtures are boxes, since layouts have no meshes."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
 SUFFIXES = (".yaml", ".yml")
-# Width, depth and height, in metres, of fixtures for which a layout leaves a side to the mesh.
+# Width, depth and height, in metres, of fixtures whose size is not always given in a layout.
 _SIZES = {
     "counter": (1.0, 0.65, 0.92),
     "stove": (0.76, 0.66, 0.92),
@@ -38,17 +38,19 @@ _SIZES = {
 }
 _COLOURS = {"counter": 0xD8D3C8, "wall": 0xEDE8DF, "floor": 0xB08D66, "steel": 0xA9AEB3, "wood": 0xC9B08C}
 _STEEL = ("stove", "oven", "microwave", "hood", "dishwasher", "fridge", "sink")
-_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")  # ignored wall fixtures
+# Types of wall fixtures that are ignored.
+_SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")
 _AXES = (("left", "right"), ("front", "back"), ("bottom", "top"))
-_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12  # base of stacks, worktop thickness, cabinet setback, in metres
-# Axis of each side, and its direction out of the room.
+# Base height of stacks, worktop thickness and cabinet setback, in metres.
+_BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12
+# Axis of each side, and the sign of the direction out of the room.
 _SIDES = {"left": (0, -1), "right": (0, 1), "back": (1, 1), "front": (1, -1)}
 _WALL, _BACKING = 0.02, 0.1  # half thickness of walls and of their backing, in metres
 
 
 def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
     """Read a layout. Raise `AssetError` if it is damaged or has an unknown fixture."""
-    del options  # metres and z up
+    del options  # layouts are always in metres with z up
     try:
         layout = yaml.safe_load(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
@@ -66,21 +68,21 @@ def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
 
 class _LayoutReader:
     def __init__(self) -> None:
-        self.name = ""  # of the current fixture
+        self.name = ""  # name of the current fixture
         self._left_out: dict[str, int] = {}
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Report lines about ignored fixtures and about the use of boxes."""
+        """Return report lines about ignored fixtures and about the use of boxes."""
         small = ", ".join(f"{n} {kind}" for kind, n in sorted(self._left_out.items()))
         boxes = ImportDecision("fixtures", "boxes", "the layout has sizes and places; meshes are RoboCasa's")
         return (boxes, left_out(small, "on walls and worktops")) if small else (boxes,)
 
     def group(self, key: str, group: Mapping[str, Any]) -> Iterator[ScenePiece]:
-        """Pieces of a group of fixtures, in the frame of the kitchen."""
+        """Yield the pieces of a group of fixtures, in the frame of the kitchen."""
         origin, place = ([*group.get(name, (0, 0)), 0] for name in ("group_origin", "group_pos"))
         turn = rotation_matrix(group.get("group_z_rot", 0.0), [0, 0, 1])
         frame = translation_matrix(place) @ turn @ translation_matrix(-np.array(origin, float))
-        known: dict[str, tuple[Floats, Floats]] = {}  # centre and size of the group's fixtures
+        known: dict[str, tuple[Floats, Floats]] = {}  # centre and size of each fixture in the group
         for fixtures in group.values():
             for fixture in fixtures if isinstance(fixtures, list) else ():
                 if isinstance(fixture, dict) and fixture.get("enable", True):
@@ -123,7 +125,7 @@ class _LayoutReader:
 
 
 def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Width, depth and height of a fixture, m."""
+    """Return the width, depth and height of a fixture in metres."""
     size = list(_SIZES[kind])
     if kind == "housing_cabinet":
         inner, padding = known[fixture["interior_obj"]][1], fixture.get("padding") or [None] * 3
@@ -139,7 +141,7 @@ def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Float
 
 
 def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Centre, m, of a fixture in its group's frame: as given, or next to another fixture, flush with its faces."""
+    """Return the centre of a fixture in its group's frame, in metres. It may be given relative to another fixture."""
     if "align_to" not in fixture:
         standing = (0.0, 0.0, size[2] / 2)
         given = fixture.get("pos") or [None] * 3
@@ -155,7 +157,7 @@ def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[
 
 
 def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
-    """Centre and size of a wall or a floor, m. The position in the layout is that of the face towards the room."""
+    """Return the centre and size of a wall or floor in metres. Layouts give the position of its inner face."""
     centre, half = np.array(fixture["pos"], float), np.array(fixture["size"], float)
     backing = bool(fixture.get("backing"))
     depth = half[2] + 2 * _WALL * backing
@@ -170,7 +172,7 @@ def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
 
 
 def _counter(name: str, centre: Floats, size: Floats, frame: Floats) -> Iterator[ScenePiece]:
-    """A worktop, and a cabinet set back below it so that its fronts are visible. They collide as one solid."""
+    """Yield a worktop, and below it a cabinet set back so that its fronts are visible. They collide as one solid."""
     yield _box(name, "counter", centre, size, frame, seen=False)
     top = np.array([0.0, 0.0, (size[2] - _TOP) / 2])
     yield _box(name, "counter", centre + top, np.array([*size[:2], _TOP]), frame, solid=False)

@@ -1,4 +1,4 @@
-"""Reader of SDF worlds (Gazebo): models with their links, poses, shapes and meshes. Joints do not move."""
+"""Reader for SDF worlds (Gazebo): models with their links, poses, shapes and meshes. Joints do not move."""
 
 import os
 import re
@@ -28,13 +28,13 @@ from mjsim.values.errors import AssetError
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
 _BUILT_IN = ("sun", "ground_plane")  # models that come with Gazebo
-_THIN = 0.002  # thickness of planes, in metres
-_DEPTH = 20  # maximum nesting of models
+_THIN = 0.002  # thickness given to planes, in metres
+_DEPTH = 20  # maximum nesting depth of models
 _PLANE = 30.0  # maximum side of a plane, in metres
 
 
 def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a world or a model. Raise `AssetError` if it is damaged, or names a missing file."""
+    """Read a world or a model. Raise `AssetError` if it is damaged or refers to a missing file."""
     root = _root(path)
     reader = _WorldReader(path, options)
     top = root.find("world")
@@ -54,7 +54,7 @@ class _Place:
     """Pose of a link, and the model that it belongs to."""
 
     name: str  # name of the outermost model
-    frame: Floats  # (4, 4)
+    frame: Floats  # transform from the link to the world, shape (4, 4)
     folder: Path
     loose: bool
 
@@ -71,7 +71,7 @@ class _WorldReader:
         self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
-        """Report lines about shapes that cannot be read."""
+        """Return report lines about shapes that cannot be read."""
         return tuple(
             left_out(f"{n} of shape <{kind}>", "it cannot be read") for kind, n in self._unknown.items()
         )
@@ -79,7 +79,7 @@ class _WorldReader:
     def models(
         self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""
     ) -> Iterator[ScenePiece]:
-        """Pieces of all models in a world or a model. `name` is that of the outermost model."""
+        """Yield the pieces of all models in a world or a model. `name` is the name of the outermost model."""
         if depth > _DEPTH:
             raise AssetError(f"{self._path} nests models more than {_DEPTH} deep; does one include itself?")
         for element in parent.findall("include"):
@@ -93,7 +93,7 @@ class _WorldReader:
     ) -> Iterator[ScenePiece]:
         uri = (element.findtext("uri") or "").strip()
         built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
-        if built_in == "ground_plane":  # only its height is used; the house gets its own floor
+        if built_in == "ground_plane":  # only its height is used, because the house gets its own floor
             ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
             surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
             yield ScenePiece(built_in, surface, seen=False, solid=False)
@@ -157,9 +157,9 @@ class _WorldReader:
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
-        """File or folder of a URI, or None if it is missing and may be left out."""
+        """Return the file or folder of a URI, or None if it is missing and may be left out."""
         scheme, _, rest = uri.rpartition("://")
-        if scheme.startswith("http"):  # Gazebo Fuel: the model may have been downloaded
+        if scheme.startswith("http"):  # Gazebo Fuel; the model may have been downloaded before
             rest = rest.rstrip("/").rpartition("/")[2]
         rest = rest.lstrip("/") if scheme == "model" else rest
         folders = [*([] if folder is None else [folder, folder.parent]), *self._folders]
@@ -176,7 +176,7 @@ class _WorldReader:
 
 def _root(path: Path) -> ET.Element:
     try:
-        # Gazebo accepts comments before the declaration.
+        # Gazebo accepts comments before the XML declaration.
         root = ET.fromstring(re.sub(r"<\?xml[^>]*\?>", "", read_text(path), count=1))
     except (OSError, UnicodeDecodeError, ET.ParseError) as error:
         raise AssetError(f"cannot read {path} as SDF: {error}; is it complete?") from error
@@ -186,7 +186,7 @@ def _root(path: Path) -> ET.Element:
 
 
 def _model_file(folder: Path) -> Path:
-    """The SDF file of a model's folder, by its model.config."""
+    """Return the SDF file that is named in the model.config of a model's folder."""
     config = folder / "model.config"
     if config.is_file():
         try:
@@ -194,7 +194,7 @@ def _model_file(folder: Path) -> Path:
         except (OSError, UnicodeDecodeError, ET.ParseError):
             named = []
         named.sort(key=lambda sdf: [int(n) for n in re.findall(r"\d+", sdf.get("version", ""))], reverse=True)
-        for sdf in named:  # the newest first
+        for sdf in named:  # newest version first
             if (file := folder / (sdf.text or "").strip()).is_file():
                 return file
     if (folder / "model.sdf").is_file():
@@ -203,7 +203,7 @@ def _model_file(folder: Path) -> Path:
 
 
 def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, depth: int = 0) -> Floats:
-    """Transform (4, 4) of an element's <pose>, x y z roll pitch yaw, to the frame of its model or link.
+    """Return the transform (4, 4) from an element to its model or link, given by <pose>: x y z roll pitch yaw.
 
     Args:
         element: A model, link, joint, ....
@@ -233,7 +233,7 @@ def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, dept
 
 
 def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
-    """A box, cylinder, ..., around the origin; None for an unknown shape."""
+    """Return a box, cylinder or other primitive around the origin, or None for an unknown shape."""
 
     def number(name: str, count: int = 1) -> Floats:
         return numbers((shape.findtext(name) or "").split(), count, path)
@@ -254,7 +254,7 @@ def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
 
 
 def _colour(element: ET.Element) -> Floats:
-    """Plain colour (3,) of a <visual>, RGB from 0 to 1."""
+    """Return the plain colour (3,) of a <visual>, RGB from 0 to 1."""
     for name in ("diffuse", "ambient"):
         words = (element.findtext(f"material/{name}") or "").split()
         if len(words) >= 3:

@@ -1,1 +1,1 @@
-"""Houses and scenes as glTF, with WebP textures and JSON."""
+"""Export of houses and scenes as glTF with WebP textures, and readers of glTF files."""

@@ -20,7 +20,7 @@ from mjsim.support.files import WORK, replacing, source_digest, work_folder
 from mjsim.support.kernels import UNUSED
 
 _LEVEL = 9
-_COMPRESSED = (".webp",)  # suffixes of files that are already compressed
+_COMPRESSED = (".webp",)  # suffixes of file formats that are already compressed
 
 
 def scene_hash(catalogue: Catalogue) -> str:
@@ -30,7 +30,7 @@ def scene_hash(catalogue: Catalogue) -> str:
 
 
 def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
-    """Write the files of a house into a folder named by their hash, unless it exists. Return that folder.
+    """Write the files of a house into a folder named by their hash, unless the folder exists. Return the folder.
 
     Compressible files are stored only as `NAME.gz`. If another process is writing the same files, wait for it.
 
@@ -45,7 +45,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
             if not target.is_dir():
                 _delete_unused(folder)
                 _make(catalogue, folder, target)
-    os.utime(target)  # marks it as used
+    os.utime(target)  # marks the folder as recently used
     return target
 
 
@@ -82,7 +82,7 @@ def _compressed(content: bytes) -> bytes:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Let one process at a time write scenes into a folder."""
+    """Ensure that only one process at a time writes scenes into a folder."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)

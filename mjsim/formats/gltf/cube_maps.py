@@ -1,4 +1,4 @@
-"""Cube textures, which glTF lacks: triangles are cut along the cube's edges and mapped to one image of its faces."""
+"""Cube textures for glTF, which has none: triangles are cut along the cube's edges and mapped to one flat image."""
 
 import itertools
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from mjsim.formats.gltf.shapes import Floats, Indices, Shape
 
-FACES = 6  # +x, -x, +y, -y, +z, -z, stacked in an image in this order
-_MAX_SHIFT = 0.015  # largest image shift at the midpoint of an edge, as a fraction of the face width
+FACES = 6  # number of cube faces, stacked in the image in the order +x, -x, +y, -y, +z, -z
+_MAX_SHIFT = 0.015  # maximum shift of the image at the midpoint of an edge, as a fraction of the face width
 _MAX_CUTS = 4  # maximum number of times an edge is halved
 _EDGE = 1e-6  # relative tolerance for directions that lie on an edge of the cube
-# For each face, the cube axis and sign along which its columns and rows increase (OpenGL's convention).
+# For each face, the cube axis and the sign along which its columns and rows increase (OpenGL's convention).
 _COLUMNS = ((2, -1.0), (2, 1.0), (0, 1.0), (0, 1.0), (0, 1.0), (0, -1.0))
 _ROWS = ((1, -1.0), (1, -1.0), (2, 1.0), (2, -1.0), (1, -1.0), (1, -1.0))
 
 
 def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
-    """A shape with `uv` for a cube texture that surrounds it.
+    """Return a shape with texture coordinates for a cube texture that surrounds it.
 
     Args:
         shape: Triangles. The direction of a vertex from the cube's centre is `unscaled * scale`.
@@ -41,7 +41,6 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
 
 
 def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
-    """Cut triangles (t, 3, k) where column i equals `sign` times column j."""
     values = corners[..., i] - sign * corners[..., j]
     values[np.abs(values) <= _EDGE * np.linalg.norm(corners[..., 6:], axis=-1)] = 0.0
     crossing = (values.min(axis=1) < 0.0) & (values.max(axis=1) > 0.0)
@@ -67,13 +66,13 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
 
 
 def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
-    """Points (t, k) between `a` and `b` at which linear interpolation of the values `at` and `bt` (t,) gives zero."""
+    """Return points (t, k) between `a` and `b` where values that change linearly from `at` to `bt` are zero."""
     share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
     return a + share * (b - a)
 
 
 def _halved(corners: Floats) -> Floats:
-    """Triangles, each cut into four where linear interpolation would shift the image by more than `_MAX_SHIFT`."""
+    """Cut triangles into four if linear interpolation would shift the image by more than `_MAX_SHIFT`."""
     after = np.roll(corners, -1, axis=1)
     face = _faces_of(corners)
     ends = _coordinates(corners[..., 6:], face), _coordinates(after[..., 6:], face)
@@ -90,7 +89,7 @@ def _triangles(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _faces_of(corners: Floats) -> Indices:
-    """Face of the cube for each triangle, (t,)."""
+    """Return the cube face of each triangle, shape (t,)."""
     middle = corners[..., 6:].mean(axis=1)
     axis = np.abs(middle).argmax(axis=1)
     is_negative = np.take_along_axis(middle, axis[:, None], axis=1)[:, 0] < 0.0
@@ -98,7 +97,7 @@ def _faces_of(corners: Floats) -> Indices:
 
 
 def _coordinates(directions: Floats, face: Indices) -> Floats:
-    """Columns and rows (t, 3, 2) on each triangle's face, from 0 to 1."""
+    """Return columns and rows (t, 3, 2) on each triangle's cube face, from 0 to 1."""
     axes = np.array([(column[0], row[0]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     signs = np.array([(column[1], row[1]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     depth = np.abs(np.take_along_axis(directions, (face // 2)[:, None, None], axis=2))
@@ -107,7 +106,6 @@ def _coordinates(directions: Floats, face: Indices) -> Floats:
 
 
 def _joined(corners: Floats, uv: Floats) -> Shape:
-    """Triangles (t, 3, 9) with texture coordinates (t, 3, 2) as a shape without duplicate vertices."""
     rows = np.concatenate((corners, uv), axis=2).reshape(-1, 11)
     _, first, index = np.unique(rows.round(9), axis=0, return_index=True, return_inverse=True)
     rows = rows[first]

@@ -1,4 +1,4 @@
-"""Export of a house for other renderers: the house, its object models, the person, and a JSON file that joins them."""
+"""Export of a house for other renderers: GLB files of the house, its objects and the person, and a JSON index."""
 
 import json
 import re
@@ -26,12 +26,12 @@ from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
-_AWAY = -100.0  # height of the object models, far below the house, in metres
+_AWAY = -100.0  # height of the object models in metres, far below the house
 _HANDS = tuple(f"{avatar.PREFIX}{hand}_hand" for hand in avatar.HANDS)
 
 
 def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
-    """All files of a house by name. `scene.json` describes the others.
+    """Return the files of a house by name. `scene.json` describes the others.
 
     Raises:
         AssetError: The house breaks a convention of docs/models.md, or shows something that cannot be exported.
@@ -40,7 +40,7 @@ def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
 
 
 def export_episode(scene: Scene) -> bytes:
-    """One GLB file of an episode at its start: the house, its receptacles, and the objects in their places.
+    """Return a GLB file of an episode at its start: the house, its receptacles, and its objects in their start poses.
 
     Raises:
         AssetError: The scene shows something that cannot be exported.
@@ -49,7 +49,7 @@ def export_episode(scene: Scene) -> bytes:
 
 
 def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
-    """The floor data for walking with this trunk radius, in metres, as JSON. Arrays are flattened row by row."""
+    """Return the floor data for walking with this trunk radius, in metres, as JSON. Arrays are flattened row by row."""
     floor = Floor.of(compiled_house(catalogue).model, body_radius)
     plain = {
         name: np.ravel(value).tolist() if isinstance(value, np.ndarray) else value
@@ -59,7 +59,7 @@ def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
 
 
 def _one_of_each(catalogue: Catalogue) -> Scene:
-    """A scene with one object of each model, far below the house."""
+    """Compose a scene with one object of each model, far below the house."""
     placed = tuple(
         PlacedObject(f"object_{i}", model.category, key, (0.0, 0.0), (0.0, 0.0, _AWAY), (1.0, 0.0, 0.0, 0.0))
         for i, (key, model) in enumerate(catalogue.objects.items())
@@ -76,8 +76,6 @@ def _one_of_each(catalogue: Catalogue) -> Scene:
 
 
 class _Export:
-    """Exporter of a composed scene."""
-
     def __init__(self, scene: Scene) -> None:
         self._scene, self._model = scene, scene.model
         self._data = mujoco.MjData(scene.model)
@@ -88,7 +86,7 @@ class _Export:
 
     @cached_property
     def _by_body(self) -> dict[int, list[GeomSurface]]:
-        """Visible geoms by the id of the body that carries them, 0 if they are static."""
+        """Visible geoms by the id of the body that they are fixed to, which is 0 for static geoms."""
         found: dict[int, list[GeomSurface]] = {}
         carried = self._model.body_weldid[self._model.geom_bodyid]
         for surface in surfaces(self._model, self._data, self._drawn):
@@ -152,7 +150,7 @@ class _Export:
         return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
 
     def _rooms(self, glb: Glb) -> list[int]:
-        """Nodes of all static geoms, split for culling. Ceilings are separate because top-down views omit them."""
+        """Return nodes of static geoms, split for culling. Ceilings are separate, since top-down views omit them."""
         groups: dict[tuple[bool, str], list[GeomSurface]] = {}
         for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
@@ -177,7 +175,7 @@ class _Export:
         return (surface.within(position, rotation) for surface in found)
 
     def _person(self) -> tuple[Glb, int]:
-        """The person's body, which is not drawn, with its hands at rest."""
+        """Return the hands at rest, in the frame of a person's body. The body itself is not drawn."""
         glb = Glb(self._images)
         base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
         hands = []
@@ -193,7 +191,7 @@ class _Export:
         return data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy(), data.xquat[body].copy()
 
     def _about(self, placed: PlacedObject) -> dict[str, Any]:
-        """Label, bounds and boxes of an object model, m, in the body's frame."""
+        """Describe an object model: label, bounding box and collision boxes in metres, in the body's frame."""
         position, rotation, _ = self._frame(self._scene.index.body(placed.name))
         points = np.concatenate([s.positions for s in self._carried(placed, position, rotation)])
         boxes = []
@@ -211,16 +209,16 @@ class _Export:
         }
 
     def _sky(self) -> bytes | None:
-        """The sky's six faces, stacked: right, left, up, down, front, back; None without a sky."""
+        """Return the six faces of the sky stacked as right, left, up, down, front, back, or None if there is no sky."""
         found = np.flatnonzero(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
         if not len(found):
             return None
         image = pixels(self._model, found[0])
-        faces = FACES * image.shape[1] // image.shape[0]  # 1 if the image has all six
+        faces = FACES * image.shape[1] // image.shape[0]  # 1 if the image contains all six faces
         return webp(np.tile(image, (faces, 1, 1)), lossless=True)
 
     def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
-        """Parameters and texture of contact shadows under objects, or None if the house has no material for them."""
+        """Return parameters and texture of contact shadows, or None if the house has no material for them."""
         material = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_MATERIAL, shadows.MATERIAL)
         textures = self._model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
         texture = textures[material] if material >= 0 else -1
@@ -237,7 +235,7 @@ class _Export:
 
 
 def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
-    """Label and rectangle of each room, corners counter-clockwise, m."""
+    """Return the label and the corners of each room, counter-clockwise, in metres."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return [
         {"label": rooms.label(key), "polygon": [rounded(xy) for xy in centre + (corners * half) @ axes.T]}
@@ -246,7 +244,7 @@ def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
 
 
 def _file_name(key: str) -> str:
-    """A name for files and URLs from a catalogue key, which may contain any character."""
+    """Turn a catalogue key, which may contain any character, into a name for files and URLs."""
     if re.fullmatch(r"[A-Za-z0-9_-]{1,80}", key):
         return key
     return f"{re.sub(r'[^A-Za-z0-9_-]', '_', key)[:40]}-{zlib.crc32(key.encode()):08x}"

@@ -1,4 +1,4 @@
-"""GLB files: merged meshes with quantised vertices, materials and WebP textures."""
+"""Writer for GLB files with merged meshes, quantised vertices, materials and WebP textures."""
 
 import functools
 import json
@@ -17,26 +17,27 @@ from mjsim.formats.gltf.shapes import Floats
 from mjsim.formats.gltf.surfaces import GeomSurface
 from mjsim.house.compiled.sites import RoomMap
 
-UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion xyzw that turns z up into y up
-_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]  # quantisation steps of positions: 1/128 mm to 128 mm
+UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion (x, y, z, w) that rotates the z axis to the y axis
+# Quantisation steps of positions, from 1/128 mm to 128 mm.
+_STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]
 _UV_STEP = 2.0**-13
 _COMPONENTS = {
     np.dtype(kind): code
     for kind, code in (("i1", 5120), ("u1", 5121), ("u2", 5123), ("u4", 5125), ("f4", 5126))
 }
-_VERTICES, _TRIANGLES = 34962, 34963  # buffer view targets
+_VERTICES, _TRIANGLES = 34962, 34963  # targets of buffer views, as defined by glTF
 _EXTENSIONS = {"mesh": "KHR_mesh_quantization", "texture": "EXT_texture_webp"}
-_MANY_TRIANGLES = 50_000  # a material with more triangles gets one draw call per room
-_SQUARE = 16.0  # side of a square of floor, in metres; positions in it are quantised to 0.25 mm
-_QUALITY, _LOSSLESS = 90, 101  # of OpenCV's WebP encoder
+_MANY_TRIANGLES = 50_000  # a material with more triangles is drawn by one call per room
+_SQUARE = 16.0  # side of a square of floor in metres; positions in it are quantised to 0.25 mm
+_QUALITY, _LOSSLESS = 90, 101  # quality settings of OpenCV's WebP encoder
 
 
 class MaterialKey(NamedTuple):
-    """The properties shared by surfaces that are drawn by one call."""
+    """Properties shared by the surfaces that are drawn by one call."""
 
-    texture: int  # id, -1 for none
+    texture: int  # texture id, or -1 for none
     is_translucent: bool
-    is_decal: bool  # a translucent plane, which MuJoCo draws before other translucent geoms
+    is_decal: bool  # True for a translucent plane, which MuJoCo draws before other translucent geoms
 
     @classmethod
     def of(cls, surface: GeomSurface) -> "MaterialKey":
@@ -64,7 +65,7 @@ class Glb:
         self.primitives = 0
 
     def node(self, name: str, children: Sequence[int] = (), **properties: Any) -> int:
-        """Add a node without a mesh, with `properties` as in glTF. Return its number."""
+        """Add a node without a mesh, and return its number. `properties` are glTF properties of the node."""
         node = {"name": name, **properties}
         if children:
             node["children"] = list(children)
@@ -72,7 +73,7 @@ class Glb:
         return len(self._nodes) - 1
 
     def mesh(self, name: str, surfaces: Iterable[GeomSurface], **properties: Any) -> int:
-        """Add a node with surfaces merged by material. Return its number."""
+        """Add a node with surfaces, which are merged by material. Return its number."""
         groups: dict[MaterialKey, list[GeomSurface]] = {}
         for surface in surfaces:
             groups.setdefault(MaterialKey.of(surface), []).append(surface)
@@ -140,7 +141,7 @@ class Glb:
     def _attribute(
         self, values: NDArray[Any], kind: str, *, normalized: bool = False, bounds: bool = False
     ) -> int:
-        """Add an accessor of vertex values (n, k), each vertex aligned to 4 bytes."""
+        """Add an accessor of vertex values (n, k). Each vertex is aligned to 4 bytes."""
         width = values.shape[1] * values.itemsize
         stride = -(-width // 4) * 4
         padded = np.zeros((len(values), stride // values.itemsize), values.dtype)
@@ -179,7 +180,7 @@ class Glb:
         return len(self._views) - 1
 
     def content(self, root: int) -> bytes:
-        """The whole file, with one root node in its scene."""
+        """Return the complete file. Its scene has a single root node."""
         sampler = {"magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497}
         lists: Mapping[str, Any] = {
             "nodes": self._nodes,
@@ -215,13 +216,13 @@ class Glb:
 
 
 def linear(rgba: Floats) -> Floats:
-    """A displayed colour (4,) as linear light, as glTF requires for vertices."""
+    """Convert a displayed colour (4,) to linear light, which glTF requires for vertex colours."""
     rgb = rgba[:3]
     return np.append(np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), rgba[3])
 
 
 def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[GeomSurface, str]]:
-    """Divide static surfaces into parts that are few enough for drawing and small enough for culling and quantisation.
+    """Divide static surfaces into parts that are few enough to draw fast and small enough to cull and quantise well.
 
     Yield each surface with the name of its part. The part is the room if the material has many triangles. Otherwise it
     is the smallest square of floor as wide as the surface, because small surfaces would be quantised more coarsely next
@@ -243,7 +244,7 @@ def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[G
 
 
 def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
-    """The image of a texture, uint8, (height, width, channels).
+    """Return the image of a texture, uint8, shape (height, width, channels).
 
     For cubes and skies, it holds six stacked faces, or a single face that is shown on all sides.
     """
@@ -266,7 +267,7 @@ def texture_encoder(model: Any) -> Callable[[int, bool], tuple[str, bytes]]:
 
 
 def webp(image: NDArray[np.uint8], *, alpha: bool = False, lossless: bool = False) -> bytes:
-    """Encode an RGB or RGBA image, dropping its alpha channel unless `alpha`."""
+    """Encode an RGB or RGBA image as WebP. The alpha channel is dropped unless `alpha` is True."""
     keep = alpha and image.shape[2] == 4
     conversion = cv2.COLOR_RGBA2BGRA if keep else cv2.COLOR_RGB2BGR
     bgr = cv2.cvtColor(np.ascontiguousarray(image if keep else image[..., :3]), conversion)

@@ -1,4 +1,4 @@
-"""Readers of mesh files (glTF, GLB, OBJ, ...) and of Habitat's scene_instance.json, which combines several."""
+"""Readers for mesh files (glTF, GLB, OBJ and others) and for Habitat's scene_instance.json, which combines several."""
 
 import math
 import re
@@ -32,7 +32,8 @@ from mjsim.values.errors import AssetError
 
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"
-RECEPTACLE = "mjsim_receptacle"  # user_defined key of templates that were exported from an mjsim bin
+# Key in the user_defined section of templates that were exported from an mjsim bin.
+RECEPTACLE = "mjsim_receptacle"
 
 
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
@@ -42,7 +43,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     sides = np.ptp(points, axis=0)
     frame = np.eye(4)
     notes: list[ImportDecision] = []
-    known = path.suffix.lower() in (*GLTF, ".dae")  # formats that define unit and vertical axis
+    known = path.suffix.lower() in (*GLTF, ".dae")  # these formats define the unit and the vertical axis
     given = options.up or _stage_up(path)
     up = given or ("z" if known else "y" if sides[1] <= sides[2] else "z")
     if up == "y" and not known:
@@ -51,7 +52,8 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
     unit, longest = options.units, float(sides.max())
-    if unit is None and (not known or longest > MAX_SIDE):  # many glTF files are not in metres
+    # Many glTF files are not in metres, contrary to the standard.
+    if unit is None and (not known or longest > MAX_SIDE):
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
     frame = scale_matrix(UNITS[unit or "m"] * options.scale) @ frame
@@ -60,7 +62,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a stage with its objects. Raise `AssetError` if a template or its mesh is missing."""
+    """Read a Habitat stage with its objects. Raise `AssetError` if a template or its mesh is missing."""
     scene = _read(path)
     missing = MissingFiles(options.skip_missing)
     reader = _HabitatReader(path, missing)
@@ -81,7 +83,7 @@ def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _stage_up(path: Path) -> str | None:
-    """The vertical axis given by the Habitat stage_config.json next to a mesh, or None if there is no such file."""
+    """Return the vertical axis given by the Habitat stage_config.json next to a mesh, or None without such a file."""
     config = path.with_suffix(".stage_config.json")
     if not config.is_file():
         return None
@@ -103,7 +105,7 @@ class _HabitatReader:
         }
 
     def rooms(self, name: str) -> tuple[NamedRoom, ...]:
-        """Rooms of the regions in a semantic_config.json; none without the file."""
+        """Return the rooms described by a semantic_config.json, or none if the file is missing."""
         found: dict[str, NamedRoom] = {}
         if (file := self._files.get(name + SEMANTICS)) is None:
             return ()
@@ -125,7 +127,7 @@ class _HabitatReader:
         return tuple(found.values())
 
     def instance(self, item: dict[str, Any], kind: str) -> Iterator[ScenePiece]:
-        """Pieces of a stage or an object in its pose, z up."""
+        """Yield the pieces of a stage or an object in its pose, with z up."""
         name = str(item.get("template_name", "")).rpartition("/")[2]
         config_file = self._files.get(f"{name}.{kind}_config.json")
         config = _read(config_file) if config_file else {}
@@ -146,7 +148,7 @@ class _HabitatReader:
         scale = numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
         scale = scale * float(item.get("uniform_scale", 1.0))
         upright = np.eye(4)
-        if _is_z_up(config):  # Habitat turns such a mesh so that y is up
+        if _is_z_up(config):  # Habitat rotates such a mesh so that y is up
             upright = np.linalg.inv(Y_TO_Z)
         own: Floats = Y_TO_Z @ frame @ np.diag([*scale, 1.0]) @ upright @ np.linalg.inv(Y_TO_Z)
         marks = config.get("user_defined")
@@ -167,7 +169,7 @@ class _HabitatReader:
                 yield ScenePiece(part if kind == "stage" else name, surface, seen, solid, loose)
 
     def _mesh(self, config: Path | None, asset: str) -> Path | None:
-        """The file of an asset, next to its template or elsewhere in the data set; None if missing."""
+        """Return an asset's mesh file, next to its template or elsewhere in the dataset, or None if it is missing."""
         mesh = (config or self._path).parent / asset
         found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
         return found if found and found.name.endswith(SCENE_SUFFIXES) else None

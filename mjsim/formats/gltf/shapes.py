@@ -1,4 +1,4 @@
-"""Triangulation of geoms with the same vertices and normals as in MuJoCo's renderer."""
+"""Triangulation of geoms with the same vertices and normals as MuJoCo's renderer."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,21 +12,21 @@ Indices = NDArray[np.int64]
 
 _Geom = mujoco.mjtGeom
 MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
-_FLATTENED_BELOW = 0.8  # cosine between vertex and face normal below which MuJoCo uses the latter
+_FLATTENED_BELOW = 0.8  # cosine between vertex and face normal below which MuJoCo uses the face normal
 
 
 class Shape(NamedTuple):
     """Triangles in a geom's frame."""
 
-    positions: Floats  # m, (n, 3)
-    normals: Floats  # of unit length, (n, 3)
-    triangles: Indices  # counter-clockwise seen from outside, (t, 3)
-    unscaled: Floats  # directions from the centre of a cube texture, (n, 3)
-    uv: Floats | None  # texture coordinates of one image, v downwards, (n, 2); None for meshes without
+    positions: Floats  # vertices in metres, shape (n, 3)
+    normals: Floats  # unit normals, shape (n, 3)
+    triangles: Indices  # vertex indices, counter-clockwise seen from outside, shape (t, 3)
+    unscaled: Floats  # directions from the centre of a cube texture, shape (n, 3)
+    uv: Floats | None  # texture coordinates with v downwards, shape (n, 2), or None for a mesh without them
 
 
 def shape_of(model: Any, geom: Any) -> Shape:
-    """Triangles of an `MjvGeom` of a model. Raise `ValueError` for a type of geom that cannot be shown."""
+    """Return the triangles of an `MjvGeom` of a model. Raise `ValueError` if this type of geom cannot be drawn."""
     kind, size = _Geom(geom.type), np.array(geom.size, np.float64)
     if kind in MESHES:
         return _mesh(model, geom.dataid // 2)
@@ -62,7 +62,7 @@ def _joined(*parts: Shape) -> Shape:
 
 
 def _grid(rows: int, columns: int) -> Indices:
-    """Two triangles for each cell between (rows + 1) x (columns + 1) vertices, row by row with the rows going up."""
+    """Return two triangles for each cell of a grid of (rows + 1) x (columns + 1) vertices, which are ordered by row."""
     i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
     low = i * (columns + 1) + j
     high = low + columns + 1
@@ -70,7 +70,7 @@ def _grid(rows: int, columns: int) -> Indices:
 
 
 def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
-    """The part of the unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
+    """Return the part of the unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
     halves = max(stacks // 2, 1)
     heights = np.arange(low * halves, high * halves + 1) / halves
     around, up = np.meshgrid(np.arange(slices + 1) / slices, heights)
@@ -78,7 +78,7 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
     axes = flat * np.cos(angle), flat * np.sin(angle), np.sin(0.5 * math.pi * up)
     points = np.stack(axes, axis=-1).reshape(-1, 3)
     uv = np.column_stack((around.ravel(), (high - up.ravel()) / (high - low)))
-    # At a pole, a cell is one triangle. Its corner at the pole is midway between the other two in the image.
+    # A cell at a pole is a single triangle. In the image, its corner at the pole is midway between the other two.
     is_pole = np.abs(points[:, 2]) > 1.0 - 1e-9
     uv[is_pole, 0] -= 0.5 / slices * np.sign(points[is_pole, 2])
     triangles = _grid(len(up) - 1, slices)
@@ -86,13 +86,13 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
 
 
 def _circle(slices: int) -> Floats:
-    """Points of the unit circle (slices + 1, 2), with the first repeated as the last."""
+    """Return points of the unit circle, shape (slices + 1, 2). The last point repeats the first."""
     angles = np.arange(slices + 1) * (2.0 * math.pi / slices)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def _tube(slices: int) -> Shape:
-    """The lateral surface of the unit cylinder."""
+    """Return the lateral surface of the unit cylinder."""
     around = np.column_stack((_circle(slices), np.zeros(slices + 1)))
     up = np.array([0.0, 0.0, 1.0])
     points = np.concatenate((around - up, around + up))
@@ -102,7 +102,7 @@ def _tube(slices: int) -> Shape:
 
 
 def _disc(slices: int, height: float) -> Shape:
-    """The end of the unit cylinder at height 1 or -1."""
+    """Return the end of the unit cylinder at height 1 or -1."""
     flat = np.concatenate((np.zeros((1, 2)), _circle(slices)[:-1]))
     number = np.arange(slices)
     triangles = np.column_stack((np.zeros(slices, np.int64), 1 + number, 1 + (number + 1) % slices))
@@ -118,17 +118,17 @@ def _quad() -> Shape:
 
 
 def _plane(size: Floats, far: float) -> Shape:
-    """A plane of half-sizes (x, y, ...), in metres. A half-size of 0 means infinite and is drawn up to `far`."""
+    """Return a plane with half-sizes in metres. A half-size of 0 means infinite, and is drawn up to `far`."""
     shape = _quad()
     endless = size[:2] <= 0.0
     half = np.where(endless, far, size[:2])
-    # The image of an infinite plane begins in the middle and is 2 m wide.
+    # The image of an infinite plane starts in its middle and is 2 m wide.
     uv = shape.positions[:, :2] * [0.5, -0.5] * np.where(endless, half, 1.0) + np.where(endless, 0.0, 0.5)
     return shape._replace(positions=shape.positions * [*half, 1.0], uv=uv)
 
 
 def _box() -> Shape:
-    """Six quads. The image is upright on the vertical quads, and mirrored on three of the six."""
+    """Return six quads. The image is upright on the vertical quads, and mirrored on three of the six."""
     quad, sides = _quad(), []
     for normal, right, up in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for sign in (-1.0, 1.0):
@@ -142,7 +142,7 @@ def _box() -> Shape:
 
 
 def _capsule(size: Floats, slices: int, stacks: int) -> Shape:
-    """A tube between two hemispheres, each with the whole image."""
+    """Return a tube between two hemispheres. Each of the three shows the whole image."""
     radius, half = (size[0] + size[1]) / 2.0, size[2]
     parts = [_scaled(_tube(slices), size)]
     for low, high in ((0, 1), (-1, 0)):
@@ -166,7 +166,7 @@ def _mesh(model: Any, mesh: int) -> Shape:
 
 
 def _flattened(corners: Floats, normals: Floats) -> Floats:
-    """Normals (t, 3, 3) of corners (t, 3, 3) of triangles, replaced by the face's normal if they differ much."""
+    """Replace the normals (t, 3, 3) of corners by the face's normal if the two differ too much."""
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-15)
     along = np.einsum("tck,tk->tc", normals, flat)
@@ -174,7 +174,7 @@ def _flattened(corners: Floats, normals: Floats) -> Floats:
 
 
 def _without_copies(faces: Any, vertices: Floats, normals: Floats, uv: Floats | None) -> Shape:
-    """Triangles of a mesh without duplicate vertices."""
+    """Merge duplicate vertices of a mesh."""
     parts = [vertices[faces].reshape(-1, 3), normals.reshape(-1, 3)]
     if uv is not None:
         parts.append(uv.reshape(-1, 2))

@@ -1,13 +1,13 @@
-"""Location and names of scene files on disk, apart from their writers so that servers import quickly."""
+"""Paths of scene files on disk. They are separate from the writers so that servers import them quickly."""
 
 from pathlib import Path
 
 from mjsim.support.kernels import cache_base
 
-GZIP = ".gz"  # suffix of compressed files
-SCENE = "scene.json"  # names the other files
+GZIP = ".gz"
+SCENE = "scene.json"  # file that lists the others
 
 
 def scenes_folder() -> Path:
-    """Folder of all scenes: in `NUMBA_CACHE_DIR` if set, else in the user's cache folder."""
+    """Return the folder of all scenes. It is in `NUMBA_CACHE_DIR` if set, otherwise in the user's cache folder."""
     return cache_base() / "scenes"

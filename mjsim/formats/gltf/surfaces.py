@@ -1,4 +1,4 @@
-"""The surfaces and lights of a scene in the `fast` profile."""
+"""Surfaces and lights of a scene in the `fast` profile."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
 from mjsim.values.errors import AssetError
 
-_OPAQUE_FROM = 0.995  # alpha below which MuJoCo blends a geom
+_OPAQUE_FROM = 0.995  # minimum alpha of geoms that MuJoCo draws without blending
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
-_MAX_LIGHTS = 8  # OpenGL's limit, including the headlight
-_AMBIENT_ALONE = 0.3  # ambient light of a scene without any light
+_MAX_LIGHTS = 8  # OpenGL's maximum number of lights, including the headlight
+_AMBIENT_ALONE = 0.3  # ambient light of a scene without lights
 _COLOURS = ("ambient", "diffuse", "specular")
 _LIGHTS = {mujoco.mjtLightType.mjLIGHT_SPOT: "spot", mujoco.mjtLightType.mjLIGHT_DIRECTIONAL: "directional"}
 
 
 @dataclass(frozen=True, eq=False)
 class GeomSurface:
-    """The visible surface of one geom, in the frame of the house.
+    """Visible surface of one geom, in the frame of the house.
 
     Attributes:
         geom: Id of the geom.
@@ -52,13 +52,13 @@ class GeomSurface:
     is_ceiling: bool
 
     def within(self, position: Floats, rotation: Floats) -> "GeomSurface":
-        """The surface in the frame of a body at `position`, m, with its axes in the columns of `rotation`."""
+        """Return the surface in the frame of a body at `position` in metres, with the axes in columns of `rotation`."""
         positions = (self.positions - position) @ rotation
         return replace(self, positions=positions, normals=self.normals @ rotation)
 
 
 def drawn_scene(model: Any, data: Any) -> Any:
-    """MuJoCo's abstract scene of everything that a first-person view can show."""
+    """Return MuJoCo's abstract scene of everything that a first-person view can show."""
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
     option = visual_option(FIRST_PERSON_GROUPS, FAST)
     mujoco.mjv_updateScene(model, data, option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, scene)
@@ -66,7 +66,7 @@ def drawn_scene(model: Any, data: Any) -> Any:
 
 
 def surfaces(model: Any, data: Any, scene: Any) -> Iterator[GeomSurface]:
-    """Yield the visible geoms of an abstract scene, in its order.
+    """Yield the visible geoms of an abstract scene, in their order there.
 
     Raises:
         AssetError: A geom is of a type that cannot be exported.
@@ -105,7 +105,7 @@ def _surface(model: Any, data: Any, geom: Any) -> GeomSurface:
 
 
 def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
-    """The shape with MuJoCo's texture coordinates, and the id of its texture, -1 for none."""
+    """Return the shape with MuJoCo's texture coordinates, and its texture id or -1."""
     texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
     if texture < 0:
         return shape, -1
@@ -120,13 +120,13 @@ def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
         over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # texture coordinates from the mesh's x and y
         return shape._replace(uv=over * repeat + 0.5), texture
     if shape.uv is not None and geom.type in MESHES:
-        return shape, -1  # MuJoCo does not draw cubes on meshes with texture coordinates
+        return shape, -1  # MuJoCo does not draw cube textures on meshes that have texture coordinates
     width = int(model.tex_width[texture])
     return laid_out(shape, scale, width, int(model.tex_height[texture]) // width), texture
 
 
 def lights_of(scene: Any) -> dict[str, Any]:
-    """The `lights` of an `MjvScene`, in the house's frame, and the `headlight`, which shines along the view.
+    """Describe the lights of an `MjvScene` in the house's frame, and the headlight, which shines along the view.
 
     Positions are in m, cutoffs in degrees. Lights of type `point` and `image` are left out, because MuJoCo does not
     draw them.
@@ -153,7 +153,7 @@ def lights_of(scene: Any) -> dict[str, Any]:
 
 
 def rounded(values: Any) -> list[float]:
-    """Values rounded to 1e-6."""
+    """Round values to six decimals."""
     return [round(float(value), 6) for value in values]
 
 

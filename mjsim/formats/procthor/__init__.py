@@ -1,1 +1,1 @@
-"""Reader and writer of ProcTHOR's house JSON."""
+"""Reader and writer for ProcTHOR's house JSON."""

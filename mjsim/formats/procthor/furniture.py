@@ -1,4 +1,4 @@
-"""Replacement of the objects in ProcTHOR houses by mjsim furniture, stretched to their sizes."""
+"""Furniture for imported ProcTHOR houses. Each object is replaced by mjsim furniture stretched to its size."""
 
 import math
 import re
@@ -24,16 +24,16 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-DATABASE = "asset-database.json"  # ProcTHOR's file with types and sizes of its assets
-_DRAWN = 4  # number of pieces drawn of each kind; the most similar one is used
-_STRETCH = math.log(2.2)  # log of the largest factor by which a side is stretched
+DATABASE = "asset-database.json"  # ProcTHOR's file with the types and sizes of its assets
+_DRAWN = 4  # number of pieces drawn of each type, of which the most similar one is used
+_STRETCH = math.log(2.2)  # logarithm of the largest factor by which a side is stretched
 _GREY, _BLACK = np.array([0.62, 0.6, 0.57]), np.array([0.08, 0.08, 0.09])
 _SCREENS = ("desktop", "microwave", "television")
 _Entry = tuple[tuple[str, ...], tuple[float, float, float]]
 _CAN: _Entry = ((), (0.45, 0.35, 0.55))
 _SHELVES: _Entry = (("bookcase", "low_bookcase", "cube_shelf"), (0.9, 0.35, 1.45))
 _PICTURE: _Entry = ((), (0.8, 0.16, 0.6))
-# Word in a name -> similar mjsim kinds (a box is used if there are none), and typical width, depth and height, m.
+# Word in a name -> similar mjsim furniture (if empty, a box is used), and typical width, depth and height in metres.
 _TYPES: Mapping[str, _Entry] = {
     "armchair": (("armchair",), (0.95, 0.9, 0.9)),
     "bathtub": (("bathtub",), (1.7, 0.8, 0.6)),
@@ -83,15 +83,15 @@ _TYPES: Mapping[str, _Entry] = {
 
 @dataclass(frozen=True)
 class AssetDatabase:
-    """Types and sizes of ProcTHOR's assets, from its database if available, otherwise from their names."""
+    """Types and sizes of ProcTHOR's assets, from its database if available, otherwise guessed from their names."""
 
     types: Mapping[str, str]  # asset -> type
-    sizes: Mapping[str, Floats]  # asset -> width, depth and height, in metres
-    source: str  # where the sizes are from, for the report
+    sizes: Mapping[str, Floats]  # asset -> width, depth and height in metres
+    source: str  # origin of the sizes, for the report
 
     @classmethod
     def read(cls, folders: Iterable[Path]) -> "AssetDatabase":
-        """Read the first database in some folders. Raise `AssetError` if it is not valid."""
+        """Read the first database found in some folders. Raise `AssetError` if it is not valid."""
         file = next((folder / DATABASE for folder in folders if (folder / DATABASE).is_file()), None)
         if file is None:
             return cls(
@@ -112,7 +112,7 @@ class AssetDatabase:
         return cls(types, sizes, f"of {DATABASE}")
 
     def type_of(self, thing: Thing) -> str:
-        """The longest key of `_TYPES` in a thing's type, asset or id, in this order; empty if none is found."""
+        """Return the longest key of `_TYPES` in a thing's type, asset or id, in this order, or "" if there is none."""
         for text in (self.types.get(thing.asset_id, ""), thing.asset_id, thing.id):
             plain = re.sub(r"[^a-z]", "", text.lower())
             if found := [key for key in _TYPES if key in plain]:
@@ -120,7 +120,7 @@ class AssetDatabase:
         return ""
 
     def size_of(self, thing: Thing, kind: str) -> Floats | None:
-        """Width, depth and height of a thing, m; None if unknown.
+        """Return the width, depth and height of a thing in metres, or None if they are unknown.
 
         Without a database, it is the type's typical size, with twice the height of the thing's centre if plausible.
         """
@@ -135,7 +135,7 @@ class AssetDatabase:
 
 
 def in_our_style(world: str, assets: Iterable[str]) -> str:
-    """MJCF of a world with the default classes of the apartment."""
+    """Return MJCF of a world with the default classes of the apartment."""
     style = (models_root() / STYLE / "defaults.xml").read_text(encoding="utf-8")
     default = style[style.index("<default>") : style.rindex("</mujocoinclude>")]
     return (
@@ -145,7 +145,7 @@ def in_our_style(world: str, assets: Iterable[str]) -> str:
 
 
 class FurnitureLibrary:
-    """Furniture for some types of things. Pieces are written as one MJCF file and read back as surfaces."""
+    """Furniture for some types of things. Pieces are written to one MJCF file and read back as surfaces."""
 
     def __init__(self, types: Iterable[str], folder: Path) -> None:
         self.file = folder / "furniture.xml"
@@ -169,7 +169,7 @@ class FurnitureLibrary:
         self.file.write_text(text, encoding="utf-8")
 
     def take(self, pieces: Iterable[ScenePiece]) -> None:
-        """Keep the pieces that were read from `file`."""
+        """Store the pieces that were read from `file`."""
         bodies: dict[str, list[ScenePiece]] = {}
         for piece in pieces:
             bodies.setdefault(piece.name, []).append(piece)
@@ -177,7 +177,7 @@ class FurnitureLibrary:
             self._pieces.setdefault(name.partition(":")[0], []).append(found)
 
     def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[ScenePiece], str]:
-        """A thing in its place, as the most similar piece or a box. Return also the piece's kind, empty for a box.
+        """Return the most similar piece or a box in a thing's place, and the piece's type, which is empty for a box.
 
         Args:
             thing: The thing.
@@ -189,7 +189,7 @@ class FurnitureLibrary:
         for kind in _TYPES[name][0] if name else ():
             for pieces in self._pieces.get(kind, []):
                 corners = np.concatenate([p.surface.corners.reshape(-1, 3) for p in pieces if p.solid])
-                # Measured from z = 0, because legs may not be solid.
+                # Heights are measured from z = 0, because legs may not be solid.
                 low, high = corners.min(axis=0) * (1, 1, 0), corners.max(axis=0)
                 stretch = float(np.abs(np.log(size / (high - low))).max())
                 choices.append((stretch, kind, pieces, low, high))

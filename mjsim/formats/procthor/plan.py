@@ -21,8 +21,9 @@ from mjsim.generator.values import WALL
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-NAMES = "mjsim_rooms"  # key of the metadata: room id -> [key, label], if the house was exported by us
-_TYPES = {"livingroom": "living_room"}  # other types are split into words by their capitals
+NAMES = "mjsim_rooms"  # key in the metadata of houses exported by mjsim, with room id -> [key, label]
+# Names of room types that differ; other names are split into words at their capitals.
+_TYPES = {"livingroom": "living_room"}
 
 
 _Number = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
@@ -60,11 +61,11 @@ class _Opening(msgspec.Struct, rename="camel"):
     room0: str | None = None
     room1: str | None = None
     hole_polygon: list[Vector] = []
-    bounding_box: _Span | None = None  # in older files
+    bounding_box: _Span | None = None  # present in older files
 
 
 class Thing(msgspec.Struct, rename="camel"):
-    """An object with the objects on it."""
+    """An object, with the objects on top of it."""
 
     id: str
     position: Vector
@@ -85,28 +86,28 @@ class _House(msgspec.Struct):
 
 @dataclass(frozen=True)
 class PlanWall:
-    """A wall, by its centre line on the floor."""
+    """A wall, given by its centre line on the floor."""
 
-    start: tuple[float, float]  # m
+    start: tuple[float, float]  # start of the wall in metres, shape (2,)
     end: tuple[float, float]
-    height: float  # m
+    height: float
 
 
 @dataclass(frozen=True)
 class PlanOpening:
-    """A door or window, from `start` to `end` on the floor, m."""
+    """A door or window, from `start` to `end` on the floor, in metres."""
 
     start: tuple[float, float]
     end: tuple[float, float]
     bottom: float
     top: float
     is_door: bool
-    rooms: tuple[str, ...]  # keys of the rooms it connects; one for a front door
+    rooms: tuple[str, ...]  # keys of the rooms it connects; a front door has one
 
 
 @dataclass(frozen=True)
 class ProcthorPlan:
-    """The plan of a house, in metres, z up."""
+    """Plan of a house in metres, with z up."""
 
     rooms: tuple[NamedRoom, ...]
     walls: tuple[PlanWall, ...]
@@ -141,7 +142,7 @@ def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
 
 
 def _without_nulls(value: Any) -> Any:
-    """JSON without nulls, such as the missing second room of a front door."""
+    """Remove nulls from JSON, such as the missing second room of a front door."""
     if isinstance(value, dict):
         return {key: _without_nulls(one) for key, one in value.items() if one is not None}
     return [_without_nulls(one) for one in value] if isinstance(value, list) else value
@@ -168,7 +169,7 @@ def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
 
 
 def _ends(wall: _Wall, path: Path) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Start and end of a wall on the floor, in the file's order, and its height, m."""
+    """Return the start and end of a wall on the floor, in the file's order, and its height, in metres."""
     heights = [point.y for point in wall.polygon] or [0.0]
     low = [point for point in wall.polygon if point.y < min(heights) + 0.01]
     if len(low) < 2:

@@ -1,4 +1,4 @@
-"""Reader of ProcTHOR houses. The plan becomes floors and walls; objects become mjsim furniture of the same size."""
+"""Reader for ProcTHOR houses. Floors and walls come from the plan. Objects become mjsim furniture of the same size."""
 
 import math
 import tempfile
@@ -23,8 +23,8 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.house.validation.object_rules import SIZE
 
 SUFFIXES = (".json",)
-_ON = 0.05  # distance within which an opening belongs to a wall, in metres
-_THICK = {"door": 0.04, "window": 0.02}  # thickness of panels in openings, in metres
+_ON = 0.05  # maximum distance between an opening and its wall, in metres
+_THICK = {"door": 0.04, "window": 0.02}  # thickness of the panels in openings, in metres
 
 
 def read_procthor(path: Path, options: HouseOptions) -> SourceScene:
@@ -79,14 +79,14 @@ def _flat(things: Iterable[Thing]) -> Iterator[Thing]:
 
 
 def _frame(thing: Thing) -> Floats:
-    """Transform (4, 4) from a thing's centre, with its front along y, to the house."""
+    """Return the transform (4, 4) from a thing's frame to the house. The frame has its origin at the thing's centre."""
     frame: Floats = np.asarray(rotation_matrix(-math.radians(thing.rotation.y), [0, 0, 1]))
     frame[:3, 3] = thing.position.x, thing.position.z, thing.position.y
     return frame
 
 
 def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
-    """Write MJCF of floors, walls, ceilings, and panels that close windows and front doors."""
+    """Write MJCF of floors, walls and ceilings, and of panels that close windows and front doors."""
     rooms = []
     for room in plan.rooms:
         low, high = np.min(room.boxes, axis=0), np.max(room.boxes, axis=0)
@@ -122,7 +122,7 @@ def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
 
 
 def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
-    """Key of the room nearest to the middle of a wall."""
+    """Return the key of the room nearest to the middle of a wall."""
     x, y = np.add(wall.start, wall.end) / 2
 
     def distance(room: NamedRoom) -> float:
@@ -132,7 +132,7 @@ def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
 
 
 def _parts(wall: PlanWall, openings: Iterable[PlanOpening]) -> Iterator[tuple[float, float, float, float]]:
-    """A wall without its openings: start, end, bottom and top of each part along the wall, m."""
+    """Yield the parts of a wall around its openings: start, end, bottom and top in metres, along the wall."""
     start, length = np.array(wall.start), math.dist(wall.start, wall.end)
     along = np.subtract(wall.end, start) / length
     at = -WALL / 2  # the wall extends into the corner

@@ -10,10 +10,12 @@ from typing import Any
 from mjsim.generator.openings import wall_stretches
 from mjsim.generator.values import CEILING_HEIGHT, SIDES, WALL, Door, HomePlan, Room, Side, Window, opposite
 
-NAMES = "mjsim_rooms"  # key of the metadata: room id -> [key, label], since ProcTHOR has only four room types
+# Key in the metadata, with room id -> [key, label], because ProcTHOR has only four room types.
+NAMES = "mjsim_rooms"
 _TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
-_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2  # doors wider than _WIDE metres are passages
-_WINDOWS = {  # by width, in metres
+# Doors wider than _WIDE metres become passages.
+_DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2
+_WINDOWS = {  # ProcTHOR windows, by width in metres
     0.92: "Window_Fixed_36x48",
     1.22: "Window_Slider_48x48",
     1.53: "Window_Slider_60x48",
@@ -22,7 +24,7 @@ _WINDOWS = {  # by width, in metres
 
 
 def procthor_house(plan: HomePlan) -> dict[str, Any]:
-    """A plan as a ProcTHOR house, ready for JSON."""
+    """Convert a plan to a ProcTHOR house, ready for JSON."""
     ids = {room.key: f"room|{number}" for number, room in enumerate(plan.rooms, 2)}
     walls = [wall for room in plan.rooms for wall in _walls(plan, room, ids)]
     return {
@@ -60,7 +62,7 @@ def _room(room: Room, name: str) -> dict[str, Any]:
 
 
 def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """The walls of a room, and their outer sides."""
+    """Yield the walls of a room, and their outer sides."""
     for side in SIDES:
         for start, end, is_outside in wall_stretches(room, side, plan.rooms):
             name = _wall_name(ids[room.key], room, side, start, end)
@@ -74,12 +76,11 @@ def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str
 
 
 def _ordered(side: Side, start: float, end: float) -> tuple[float, float]:
-    """The ends of a wall in clockwise order around the floor, as seen from above."""
+    """Return the ends of a wall in clockwise order around the floor, as seen from above."""
     return (start, end) if side in ("west", "north") else (end, start)
 
 
 def _on(room: Room, side: Side, at: float) -> tuple[float, float]:
-    """A point on the centre line of a wall."""
     x, y = room.floor.along(side, at, at, -WALL / 2, -WALL / 2).center
     return round(x, 4), round(y, 4)
 
@@ -92,7 +93,7 @@ def _wall_name(room: str, at: Room, side: Side, start: float, end: float) -> str
 def _hole(
     plan: HomePlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
 ) -> tuple[str, dict[str, Any]]:
-    """The id of a room's wall with an opening, and the fields that describe the hole in it."""
+    """Return the id of the room's wall that has an opening, and the fields that describe the opening."""
     of = plan.room(room)
     start, end, _ = min(
         wall_stretches(of, side, plan.rooms),

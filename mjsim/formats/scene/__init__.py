@@ -1,1 +1,1 @@
-"""The scene that readers return, and readers of mesh files."""
+"""Scenes as returned by readers, and readers for mesh files."""

@@ -1,4 +1,4 @@
-"""Reading of mesh files with trimesh: every node of the scene graph in its place, with its colours.
+"""Readers for mesh files, based on trimesh. Every node of the scene graph is read in its pose and with its colours.
 
 Parts of a scene are in metres and z up if the file format defines unit and axis.
 """
@@ -25,9 +25,9 @@ from mjsim.support.files import check_input, read_bytes
 from mjsim.values.errors import AssetError
 
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
-MAX_FILE = 500_000_000  # bytes
+MAX_FILE = 500_000_000  # maximum file size in bytes
 MAX_TRIANGLES = 5_000_000
-PLAIN = (0.74, 0.72, 0.68)  # RGB of meshes without a colour
+PLAIN = (0.74, 0.72, 0.68)  # RGB colour of meshes that have none
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
@@ -37,7 +37,7 @@ class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
     """Resolver for files that a mesh names, such as its materials."""
 
     def absolute(self, name: str) -> Path:
-        """Path of a named file. Raise `OSError` for special files, because reading them may never end."""
+        """Return the path of a named file. Raise `OSError` for special files, because reading them may never end."""
         path = Path(super().absolute(name))
         if path.exists():
             check_input(path)
@@ -45,7 +45,7 @@ class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
 
 
 def read_surface(path: Path) -> Surface:
-    """All triangles of a mesh file, in its own unit and axes. Raise `AssetError` if there are none."""
+    """Read all triangles of a mesh file, in the file's unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
         geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
@@ -59,7 +59,7 @@ def read_surface(path: Path) -> Surface:
 
 
 def missing_colours(path: Path) -> tuple[str, ...]:
-    """Missing material and image files that an OBJ file names."""
+    """Return the material and image files that an OBJ file refers to and that are missing."""
     if path.suffix.lower() != ".obj":
         return ()
     named = _named(path, "mtllib")
@@ -87,7 +87,7 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
 
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
-    """Turn any error of a parser into an `AssetError`, and hide its warnings."""
+    """Turn any error of a parser into an `AssetError`, and hide the parser's warnings."""
     log = logging.getLogger("trimesh")
     before = log.level
     log.setLevel(logging.CRITICAL)
@@ -111,7 +111,7 @@ def _what_it_has(geometries: list[Any]) -> str:
 
 
 def _named(path: Path, keyword: str) -> list[str]:
-    """The last word of each line of an OBJ or MTL file that starts with a keyword. Empty if the file is missing."""
+    """Return the last word of each line that starts with a keyword in an OBJ or MTL file. Empty without the file."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -120,7 +120,7 @@ def _named(path: Path, keyword: str) -> list[str]:
 
 
 def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
-    """The surface of one mesh of a file.
+    """Return the surface of one mesh of a file.
 
     Args:
         mesh: The mesh.
@@ -151,7 +151,7 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
 
 
 def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Plain colour (3,) and image (height, width, 3) of a material, RGB from 0 to 1."""
+    """Return the plain colour (3,) and the image (height, width, 3) of a material, RGB from 0 to 1."""
     if isinstance(material, trimesh.visual.material.PBRMaterial):
         factor, picture = material.baseColorFactor, material.baseColorTexture
     else:
@@ -166,13 +166,13 @@ def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float
 
 
 def _srgb(linear: Floats) -> Floats:
-    """Displayed colours from linear ones, of the same shape (IEC 61966-2-1)."""
+    """Convert linear colours to displayed ones, of the same shape (IEC 61966-2-1)."""
     low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, low, high)
 
 
 class _Nearby(Beside):
-    """Resolver for files in the mesh's folder or next to it, such as `../materials/textures/wood.png`."""
+    """Resolver for files in or next to the mesh's folder, such as `../materials/textures/wood.png`."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(file)
@@ -189,7 +189,7 @@ class _Nearby(Beside):
 
 
 def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
-    """Parts of a mesh file with the names of their nodes, moved by a transform (4, 4).
+    """Return the parts of a mesh file, moved by a transform (4, 4), with the names of their nodes.
 
     glTF and COLLADA are returned in metres and z up, other formats unchanged.
 
@@ -224,19 +224,19 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
 
 
 def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:
-    """A surface of one colour (3,), RGB from 0 to 1."""
+    """Return a surface of one colour (3,), RGB from 0 to 1."""
     corners = np.asarray(mesh.triangles, np.float64)
     count = len(corners)
     return Surface(corners, np.tile(colour, (count, 3, 1)), np.zeros((count, 3, 2)), np.full(count, -1))
 
 
 def _without_comments(path: Path) -> io.BytesIO:
-    """A COLLADA file without comments, because pycollada drops geometries that contain one."""
+    """Return a COLLADA file without comments, because pycollada drops geometries that contain one."""
     return io.BytesIO(re.sub(rb"<!--.*?-->", b"", read_bytes(path), flags=re.DOTALL))
 
 
 def _collada_frame(path: Path) -> Floats:
-    """Transform (4, 4) to metres and z up from the unit and axes in a COLLADA file's <asset>, which trimesh ignores."""
+    """Return the transform (4, 4) to metres and z up, from the <asset> of a COLLADA file, which trimesh ignores."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
         for tag, element in _elements(path):

@@ -1,4 +1,4 @@
-"""The scene that all readers return, options and decisions of an import, and helpers for readers."""
+"""Types for scenes, options and decisions of an import, with helper functions for readers."""
 
 import re
 from collections.abc import Iterator
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.values.errors import AssetError
 
-UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}  # in metres; guessed in this order
+# Length of each unit in metres; units are guessed in this order.
+UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}
 AXES = ("y", "z")
-TEXTURE_SIDE = 512  # longest side of an image, in pixels
-MIN_SIDE, MAX_SIDE = 3.0, 60.0  # limits of a house's longest side, in metres
+TEXTURE_SIDE = 512  # maximum side of an image, in pixels
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # minimum and maximum of a house's longest side, in metres
 _STEP = 0.1  # width of the rectangles that approximate slanted outlines, in metres
 
 
@@ -25,30 +26,30 @@ class ImportOptions:
     """Options of an object import. Values of None are determined automatically."""
 
     units: str | None = None  # key of `UNITS`
-    up: str | None = None  # one of `AXES`
-    scale: float = 1.0  # factor on top of the unit
-    mass: float | None = None  # kg
-    density: float | None = None  # kg/m^3; excludes `mass`
+    up: str | None = None  # vertical axis, one of `AXES`
+    scale: float = 1.0  # factor applied in addition to the unit
+    mass: float | None = None  # mass in kg
+    density: float | None = None  # density in kg/m^3; must be None if `mass` is given
 
 
 @dataclass(frozen=True)
 class ImportDecision:
-    """One line of the report."""
+    """A line of the import report."""
 
-    what: str  # subject
+    what: str  # subject of the decision
     choice: str
-    reason: str = ""  # reason for the choice, or how to change it
+    reason: str = ""  # reason for the decision, or how to change it
 
 
 @dataclass(frozen=True, eq=False)
 class ScenePiece:
-    """An object or part of a scene, in the frame of the scene: z up, m."""
+    """An object or part of a scene, in the frame of the scene: z up, in metres."""
 
-    name: str  # its name in the source
+    name: str  # name in the source
     surface: Surface
-    seen: bool = True  # drawn
-    solid: bool = True  # collides
-    loose: bool = False  # movable in the source
+    seen: bool = True  # True if the piece is drawn
+    solid: bool = True  # True if the piece collides
+    loose: bool = False  # True if the piece is movable in the source
 
 
 @dataclass(frozen=True)
@@ -57,31 +58,31 @@ class NamedRoom:
 
     key: str
     label: str
-    boxes: tuple[tuple[float, float, float, float], ...]  # rectangles: xmin, ymin, xmax, ymax, in metres
+    boxes: tuple[tuple[float, float, float, float], ...]  # rectangles (xmin, ymin, xmax, ymax) in metres
 
 
 @dataclass(frozen=True)
 class Bin:
-    """A receptacle in its place."""
+    """A receptacle placed in a house."""
 
     key: str
     room: str  # room key
-    x: float  # middle of its base, in metres
+    x: float  # x coordinate of the middle of the base, in metres
     y: float
-    yaw: float  # rad
+    yaw: float  # yaw in radians
     z: float = 0.0
-    place: str = "against the wall"  # description shown to participants
+    place: str = "against the wall"  # description of the location, shown to participants
 
 
 @dataclass(frozen=True, eq=False)
 class SourceScene:
-    """A scene as it was read."""
+    """A scene as returned by a reader."""
 
     pieces: tuple[ScenePiece, ...]
-    kind: str  # kind of source, such as `SDF world`
-    notes: tuple[ImportDecision, ...] = ()  # the reader's decisions
-    rooms: tuple[NamedRoom, ...] = ()  # if the source names them
-    bins: tuple[Bin, ...] = ()  # if the source is an exported mjsim house
+    kind: str  # type of the source, such as `SDF world`
+    notes: tuple[ImportDecision, ...] = ()  # decisions of the reader
+    rooms: tuple[NamedRoom, ...] = ()  # rooms named by the source
+    bins: tuple[Bin, ...] = ()  # bins of a source that is an exported mjsim house
 
 
 @dataclass(frozen=True)
@@ -89,33 +90,33 @@ class HouseOptions:
     """Options of a house import. Values of None are determined automatically."""
 
     units: str | None = None  # key of `UNITS`
-    up: str | None = None  # one of `AXES`
-    scale: float = 1.0  # factor on top of the unit
+    up: str | None = None  # vertical axis, one of `AXES`
+    scale: float = 1.0  # factor applied in addition to the unit
     floor: float | None = None  # height of the floor in the source, in metres
-    rooms: Path | None = None  # TOML file that names rooms
-    models: tuple[Path, ...] = ()  # folders with the source's models
-    skip_missing: bool = False  # leave out missing files
+    rooms: Path | None = None  # TOML file that names the rooms
+    models: tuple[Path, ...] = ()  # folders with models that the source refers to
+    skip_missing: bool = False  # True to leave out missing files instead of raising an error
 
 
 @dataclass
 class MissingFiles:
-    """Files that a source names but that are missing: an error, or left out with `skip`."""
+    """Missing files that a source refers to. They are an error, unless `skip` is True."""
 
     skip: bool
     files: list[str] = field(default_factory=list)
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Report of the files that were left out."""
+        """Return report lines about the files that were left out."""
         return (left_out(f"{len(self.files)} missing", ", ".join(self.files[:6])),) if self.files else ()
 
 
 def left_out(what: str, why: str) -> ImportDecision:
-    """A line of the report about something that was left out."""
+    """Return a report line about something that was left out."""
     return ImportDecision("left out", what, why)
 
 
 def numbers(values: Any, count: int, path: Path) -> Floats:
-    """`count` numbers of a file as an array (count,). Raise `AssetError` if they are not finite numbers."""
+    """Convert `count` numbers of a file to an array (count,). Raise `AssetError` if they are not finite numbers."""
     try:
         found = np.array(values, np.float64)
     except (TypeError, ValueError):
@@ -126,17 +127,17 @@ def numbers(values: Any, count: int, path: Path) -> Floats:
 
 
 def moved(pieces: list[ScenePiece], transform: Floats) -> list[ScenePiece]:
-    """Pieces moved by a homogeneous transform (4, 4)."""
+    """Return pieces moved by a homogeneous transform (4, 4)."""
     return [ScenePiece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]
 
 
 def unit_of(longest: float) -> str | None:
-    """The unit in which a house could have this longest side, or None."""
+    """Return the unit in which a house could have this longest side, or None if there is none."""
     return next((unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE), None)
 
 
 def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
-    """Rectangles, m, that cover a polygon (k, 2). Raise `ValueError` if its area is 0.
+    """Return rectangles in metres that cover a polygon (k, 2). Raise `ValueError` if its area is 0.
 
     Slanted sides are approximated in steps of 0.1 m.
     """
@@ -157,8 +158,8 @@ def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
 
 
 def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
-    """Rectangles (first row, end row, first column, end column) that cover each cell of a mask (nx, ny) once; ends are
-    exclusive.
+    """Yield rectangles (first row, end row, first column, end column) that cover each cell of a mask (nx, ny) once.
+    Ends are exclusive.
     """
     left = mask.copy()
     for row in range(len(left)):
@@ -175,5 +176,5 @@ def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, 
 
 
 def words_of(name: str) -> list[str]:
-    """Words of a name: `KitchenCabinet_01_001` gives kitchen, cabinet."""
+    """Split a name into words. For example, `KitchenCabinet_01_001` gives kitchen and cabinet."""
     return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]

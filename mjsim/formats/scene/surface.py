@@ -10,39 +10,40 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WELD_DIGITS = 6  # corners are equal if they agree to 1e-6 m
-_MIN_AREA = 1e-13  # area below which a triangle has no normal, in m^2
+WELD_DIGITS = 6  # corners count as equal if they agree to 1e-6 m
+_MIN_AREA = 1e-13  # area in square metres below which a triangle has no normal
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
     """Triangles with colours. The colour of a point is interpolated from the corners and multiplied by the image."""
 
-    corners: Floats  # corners of the triangles, m, (n, 3, 3)
-    colours: Floats  # colour at each corner, RGB from 0 to 1, (n, 3, 3)
-    uv: Floats  # texture coordinates of the corners, from 0 to 1 from the lower left, repeating, (n, 3, 2)
-    image: Ints  # index of each triangle's image, -1 for none, (n,)
-    images: tuple[Floats, ...] = ()  # RGB from 0 to 1, rows from the top, (height, width, 3) each
+    corners: Floats  # corners of the triangles in metres, shape (n, 3, 3)
+    colours: Floats  # colour at each corner, RGB from 0 to 1, shape (n, 3, 3)
+    # Repeating texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (n, 3, 2).
+    uv: Floats
+    image: Ints  # index of each triangle's image, or -1 for none, shape (n,)
+    images: tuple[Floats, ...] = ()  # RGB from 0 to 1, rows from the top, shape (height, width, 3) each
 
     def __len__(self) -> int:
         return len(self.corners)
 
     def select(self, rows: NDArray[Any]) -> Self:
-        """The triangles of a mask (n,), or of row numbers (k,)."""
+        """Return the triangles selected by a mask (n,) or by row numbers (k,)."""
         arrays = {name: getattr(self, name)[rows] for name in ("corners", "colours", "uv", "image")}
         return replace(self, **arrays)
 
     def moved(self, transform: Floats) -> Self:
-        """The surface moved by a homogeneous transform (4, 4)."""
+        """Return the surface moved by a homogeneous transform (4, 4)."""
         return replace(self, corners=self.corners @ transform[:3, :3].T + transform[:3, 3])
 
     def mesh(self) -> trimesh.Trimesh:
-        """The triangles joined where their corners coincide. Face k is triangle k."""
+        """Return a mesh whose triangles are joined where corners coincide. Face k is triangle k."""
         vertices, faces = _welded(self.corners)
         return trimesh.Trimesh(vertices, faces, process=False)
 
     def colours_at(self, triangles: Ints, weights: Floats) -> Floats:
-        """Colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and barycentric weights (k, 3)."""
+        """Return colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and barycentric weights (k, 3)."""
         colours: Floats = np.einsum("kc,kcd->kd", weights, self.colours[triangles])
         places = np.einsum("kc,kcd->kd", weights, self.uv[triangles])
         for number, image in enumerate(self.images):
@@ -83,14 +84,14 @@ def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
 
 
 def _welded(corners: Floats) -> tuple[Floats, Ints]:
-    """Distinct vertices (k, 3), and the vertex of every corner (n, 3)."""
+    """Return the distinct vertices (k, 3), and the vertex index of each corner (n, 3)."""
     points = np.round(corners.reshape(-1, 3), WELD_DIGITS) + 0.0
     vertices, faces = np.unique(points, axis=0, return_inverse=True)
     return vertices, faces.reshape(-1, 3)
 
 
 def _sample(image: Floats, places: Floats) -> Floats:
-    """Bilinear colours (k, 3) of a repeating image (h, w, 3) at texture coordinates (k, 2)."""
+    """Interpolate the colours (k, 3) of a repeating image (h, w, 3) at texture coordinates (k, 2)."""
     height, width = image.shape[:2]
     x, y = places[:, 0] * width - 0.5, (1.0 - places[:, 1]) * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
