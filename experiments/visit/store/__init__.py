@@ -1,4 +1,4 @@
-"""The database of a study. No other package accesses it."""
+"""The database of a study, which no other package accesses directly."""
 
 from experiments.visit.store.copies import restore
 from experiments.visit.store.store import Store, change_database

@@ -1,4 +1,4 @@
-"""Assignment of participants to places in cells, in transactions that lock the study."""
+"""Assign participants to places in the cells of the design, in transactions that lock the study."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -22,11 +22,11 @@ from experiments.visit.store.values import (
     utc_now,
 )
 
-SEEDS = 2**53  # JavaScript's numbers represent all seeds below this exactly
+SEEDS = 2**53  # limit of seeds; JavaScript represents all smaller integers exactly
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
-# Built once, since building a query takes as long as running it.
+# Queries are built only once, because building one takes as long as running it.
 _ACTIVE = update(person).where(
     person.c.id == bindparam("person"),
     person.c.study_id == bindparam("study"),
@@ -52,7 +52,7 @@ _HOLDERS = (
 
 
 class Assignments(StorePart):
-    """Rows of `assignment`."""
+    """Store methods that assign participants to places."""
 
     async def assign(
         self,
@@ -65,15 +65,15 @@ class Assignments(StorePart):
     ) -> Assignment | None:
         """Return the participant's place, assigning one if needed, or None if all cells are full.
 
-        A place is held while its participant is active. After `abandoned_after` without activity it no longer counts,
-        and the next participant of the cell gets it if no other place is free. A participant who returns later gets the
-        same place back if it is still free, or else a new one in any cell. Once a trial has started, call
-        :meth:`assignment` instead.
+        A place is held while its participant is active. It is abandoned after `abandoned_after` without activity, and
+        is then assigned to the next participant of the cell if no other place is free. Participants who return later
+        keep their place if it is still free. Otherwise, they get a new place in any cell. Once a trial has started,
+        call :meth:`assignment` instead.
 
         Args:
-            cells: Quotas of the study file. :meth:`set_quota` may have changed them.
+            cells: Quotas from the study file, unless :meth:`set_quota` has changed them.
             rule: Rule for choosing a cell; see :func:`choose`.
-            abandoned_after: How long a place is held without activity.
+            abandoned_after: Inactivity after which a place counts as abandoned.
 
         Raises:
             StoreError: The participation has ended.
@@ -91,7 +91,7 @@ class Assignments(StorePart):
                     return await place_of(connection, person_id)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
             here = {"study": self._study_id, "since": now - abandoned_after}
-            while True:  # repeat if an absent participant returned between the two queries
+            while True:  # try again if an absent participant returned between the two queries
                 taken = await _tally(connection, _TAKEN, here)
                 cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
                 if cell is None:
@@ -107,12 +107,12 @@ class Assignments(StorePart):
     async def room(
         self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
     ) -> int:
-        """Return the number of free places not needed by participants in earlier phases. It may be negative.
+        """Return the number of free places that participants in earlier phases do not need. It may be negative.
 
         Args:
-            wanted: Quotas of the study file.
-            first: Name of the first phase, whose participants are not counted.
-            abandoned_after: Inactivity after which a participant does not count, as in :meth:`assign`.
+            wanted: Quotas from the study file.
+            first: Name of the first phase. Participants in this phase are not counted.
+            abandoned_after: Inactivity after which participants are not counted.
         """
         since = (now or utc_now()) - abandoned_after
         mine, there = person.c.study_id == self._study_id, person.c.seen >= since
@@ -134,18 +134,18 @@ class Assignments(StorePart):
         return int(sum(max(0, number) for number in free) - on_the_way)
 
     async def assignment(self, person_id: int) -> Assignment | None:
-        """Return the current or released place of a participant."""
+        """Return a participant's place, even if it has been released. Return None if there is none."""
         async with self._database.reading() as connection:
             return await place_of(connection, person_id)
 
     async def assignments(self) -> tuple[Assignment, ...]:
-        """Return all places, in the order in which they were first assigned."""
+        """Return all assigned and released places, in the order in which they were first assigned."""
         query = select(*FIELDS).where(assignment.c.study_id == self._study_id).order_by(assignment.c.id)
         async with self._database.reading() as connection:
             return tuple(Assignment(*row) for row in await connection.execute(query))
 
     async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
-        """Override the study file's number of participants in a cell. Assigned places are kept."""
+        """Change the number of participants wanted in a cell. Places that are already assigned are kept."""
         if cell < 0 or wanted < 0:
             raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
         now = now or utc_now()
@@ -214,7 +214,6 @@ class Assignments(StorePart):
 
 
 async def _free_place(connection: AsyncConnection, holders: Sequence[Any], wanted: int) -> int | None:
-    """Return a free place of a cell. If there is none, release an abandoned one, or return None."""
     free = sorted(set(range(wanted)) - {holder.place for holder in holders})
     if free:
         return free[0]
@@ -232,11 +231,11 @@ async def _tally(
 
 
 def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
-    """Choose the next participant's cell: the least filled (`balanced`) or any with free places (`uniform`).
+    """Choose a cell for the next participant: the least filled (`balanced`) or any with free places (`uniform`).
 
     Args:
         counts: Number of participants in each cell.
-        quotas: Number of wanted participants of each cell.
+        quotas: Number of participants wanted in each cell.
         rule: Rule for choosing a cell. Ties are broken at random.
 
     Returns:
@@ -253,13 +252,12 @@ def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.ran
 
 
 async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | None:
-    """Return the current or released place of a participant."""
     row = (await connection.execute(_PLACE, {"person": person_id})).first()
     return None if row is None else Assignment(*row)
 
 
 async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
-    """Give a released place back to its participant. Return False if another participant has it."""
+    """Assign a released place to its participant again. Return False if another participant has it now."""
     query = select(assignment.c.id).where(
         assignment.c.study_id == study_id,
         assignment.c.cell == place.cell,

@@ -1,4 +1,4 @@
-"""Backups. A backup of any database is one SQLite file, which can be restored into a database of any kind."""
+"""Backups of databases. A backup is a single SQLite file that can be restored into any supported database."""
 
 import os
 import shutil
@@ -16,17 +16,17 @@ from experiments.visit.store.engine import Database
 from experiments.visit.store.tables import metadata
 from experiments.visit.store.upgrade import upgrade
 
-ROWS = 1000  # rows per INSERT
+ROWS = 1000  # number of rows per INSERT statement
 
 
 def check_new(path: Path) -> None:
-    """Raise StoreError if the file for a new backup exists already."""
+    """Raise StoreError if the file of a new backup exists already."""
     if path.exists():
         raise StoreError(f"{path} is there already: name a new file for the backup.")
 
 
 async def back_up(source: Database, path: Path) -> None:
-    """Write a consistent snapshot of the database atomically to a new SQLite file.
+    """Write a consistent snapshot of the database to a new SQLite file, atomically.
 
     Raises StoreError if the file exists or cannot be written.
     """
@@ -47,7 +47,7 @@ def one_file(path: Path) -> None:
     """Checkpoint the WAL of a SQLite database, fsync it, and restrict the file to mode 0600."""
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
-    path.chmod(0o600)  # it contains platform ids
+    path.chmod(0o600)  # only the owner may read platform ids
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
@@ -56,15 +56,15 @@ async def restore(path: Path, url: str) -> None:
     """Restore a backup into an empty database.
 
     Args:
-        path: A file written by :meth:`Store.backup`.
-        url: URL of the database, see :meth:`Store.open`.
+        path: Backup file, as written by :meth:`Store.backup`.
+        url: URL of the empty database, in the form that :meth:`Store.open` accepts.
 
     Raises:
         StoreError: The backup is missing or damaged, or the database is not empty.
     """
     if not path.is_file():
         raise StoreError(f"There is no backup {path}.")
-    with TemporaryDirectory() as folder:  # upgrade a copy, in case the backup is from an older version
+    with TemporaryDirectory() as folder:  # the backup may need an upgrade, so it is copied first
         copy = shutil.copyfile(path, Path(folder, "backup.db"))
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
@@ -101,7 +101,7 @@ async def _copy(source: Database, target: Database) -> None:
                         rows = []
                 if rows:
                     await writing.execute(insert(table), rows)
-                if target.kind == "postgresql":  # inserted ids do not advance PostgreSQL's sequences
+                if target.kind == "postgresql":  # PostgreSQL's sequences are not advanced by inserted ids
                     last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
                     after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
                     await writing.execute(text(f"SELECT setval({after})"))

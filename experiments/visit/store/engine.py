@@ -1,4 +1,4 @@
-"""The connection to the database: short transactions, safe retries, and errors with remedies."""
+"""Database connections with short transactions, safe retries and helpful error messages."""
 
 import asyncio
 import random
@@ -27,11 +27,11 @@ DRIVERS = {
 }
 PRAGMAS = (
     "PRAGMA journal_mode = WAL",
-    "PRAGMA synchronous = FULL",  # commits are durable
+    "PRAGMA synchronous = FULL",  # makes commits durable
     "PRAGMA foreign_keys = ON",
-    "PRAGMA secure_delete = ON",  # overwrite deleted rows
+    "PRAGMA secure_delete = ON",  # overwrites deleted rows
 )
-# Server settings, each with the values that make commits durable.
+# For each server setting that affects durability, the values that make commits durable.
 DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
     "mysql": {"@@innodb_flush_log_at_trx_commit": ("1",)},
     "postgresql": {
@@ -39,40 +39,40 @@ DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
         "current_setting('synchronous_commit')": ("on", "local", "remote_write", "remote_apply"),
     },
 }
-PATIENCE_S = 20  # timeout for locks and new connections, in seconds
-TURN_S = 60  # timeout for a pooled connection, in seconds
+PATIENCE_S = 20  # timeout for locks and for new connections, in seconds
+TURN_S = 60  # timeout for a connection from the pool, in seconds
 TRIES = 9
-CONNECTIONS = 10  # size of the connection pool
+CONNECTIONS = 10
 TOGETHER = 64  # maximum number of writes per SQLite transaction
-PAUSE_S = 0.01  # base of the exponential delay between tries, in seconds
+PAUSE_S = 0.01  # delay before a retry, in seconds; it doubles with each attempt
 
 
 class _UnknownError(StoreError):
-    """A commit failed with an unknown outcome."""
+    """A commit failed, and it is unknown whether the data was saved."""
 
 
 class Database:
-    """A database: SQLite, MariaDB or PostgreSQL."""
+    """A SQLite, MariaDB or PostgreSQL database."""
 
     def __init__(self, url: str) -> None:
-        """Parse the URL, without connecting. Raises StoreError if it is not valid."""
+        """Parse the URL without connecting to the database. Raises StoreError if the URL is not valid."""
         self.url = _parsed(url)
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
-        # called with the duration of each write, in seconds
+        # is called with the duration of each write, in seconds
         self.on_write: Callable[[float], None] = lambda _: None
-        self._turn = asyncio.Lock()  # SQLite allows one writer at a time
+        self._turn = asyncio.Lock()  # SQLite allows only one writer at a time
         self._waiting: list[_Waiting] = []
         self._writer: asyncio.Task[None] | None = None
 
     @property
     def kind(self) -> str:
-        """`sqlite`, `mysql` (also for MariaDB) or `postgresql`."""
+        """Database system: `sqlite`, `mysql` (also for MariaDB) or `postgresql`."""
         return self.url.get_backend_name()
 
     @property
     def name(self) -> str:
-        """URL without the password."""
+        """The database's URL, without the password."""
         return self.url.render_as_string(hide_password=True)
 
     async def close(self) -> None:
@@ -80,19 +80,19 @@ class Database:
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncConnection]:
-        """Connect for reading. Each statement sees everything committed so far."""
+        """Open a connection for reading. Each statement sees everything committed before it."""
         async with self._connection(begin="") as connection:
             yield connection
 
     @asynccontextmanager
     async def snapshot(self) -> AsyncIterator[AsyncConnection]:
-        """Connect for reading a consistent snapshot."""
+        """Open a connection for reading a consistent snapshot."""
         options = {"begin": "BEGIN"} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
         async with self._connection(**options) as connection:
             yield connection
 
     async def scrub(self) -> None:
-        """Vacuum a SQLite file and truncate its WAL, so that deleted rows are gone from both.
+        """Vacuum a SQLite file and truncate its WAL, so that neither contains deleted rows.
 
         Raises StoreError if the WAL cannot be truncated because the database is in constant use.
         """
@@ -115,7 +115,7 @@ class Database:
                 raise StoreError(damaged(self.name))
 
     async def check_durable(self) -> None:
-        """Raise StoreError if the server may confirm a commit before it is on disk."""
+        """Raise StoreError if the server's settings allow a commit to be confirmed before it is on disk."""
         if self._sqlite:
             return
         async with self.reading() as connection:
@@ -141,7 +141,6 @@ class Database:
             raise StoreError(advice(error, self.name)) from error
 
     async def _connected(self) -> AsyncConnection:
-        """Connect. Retry for some seconds if the server is still starting."""
         for attempt in range(1, TRIES):
             try:
                 return await self._engine.connect()
@@ -154,8 +153,8 @@ class Database:
     async def write(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
         """Run `work` in one transaction and return its result after the commit.
 
-        It is run again after a deadlock, a conflict or a lost connection, so it must only use the connection. If the
-        connection is lost during the commit, the outcome is unknown and an error is raised.
+        After a deadlock, a conflict or a lost connection, `work` is run again, so it must change nothing outside the
+        database. If the connection is lost during the commit, an error is raised, since the outcome is unknown.
 
         Raises StoreError if the database fails.
         """
@@ -172,16 +171,15 @@ class Database:
         return result
 
     async def _write_waiting(self) -> None:
-        """Run waiting work in groups, since a transaction spends most of its time waiting for the disk."""
+        """Run all waiting work, in groups that share a transaction and so the wait for the disk."""
         while self._waiting:
             group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
             if len(group) > 1 and await self._write_group(group, alone=False):
                 continue
-            for one in group:  # a single one, or a group that failed without being written
+            for one in group:  # the group has one member, or none of it was written
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
-        """Write a group in one transaction. Return False if its members must be written one by one."""
         try:
             results = await self._persist([work for work, _ in group])
         except Exception as error:
@@ -192,7 +190,7 @@ class Database:
                     done.set_exception(error)
         else:
             for (_, done), result in zip(group, results, strict=True):
-                if not done.done():  # the caller was cancelled
+                if not done.done():  # the caller may have been cancelled
                     done.set_result(result)
         return True
 
@@ -254,12 +252,12 @@ def _engine(url: URL) -> AsyncEngine:
             connect_args={"timeout": PATIENCE_S, "async_creator_fn": sqlite_connection},
             pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
-            max_overflow=0,  # a connection is a thread; waiting for one is faster than starting one
+            max_overflow=0,  # each connection has a thread; waiting for a free one is faster than starting one
         )
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
         return engine
-    # Every statement sees committed rows. Rows that must not change are locked explicitly.
+    # READ COMMITTED suffices, because rows that must not change are locked explicitly.
     return create_async_engine(
         url,
         hide_parameters=True,
@@ -271,7 +269,7 @@ def _engine(url: URL) -> AsyncEngine:
 
 
 def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
-    connection.isolation_level = None  # keeps the driver from starting transactions
+    connection.isolation_level = None  # disables the driver's implicit transactions
     cursor = connection.cursor()
     for pragma in PRAGMAS:
         cursor.execute(pragma)
@@ -279,20 +277,16 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 
 
 def _begin(connection: Connection) -> None:
-    """Start a transaction.
-
-    A transaction that will write takes the lock at once, since it may fail to get it after reading.
-    """
+    """Start a transaction. Writers take the lock immediately, since SQLite may refuse it after a read."""
     if statement := connection.get_execution_options()["begin"]:
         connection.exec_driver_sql(statement)
 
 
 async def _pause(attempt: int) -> None:
-    """Wait before a retry. All waits together take about five seconds."""
     share = random.uniform(0.5, 1.5)  # nosec B311  # no secret
     await asyncio.sleep(PAUSE_S * 2**attempt * share)
 
 
 def _again(error: SQLAlchemyError, attempt: int) -> bool:
-    """Return True if a retry may succeed. A conflict of two writers is retried once."""
+    """Return True if a retry may succeed. A violated constraint is retried once, as two writers may have collided."""
     return passes(error) or (isinstance(error, IntegrityError) and attempt == 1)

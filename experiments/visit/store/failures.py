@@ -1,16 +1,16 @@
-"""Database errors: which ones to retry, and messages with remedies."""
+"""Classify database errors, and explain their causes and remedies."""
 
 from sqlalchemy.exc import DBAPIError, IntegrityError, SQLAlchemyError, TimeoutError
 
 DAMAGED = "is damaged: restore the last backup with `mjsim study restore`."
 UNREACHABLE = "cannot be reached: check that its server runs."
 PASSING = {
-    "1205",  # MariaDB: waited too long for a lock
+    "1205",  # MariaDB: lock wait timeout
     "1213",  # MariaDB: deadlock
-    "40001",  # PostgreSQL: conflict of two transactions
+    "40001",  # PostgreSQL: serialization failure
     "40P01",  # PostgreSQL: deadlock
 }
-# Error numbers (MariaDB), SQLSTATE codes (PostgreSQL) or parts of messages, with cause and remedy
+# MariaDB error numbers, PostgreSQL SQLSTATE codes or parts of messages, each with its cause and remedy
 MEANINGS = (
     (
         ("1045", "1044", "28P01", "42501", "authentication failed", "FATAL:  role", "pg_hba.conf"),
@@ -33,14 +33,14 @@ MEANINGS = (
 
 
 def passes(error: SQLAlchemyError) -> bool:
-    """Return True if a retry of the transaction may succeed."""
+    """Return True if the transaction may succeed when it is retried."""
     if not isinstance(error, DBAPIError):
         return False
     return error.connection_invalidated or bool(_codes(error) & PASSING) or _meaning(error) == UNREACHABLE
 
 
 def advice(error: SQLAlchemyError, database: str) -> str:
-    """Return a message with the cause and the remedy."""
+    """Return an error message with the cause and the remedy."""
     if isinstance(error, TimeoutError):
         return (
             f"The database {database} is busy: every connection is in use. Try again, or let fewer people in."

@@ -1,6 +1,6 @@
-"""Several hosts with one database: their heartbeats, and the assignment of visits to hosts.
+"""Coordinate several hosts that share a database, by heartbeats and by assigning visits to hosts.
 
-Times are those of the database's clock, since the hosts' clocks may be wrong.
+Times are measured by the database's clock, since the hosts' clocks may be wrong.
 """
 
 from datetime import datetime, timedelta
@@ -13,16 +13,16 @@ from experiments.visit.store.part import StorePart, database_now, note
 from experiments.visit.store.tables import assignment, host, person
 from experiments.visit.store.values import Host
 
-LEASE = timedelta(seconds=60)  # without a successful heartbeat for this long, a host ends its sessions
-SILENT = timedelta(seconds=90)  # a host without heartbeats for this long may be handed over
-HANDED_OVER = "-"  # stands for the name of any host that has the participant's journal
+LEASE = timedelta(seconds=60)  # time after the last successful heartbeat when a host ends its sessions
+SILENT = timedelta(seconds=90)  # time after the last heartbeat when a host's visits may be handed over
+HANDED_OVER = "-"  # replaces the host's name if any host with the journal may take over the visit
 
 
 class Hosts(StorePart):
-    """Rows of `host`, and `person.host`."""
+    """Store methods for hosts and the visits assigned to them."""
 
     async def greet(self, name: str, *, leaves: bool = False) -> bool:
-        """Record a heartbeat or departure. Return whether the host accepts new visits."""
+        """Record a host's heartbeat or departure. Return True if the host accepts new visits."""
         mine = (host.c.study_id == self._study_id, host.c.name == name)
 
         async def work(connection: AsyncConnection) -> bool:
@@ -40,16 +40,16 @@ class Hosts(StorePart):
             return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
 
     async def claim(self, person_id: int, name: str, *, new: bool, journal: bool) -> bool:
-        """Assign a participant's trials to a host if allowed. Return True if the host has them.
+        """Assign a participant's visit to a host if possible. Return True if it is assigned to this host.
 
         Args:
             new: True if the host accepts new visits.
-            journal: True if the host has the participant's journal.
+            journal: True if the journal of the visit is on the host.
         """
         may = [person.c.host == name]
         if journal:
             may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
-        elif new:  # not for participants with a place, whose journal is on another host
+        elif new:  # the journal of a participant with a place is on another host
             may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
 
         async def work(connection: AsyncConnection) -> bool:
@@ -59,7 +59,7 @@ class Hosts(StorePart):
         return await self._database.write(work)
 
     async def drain(self, name: str, draining: bool, who: str) -> None:
-        """Stop or allow new visits on a host. Its current visits continue."""
+        """Stop or allow new visits on a host. Visits that have begun continue."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)
@@ -73,9 +73,9 @@ class Hosts(StorePart):
         await self._database.write(work)
 
     async def hand_over(self, name: str, who: str, now: datetime | None = None) -> int:
-        """Release the visits of a dead host to the hosts that have their journals. Return the number of visits.
+        """Let other hosts continue the visits of a failed host if they have the journals. Return the number of visits.
 
-        Raises StoreError while the host may still be running.
+        Raises StoreError if the host may still be running.
         """
 
         async def work(connection: AsyncConnection) -> int:

@@ -1,8 +1,8 @@
-"""Payments of participants: an append-only list of events that determines what is owed.
+"""Ledger of payments to participants, an append-only list of events that determines which payments are owed.
 
-Every payment has a key. The event `sending` is written before the platform is asked. After a crash between the
-platform's answer and the next event, the payment is in doubt, so the platform is asked about its key before anything is
-sent again. Times are those of the database's clock.
+Every payment has a key. The event `sending` is written before the request is sent to the platform. If no event follows,
+for example after a crash, the payment is in doubt, and the platform must be asked about the key before another request.
+Times are measured by the database's clock.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from experiments.visit.store.part import StorePart, database_now, lock_study
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
-# kinds of which a participant gets at most one payment in all
+# types of payments that exclude each other: a participant receives at most one of them
 ONCE: tuple[PaymentKind, ...] = ("reward", "screen_out", "partial")
 IN_DOUBT_AFTER = timedelta(minutes=10)
 _FIELDS = [column for column in payment.c if column.name != "study_id"]
 
 
 class Ledger(StorePart):
-    """Rows of `payment`, which are never changed."""
+    """Records payment events, which are never changed afterwards."""
 
     async def decide(
         self,
@@ -36,17 +36,17 @@ class Ledger(StorePart):
         note: str = "",
         now: datetime | None = None,
     ) -> bool:
-        """Record that a payment is owed. Return False if this has been recorded before.
+        """Record that a payment is owed. Return False if it is already recorded.
 
         Args:
-            kind: Kind of the payment. A participant gets at most one of `reward`, `screen_out` and `partial`.
-            cents: Hundredths of the currency, 0 for a rejection.
-            currency: Three-letter code.
+            kind: Type of the payment. A participant receives at most one of `reward`, `screen_out` and `partial`.
+            cents: Amount in hundredths of the currency, or 0 for a rejection.
+            currency: Three-letter currency code.
             key: Permanent name of the payment, such as `12-reward`, of at most 100 characters.
 
         Raises:
-            StoreError: The key is used for another payment, the participant already has one of these kinds, or
-                the amount or kind is not valid.
+            StoreError: Another payment has the key, a payment that excludes this one is recorded, or the amount or type
+                is not valid.
         """
         _check(kind, cents, currency)
         same = (person_id, kind, cents, currency)
@@ -69,11 +69,11 @@ class Ledger(StorePart):
         return await self._database.write(work)
 
     async def begin_sending(self, key: str, now: datetime | None = None) -> int | None:
-        """Request to send a payment. Return the number of the attempt, or None if it must not be sent now.
+        """Record a new attempt to send a payment. Return its number, or None if the payment must not be sent now.
 
-        It must not be sent if it is paid, or if another attempt is under way or in doubt. Ask the platform at once,
-        with a timeout well below ten minutes. After ten minutes :meth:`owed` returns the payment to other callers, who
-        ask the platform about its key.
+        This is the case if it is paid or another attempt has no known outcome. Send the request to the platform
+        immediately, with a timeout well below ten minutes. After ten minutes, :meth:`owed` returns the payment to other
+        callers, who ask the platform about its key.
         """
 
         async def work(connection: AsyncConnection) -> int | None:
@@ -89,7 +89,7 @@ class Ledger(StorePart):
     async def confirm(
         self, key: str, attempt: int, reference: str, note: str = "", now: datetime | None = None
     ) -> bool:
-        """Record that the platform has paid, with its reference. Return False if this was recorded before."""
+        """Record that the platform has paid, with its reference. Return False if this is already recorded."""
 
         async def work(connection: AsyncConnection) -> bool:
             events = await self._known(connection, key)
@@ -102,9 +102,9 @@ class Ledger(StorePart):
         return await self._database.write(work)
 
     async def fail(self, key: str, attempt: int, note: str, now: datetime | None = None) -> bool:
-        """Record that an attempt has certainly failed. Return False if it is not the current attempt.
+        """Record that an attempt has definitely failed. Return False if it is not the current attempt.
 
-        Never call this after a timeout or a lost connection, when the payment is in doubt.
+        Never call this after a timeout or a lost connection, because the platform may have paid.
         """
 
         async def work(connection: AsyncConnection) -> bool:
@@ -119,10 +119,10 @@ class Ledger(StorePart):
     async def owed(
         self, now: datetime | None = None, in_doubt_after: timedelta = IN_DOUBT_AFTER
     ) -> tuple[PaymentEvent, ...]:
-        """Return the last events of unconfirmed payments, except those that another process has just started to send.
+        """Return the last event of each unconfirmed payment, except those that another process has begun to send.
 
-        If the event is `sending`, the payment is in doubt. Ask the platform about its key, then :meth:`confirm` or
-        :meth:`fail` the attempt.
+        If the event is `sending`, the payment is in doubt. Ask the platform about the key, then call :meth:`confirm` or
+        :meth:`fail`.
         """
         limit = (now or await self.now()) - in_doubt_after
         payments = by_key(await self.history()).values()
@@ -130,12 +130,12 @@ class Ledger(StorePart):
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
 
     async def now(self) -> datetime:
-        """Return the time of the clock that stamps events."""
+        """Return the current time of the database's clock, which timestamps events."""
         async with self._database.reading() as connection:
             return await database_now(connection)
 
     async def history(self, person_id: int | None = None) -> tuple[PaymentEvent, ...]:
-        """Return all events in order, or those of one participant."""
+        """Return the events of all participants or of one, in order."""
         which = [payment.c.study_id == self._study_id]
         if person_id is not None:
             which.append(payment.c.person_id == person_id)
@@ -149,7 +149,7 @@ class Ledger(StorePart):
         return events
 
     async def _events(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
-        """Return the events of a key, and lock the study so that no other process adds any."""
+        """Lock the study so that no other process adds events, and return the events of a key."""
         await lock_study(connection, self._study_id)
         return await events_of(connection, payment.c.study_id == self._study_id, payment.c.key == key)
 
@@ -215,5 +215,5 @@ def by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
 
 
 def paid(events: Sequence[PaymentEvent]) -> bool:
-    """Return True if the platform is known to have paid."""
+    """Return True if a payment's events include a confirmation by the platform."""
     return any(event.event == "confirmed" for event in events)

@@ -1,4 +1,4 @@
-"""The base of the store's classes."""
+"""Base class of the store's parts."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -18,7 +18,7 @@ _NOW = {
 
 
 class StorePart:
-    """Access to the rows of one study."""
+    """A part of the store, with access to the rows of one study."""
 
     def __init__(self, database: Database, study_id: int) -> None:
         self._database, self._study_id = database, study_id
@@ -30,12 +30,12 @@ def new_id(inserted: CursorResult[Any]) -> int:
 
 
 async def database_now(connection: AsyncConnection) -> datetime:
-    """Return the time of the database's clock, which all hosts share."""
+    """Return the current time of the database's clock, which all hosts share."""
     return (await connection.execute(select(_NOW[connection.dialect.name]))).scalar_one()
 
 
 async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
-    """Lock the study's row until the transaction ends, and return the changed quotas by cell."""
+    """Lock the study's row until the transaction ends, and return the quotas that were changed, by cell."""
     query = select(tables.study.c.quotas).where(tables.study.c.id == study_id).with_for_update()
     return dict((await connection.execute(query)).scalar_one())
 

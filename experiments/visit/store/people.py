@@ -1,4 +1,4 @@
-"""Participants: arrival, activity and platform ids."""
+"""Store the arrival, activity and platform ids of participants."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,14 +25,14 @@ _FIELDS = (
     person.c.delete_wanted,
     person.c.host,
 )
-# Built once, since building a query takes as long as running it.
+# Queries are built only once, because building one takes as long as running it.
 _FIND = select(*_FIELDS).where(
     person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
 )
 
 
 class People(StorePart):
-    """Rows of `person` and `identity`."""
+    """Store methods for participants and their platform ids."""
 
     async def arrive(
         self,
@@ -43,16 +43,16 @@ class People(StorePart):
         phase: str,
         now: datetime | None = None,
     ) -> PersonRow:
-        """Return the participant of a link, adding a new one or finding an earlier arrival.
+        """Find the participant who arrives with a link, or add a new one.
 
-        A returning participant keeps the token hash of the first arrival, so derive the token from the key.
+        Returning participants keep the token hash of their first arrival, so the token must be derived from the key.
 
         Args:
             platform: Recruitment platform, such as `prolific`, of at most 20 characters.
-            key: HMAC-SHA-256 of the platform's id with the study's secret, hexadecimal. None for links without an id.
-            identity: The platform's ids, which are stored separately and never exported. An active participant's ids
-                are replaced by those of the last arrival.
-            token_hash: SHA-256 of the link's token, hexadecimal.
+            key: Hexadecimal HMAC-SHA-256 of the platform id with the study's secret, or None for links without an id.
+            identity: Ids from the platform, which are stored separately and never exported. Those of the last arrival
+                replace earlier ones while the participant is active.
+            token_hash: Hexadecimal SHA-256 of the link's token.
         """
         now = now or utc_now()
         same = person.c.token_hash == token_hash if key is None else person.c.platform_key == key
@@ -61,7 +61,7 @@ class People(StorePart):
             known = (await connection.execute(self._select(same))).first()
             if known is not None:
                 found = replace(PersonRow(*known), returning=True)
-                if found.active:  # after returning and accepting the task again, a participant has new ids
+                if found.active:  # ids change if a participant returns the task and accepts it again
                     mine = ids.c.person_id == found.id
                     await connection.execute(update(ids).where(mine).values(ids=dict(identity)))
                 return found
@@ -83,14 +83,14 @@ class People(StorePart):
         return await self._database.write(work)
 
     async def find(self, token_hash: str) -> PersonRow | None:
-        """Return the participant of a link, or None."""
+        """Return the participant whose link has this token hash, or None."""
         async with self._database.reading() as connection:
             found = await connection.execute(_FIND, {"study": self._study_id, "token": token_hash})
             row = found.first()
             return None if row is None else PersonRow(*row)
 
     async def person(self, person_id: int) -> PersonRow:
-        """Return a participant by number. Raises StoreError if there is none."""
+        """Return the participant with a number. Raises StoreError if there is none."""
         async with self._database.reading() as connection:
             row = (await connection.execute(self._select(person.c.id == person_id))).first()
         if row is None:
@@ -100,19 +100,19 @@ class People(StorePart):
         return PersonRow(*row)
 
     async def people(self, status: Status | None = None) -> tuple[PersonRow, ...]:
-        """Return all participants, or those of one status, in order of arrival."""
+        """Return all participants, or those with the given status, in order of arrival."""
         query = self._select() if status is None else self._select(person.c.status == status)
         async with self._database.reading() as connection:
             return tuple(PersonRow(*row) for row in await connection.execute(query.order_by(person.c.id)))
 
     async def identity(self, person_id: int) -> dict[str, str]:
-        """Return a participant's platform ids, which are only used for payment. They are empty once erased."""
+        """Return a participant's platform ids, which are only needed for payment. Empty if they have been deleted."""
         query = select(ids.c.ids).where(ids.c.person_id == person_id)
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
 
     async def beat(self, person_id: int, now: datetime | None = None) -> None:
-        """Record that a participant is active and keeps the place."""
+        """Record that a participant is active and keeps the assigned place."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:

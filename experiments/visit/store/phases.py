@@ -1,4 +1,4 @@
-"""Progress of participants: phases, answers, trials, and the end of the participation."""
+"""Store the progress of participants: phases, answers, trials and the final status."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -14,7 +14,7 @@ from experiments.visit.store.tables import answer, identity, person, trial
 from experiments.visit.store.tables import phase as phases
 from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
 
-# Built once, since building a query takes as long as running it.
+# Queries are built only once, because building one takes as long as running it.
 _PHASE = select(*[column for column in phases.c if column.name != "id"]).where(
     phases.c.person_id == bindparam("person"), phases.c.name == bindparam("phase")
 )
@@ -41,10 +41,10 @@ _ROWS_OF_ONE = {table: rows.where(table.c.person_id == bindparam("person")) for 
 
 
 class Phases(StorePart):
-    """Rows of `phase`, `answer` and `trial`."""
+    """Store methods for phases, answers and trials."""
 
     async def show_phase(self, person_id: int, name: str, now: datetime | None = None) -> PhaseRow:
-        """Record when the phase was first shown, and return its row."""
+        """Record when a phase was first shown to a participant, and return its row."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> PhaseRow:
@@ -72,13 +72,13 @@ class Phases(StorePart):
     ) -> bool:
         """Advance a participant to the next phase and make the answers final, in one transaction.
 
-        Return False if the participant is in another phase (double submission, back button, second tab) or has ended.
+        Return False if the participant is no longer in the phase, for example after submitting its form twice.
 
         Args:
-            answers: Answers by item. They replace saved ones.
-            reason: Reason for the end of the phase, if there are several ways to end it.
-            duration_s: Duration in seconds, by default the time since the phase was first shown.
-            status: Final status, such as `finished`, if the participation ends as well.
+            answers: Answers by item, which replace answers saved earlier.
+            reason: Reason why the phase ended, if several are possible.
+            duration_s: Duration of the phase in seconds. The default is the time since it was first shown.
+            status: Final status, such as `finished`, if this phase ends the visit.
         """
         now = now or utc_now()
 
@@ -104,7 +104,7 @@ class Phases(StorePart):
     ) -> bool:
         """Save or replace answers of the current phase. Return False if the participant is in another phase.
 
-        Answers of a phase that has ended never change.
+        The answers of a phase cannot be changed after its end.
         """
         now = now or utc_now()
 
@@ -120,7 +120,7 @@ class Phases(StorePart):
     async def finish_trial(
         self, person_id: int, phase: str, folder: str, ended: str, now: datetime | None = None
     ) -> None:
-        """Record or replace the end of a trial, with its run directory relative to the study's folder."""
+        """Record that a trial has ended, and where its run directory is, relative to the study's folder."""
         values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
 
         async def work(connection: AsyncConnection) -> None:
@@ -139,7 +139,7 @@ class Phases(StorePart):
         return tuple(Answer(*row) for row in await self._rows(answer, person_id))
 
     async def answers_to(self, phase: str, item: str) -> tuple[Answer, ...]:
-        """Return all final answers to one item."""
+        """Return the final answers of all participants to one item."""
         asked = (answer.c.phase == phase, answer.c.item == item, answer.c.final.is_(True))
         return tuple(Answer(*row) for row in await self._rows(answer, None, *asked))
 
@@ -165,7 +165,7 @@ async def _end_phase(
     row = await _phase(connection, person_id, name)
     if how["duration_s"] is None:
         how["duration_s"] = max(0.0, (now - row.shown).total_seconds()) if row else 0.0
-    if row is None:  # the phase was never shown
+    if row is None:  # the phase has never been shown
         new = {"person_id": person_id, "name": name, "shown": now, "ended": now, **how}
         await connection.execute(insert(phases), new)
         return
@@ -181,7 +181,6 @@ async def _save(
     *,
     final: bool = False,
 ) -> None:
-    """Insert or update answers. `final` makes all answers of the phase final. The person's row must be locked."""
     mine = (answer.c.person_id == person_id, answer.c.phase == phase)
     known = set((await connection.execute(_ITEMS, {"person": person_id, "which": phase})).scalars())
     for item in known & set(values):
@@ -202,12 +201,12 @@ async def _save(
 
 
 class Endings(StorePart):
-    """Ways to end a participation."""
+    """Store methods that end visits."""
 
     async def finish(self, person_id: int, status: Status = "finished", now: datetime | None = None) -> bool:
-        """End an active participation. Return True if it was active.
+        """Set the final status of an active participant. Return False if the participant was not active.
 
-        A finished participant keeps the place. Otherwise it is released.
+        The participant's place is kept if the status is `finished`, and released otherwise.
         """
         now = now or utc_now()
 
@@ -225,7 +224,7 @@ class Endings(StorePart):
         return await self._database.write(work)
 
     async def time_out(self, before: datetime) -> int:
-        """Time out participants inactive since `before`, and release their places. Return their number."""
+        """Time out participants inactive since `before` and release their places. Return how many there were."""
         gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)
 
         async def work(connection: AsyncConnection) -> int:
@@ -238,10 +237,10 @@ class Endings(StorePart):
         return await self._database.write(work)
 
     async def withdraw(self, person_id: int, delete: bool, now: datetime | None = None) -> bool:
-        """Withdraw a participant, even after finishing. Return False if nothing changed.
+        """Withdraw a participant, who may have finished already. Return False if nothing changed.
 
-        With `delete`, the answers are deleted at once and the place is released. The number and platform ids stay until
-        all payments are made. :meth:`Store.erase` then deletes the rest.
+        With `delete`, the answers are deleted immediately and the place is released. The number and platform ids are
+        kept until all payments are made and :meth:`Store.erase` is called.
         """
         now = now or utc_now()
 
@@ -265,9 +264,9 @@ class Endings(StorePart):
 async def end(
     connection: AsyncConnection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
 ) -> None:
-    """Set the final status of a participant, and finish or release the place. The study must be locked."""
+    """Set a participant's final status, and keep or release the place accordingly. The study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
-    if status == "no_consent":  # no payment needs the ids; the keyed hash still recognizes the person
+    if status == "no_consent":  # without payments, ids are not needed
         await connection.execute(delete_rows(identity).where(identity.c.person_id == person_id))
     place = await place_of(connection, person_id)
     if place is None:
@@ -277,5 +276,5 @@ async def end(
             await set_place(connection, person_id, "released")
     elif place.state == "held":
         await set_place(connection, person_id, "finished")
-    else:  # if the place is taken again, the cell ends with one participant too many
+    else:  # the place was released, and another participant may have it now
         await take_back(connection, study_id, place, "finished")

@@ -1,4 +1,4 @@
-"""Accounts of the researcher's page: passwords, roles and revocable logins."""
+"""Store accounts of researchers, with passwords, roles and revocable logins."""
 
 import asyncio
 import re
@@ -17,7 +17,7 @@ from experiments.visit.store.values import Researcher, Role, utc_now
 if TYPE_CHECKING:
     from argon2 import PasswordHasher
 
-PASSWORD_MEMORY_KIB = 65_536  # memory cost of hashing a password, as recommended by RFC 9106
+PASSWORD_MEMORY_KIB = 65_536  # memory needed to hash a password, as recommended by RFC 9106
 NAME = re.compile(r"[a-z0-9][a-z0-9._@-]{0,59}")
 _FIELDS = (
     researcher.c.id,
@@ -29,7 +29,7 @@ _FIELDS = (
 
 
 class Researchers:
-    """Rows of `researcher` and `login`, shared by all studies of a database."""
+    """Store methods for researchers and logins, which are shared by all studies in a database."""
 
     def __init__(self, database: Database, memory_kib: int) -> None:
         self._database = database
@@ -42,7 +42,7 @@ class Researchers:
         return PasswordHasher(memory_cost=self._memory_kib)
 
     async def add(self, name: str, password: str, role: Role, now: datetime | None = None) -> Researcher:
-        """Add a researcher. Raises StoreError if the name is taken or not valid, or the role is unknown."""
+        """Add a researcher. Raises StoreError if the name is taken, or if the name or role is not valid."""
         if not NAME.fullmatch(name):
             raise StoreError(f"{name!r} cannot be a name: use up to 60 of a-z, 0-9 and the signs . _ @ -")
         values = {"name": name, "role": _known(role), "disabled": False, "created": now or utc_now()}
@@ -65,7 +65,7 @@ class Researchers:
     async def check(self, name: str, password: str) -> Researcher | None:
         """Return the researcher with these credentials, or None if they are wrong or the account is disabled.
 
-        Checking an unknown name takes as long as checking a known one. The caller limits the number of attempts.
+        Unknown names take as long as known ones. The caller must limit the number of attempts.
         """
         row = await self._row(name) if NAME.fullmatch(name) else None
         if row is None:
@@ -88,7 +88,7 @@ class Researchers:
         disabled: bool | None = None,
         now: datetime | None = None,
     ) -> None:
-        """Change the given values, and end all logins of the researcher."""
+        """Change a researcher's password, role or access, and revoke all logins of the researcher."""
         values: dict[str, object] = {}
         if password is not None:
             values["password"] = await self._hash(password)
@@ -113,7 +113,7 @@ class Researchers:
     async def log_in(
         self, researcher_id: int, token_hash: str, expires: datetime, now: datetime | None = None
     ) -> None:
-        """Start a login. Only the SHA-256 of its token is stored."""
+        """Add a login. Only the SHA-256 of its token is stored."""
         values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
 
         async def work(connection: AsyncConnection) -> None:
@@ -122,7 +122,7 @@ class Researchers:
         await self._database.write(work)
 
     async def who(self, token_hash: str, now: datetime | None = None) -> Researcher | None:
-        """Return the researcher of a valid login, or None."""
+        """Return the researcher who is logged in with this token hash, or None."""
         query = (
             select(*_FIELDS)
             .join(login, login.c.researcher_id == researcher.c.id)
@@ -147,7 +147,6 @@ class Researchers:
             return (await connection.execute(query)).first()
 
     async def _hash(self, password: str) -> str:
-        """Hash in a thread, since hashing is slow by design."""
         return await asyncio.to_thread(self._hasher.hash, password)
 
 

@@ -1,4 +1,4 @@
-"""SQLite in an event loop. Fast statements run directly, which takes less time than a thread."""
+"""SQLite connections for an event loop. Fast statements run without a thread, which saves time."""
 
 import sqlite3
 from collections.abc import Callable
@@ -11,9 +11,9 @@ SLOW = ("Connection.commit", "Connection.close")
 
 
 class SqliteConnection(aiosqlite.Connection):
-    """A connection that uses its thread only for operations that may wait for a lock or the disk.
+    """Connection that uses its thread only for operations that may wait for a lock or the disk.
 
-    In WAL mode, reading never waits, and a transaction has the lock before it writes.
+    In WAL mode, reads never wait, and neither do writes, because their transaction already has the lock.
     """
 
     async def _execute(self, fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
@@ -25,7 +25,7 @@ class SqliteConnection(aiosqlite.Connection):
 
 
 def sqlite_connection(database: str, **options: Any) -> SqliteConnection:
-    """Return an unopened connection, as SQLAlchemy's `async_creator_fn` requires."""
+    """Create a connection that is not open yet, as SQLAlchemy's `async_creator_fn` requires."""
     connection = SqliteConnection(
         lambda: sqlite3.connect(database, **{**options, "check_same_thread": False}), iter_chunk_size=64
     )

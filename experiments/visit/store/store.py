@@ -1,4 +1,4 @@
-"""The store of a study: participants, progress, answers and payments."""
+"""Store of a study's participants, progress, answers and payments."""
 
 import sqlite3
 from collections.abc import Awaitable, Callable, Mapping
@@ -27,12 +27,12 @@ from experiments.visit.store.values import AuditRow, StudyRow, StudyState, utc_n
 
 
 class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
-    """The database of one study. Changes are on disk when a method returns.
+    """Database access for one study. Changes are on disk when a method returns.
 
     All methods raise :class:`~experiments.errors.StoreError` if the database fails.
 
     Attributes:
-        researchers: Accounts of the researcher's page, shared by all studies of a database.
+        researchers: Accounts of researchers, which are shared by all studies in a database.
     """
 
     def __init__(self, database: Database, study_id: int, password_memory_kib: int) -> None:
@@ -49,8 +49,8 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         Args:
             url: `sqlite:///FILE`, `mysql://USER:PASSWORD@HOST/NAME` or `postgresql://USER:PASSWORD@HOST/NAME`.
             study_name: Name of the study. A database may hold several.
-            file_hash: SHA-256 of the study file, hexadecimal. A change is recorded in the audit log.
-            password_memory_kib: Memory cost of hashing a researcher's password. Tests use less.
+            file_hash: Hexadecimal SHA-256 of the study file. If it has changed, this is recorded in the audit log.
+            password_memory_kib: Memory needed to hash a researcher's password, in KiB.
         """
         database = Database(url)
         try:
@@ -65,7 +65,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         await self._database.close()
 
     def on_write(self, tell: Callable[[float], None]) -> None:
-        """Call `tell` with the duration of each write, in seconds."""
+        """Register a function that is called with the duration of each write, in seconds."""
         self._database.on_write = tell
 
     def is_at(self, path: Path) -> bool:
@@ -76,7 +76,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         )
 
     async def backup(self, path: Path) -> None:
-        """Write a consistent snapshot of the database to a new SQLite file, while the study continues."""
+        """Write a consistent snapshot of the database to a new SQLite file. The study can continue meanwhile."""
         await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
@@ -98,7 +98,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
     async def audit(
         self, who: str, action: str, details: Mapping[str, Any] | None = None, now: datetime | None = None
     ) -> None:
-        """Add a line to the audit log. Name participants by number, never by a platform's id."""
+        """Add an entry to the audit log. Refer to participants by number, never by platform id."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:
@@ -114,7 +114,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
 
 
 async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
-    """Apply `work` to a study in a backup or another SQLite file, and return its result.
+    """Apply `work` to a study in a SQLite file, such as a backup, and return the result.
 
     Raises StoreError if the file cannot be read or changed.
     """
@@ -130,7 +130,7 @@ async def change_database(path: Path, study_name: str, work: Callable[[Store], A
         return await work(store)
     finally:
         await store.close()
-        with suppress(sqlite3.OperationalError):  # fails while another process has the file open
+        with suppress(sqlite3.OperationalError):  # another process may have the file open
             one_file(path)
 
 

@@ -1,4 +1,4 @@
-"""The tables of a study's database. Migrations create them, and a test checks that both agree."""
+"""Tables of a study's database. Migrations create the same tables, which a test checks."""
 
 import json
 from datetime import UTC, datetime
@@ -28,13 +28,13 @@ HASH = 64  # length of a SHA-256, in hexadecimal digits
 
 
 class Utc(TypeDecorator[datetime]):
-    """A time with a timezone. It is stored in UTC, since SQLite and MariaDB cannot store timezones."""
+    """Column type for times with a timezone. They are stored in UTC, since SQLite and MariaDB store no timezones."""
 
     impl = DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
-        """Convert to UTC. Raises ValueError if the timezone is missing."""
+        """Convert a time to UTC. Raises ValueError if it has no timezone."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -46,13 +46,13 @@ class Utc(TypeDecorator[datetime]):
 
 
 class Json(TypeDecorator[Any]):
-    """A value stored as JSON in ASCII, so that no database can change a character."""
+    """Column type for JSON values. They are stored as ASCII, which every database preserves."""
 
     impl = Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
     cache_ok = True
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> str:  # noqa: ARG002
-        """Encode as JSON. Raises ValueError for NaN and infinity, and TypeError for other unsupported values."""
+        """Encode a value as JSON. Raises ValueError for NaN and infinity, and TypeError for unsupported types."""
         return json.dumps(value, allow_nan=False, separators=(",", ":"))
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> Any:  # noqa: ARG002
@@ -68,7 +68,7 @@ metadata = MetaData(
     }
 )
 
-# By default, SQLite reuses ids of deleted rows, and MariaDB compares text case-insensitively.
+# Without these options, SQLite would reuse the ids of deleted rows, and MariaDB would ignore case.
 OPTIONS: dict[str, Any] = {
     "sqlite_autoincrement": True,
     "mysql_engine": "InnoDB",
@@ -82,7 +82,6 @@ def _id() -> Column[int]:
 
 
 def _of(table: str, *, unique: bool = False, index: bool = False) -> Column[int]:
-    """Return a foreign-key column. Set `index` if no unique constraint of the table begins with it."""
     return Column(f"{table}_id", ForeignKey(f"{table}.id"), nullable=False, unique=unique, index=index)
 
 
@@ -111,7 +110,7 @@ person = Table(
     Column("created", Utc, nullable=False),
     Column("seen", Utc, nullable=False),
     Column("delete_wanted", Boolean, nullable=False),
-    Column("host", String(NAME)),  # host that has the participant's trials; NULL if there is only one host
+    Column("host", String(NAME)),  # host that runs the participant's trials; NULL if there is only one host
     UniqueConstraint("study_id", "platform_key"),
     **OPTIONS,
 )
@@ -125,8 +124,8 @@ identity = Table(
     **OPTIONS,
 )
 
-# `active` is 1 while a place is held or finished, and NULL once it is released. Thus the unique constraint ensures
-# that only one participant has a place.
+# `active` is 1 while a place is held or finished, and NULL once it is released. The unique constraint ignores NULL, so
+# it ensures that each place has at most one participant.
 assignment = Table(
     "assignment",
     metadata,

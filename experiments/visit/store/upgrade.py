@@ -1,4 +1,4 @@
-"""Migration of a database to the current schema, by one process at a time."""
+"""Migrate a database to the current schema, in one process at a time."""
 
 from pathlib import Path
 
@@ -15,13 +15,13 @@ from experiments.visit.store.tables import metadata
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSIONS = "alembic_version"
-LOCK = 7_303_014  # arbitrary lock number, shared by all upgrading processes
+LOCK = 7_303_014  # arbitrary number of the lock that all upgrading processes use
 
 
 async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
     """Create the tables, or migrate existing tables and their rows to the current schema.
 
-    Raises StoreError if a newer mjsim created them, or the database holds tables of another program.
+    Raises StoreError if the tables are from a newer version of mjsim or from another program.
     """
 
     async def work(connection: AsyncConnection) -> None:
@@ -36,7 +36,6 @@ async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:
 
 
 async def _lock(connection: AsyncConnection, kind: str) -> None:
-    """Keep other processes from upgrading. In SQLite, the transaction does so already."""
     if kind == "mysql":
         found = await connection.execute(
             text("SELECT GET_LOCK(:name, :wait)"), {"name": f"mjsim{LOCK}", "wait": PATIENCE_S}

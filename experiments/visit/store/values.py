@@ -1,4 +1,4 @@
-"""Frozen values that the store accepts and returns."""
+"""Immutable values that the store accepts and returns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ def utc_now() -> datetime:
 
 @dataclass(frozen=True)
 class StudyRow:
-    """The study of a store.
+    """A study in the database.
 
     Attributes:
-        file_hash: Hash of the study file at the last opening.
-        quotas: Numbers of wanted participants that differ from the study file, by cell.
+        file_hash: SHA-256 of the study file when the database was last opened.
+        quotas: Numbers of participants wanted, for cells in which they differ from the study file.
     """
 
     id: int
@@ -42,11 +42,11 @@ class PersonRow:
     """A participant.
 
     Attributes:
-        token_hash: SHA-256 of the link's token, hexadecimal. Also the name of the visit's folder.
+        token_hash: Hexadecimal SHA-256 of the link's token, which is also the name of the visit's folder.
         seen: Time of the last activity.
         delete_wanted: True if the participant withdrew and asked for deletion.
-        host: Host that has the participant's trials. None if there are no trials yet, or only one host.
-        returning: True if :meth:`Store.arrive` found the participant.
+        host: Host that runs the participant's trials. None before the first trial, or if there is only one host.
+        returning: True if :meth:`Store.arrive` found the participant in the database.
     """
 
     id: int
@@ -67,7 +67,7 @@ class PersonRow:
 
 @dataclass(frozen=True)
 class Host:
-    """One of several hosts of a study."""
+    """One of several hosts that serve a study."""
 
     name: str
     seen: datetime
@@ -76,7 +76,7 @@ class Host:
 
 @dataclass(frozen=True)
 class PhaseRow:
-    """A participant's phase. `ended` and the fields after it are None until the phase has ended."""
+    """A phase of a participant's visit. `ended` and the following fields are None until the phase has ended."""
 
     person_id: int
     name: str
@@ -89,7 +89,7 @@ class PhaseRow:
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer to an item. `final` is True once the phase has ended."""
+    """An answer to an item of a form. `final` is True once the phase has ended."""
 
     person_id: int
     phase: str
@@ -101,7 +101,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class TrialRow:
-    """A played trial, with its run directory relative to the study's folder."""
+    """A trial that has been played. `folder` is its run directory, relative to the study's folder."""
 
     person_id: int
     phase: str
@@ -112,7 +112,7 @@ class TrialRow:
 
 @dataclass(frozen=True)
 class AuditRow:
-    """A line of the audit log."""
+    """An entry of the audit log."""
 
     id: int
     at: datetime
@@ -123,19 +123,19 @@ class AuditRow:
 
 @dataclass(frozen=True)
 class CellQuota:
-    """Number of participants wanted in a cell, and the house seeds of its places, which are reused in order."""
+    """The number of participants wanted in a cell, and the house seeds that they are given in turn."""
 
     wanted: int
     house_seeds: Sequence[int]
 
     def house_seed(self, place: int) -> int:
-        """Return the house seed of the place with this index."""
+        """Return the house seed of a place in the cell, counted from 0."""
         return self.house_seeds[place % len(self.house_seeds)]
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """A participant's place in a cell, and the participant's seeds. `cell` and `place` count from 0."""
+    """A participant's place in a cell of the design, and the seeds of its trials. `cell` and `place` count from 0."""
 
     person_id: int
     cell: int
@@ -149,7 +149,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class CellCount:
-    """Places of a cell by state. `held` includes abandoned ones that are not yet reassigned."""
+    """Numbers of places in a cell, by state. `held` includes abandoned places that are not reassigned yet."""
 
     held: int = 0
     finished: int = 0
@@ -158,7 +158,7 @@ class CellCount:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of participants by status and by phase (only active ones), and of places by cell."""
+    """Numbers of participants by status, of active participants by phase, and of places by cell."""
 
     statuses: Mapping[str, int]
     phases: Mapping[str, int]
@@ -167,13 +167,13 @@ class Counts:
 
 @dataclass(frozen=True)
 class PaymentEvent:
-    """A row of the ledger.
+    """An event in the ledger of payments.
 
     Attributes:
-        key: Permanent name of the payment.
-        attempt: Number of the attempt to send it, 0 for the decision.
-        cents: Hundredths of the currency.
-        reference: The platform's reference of a confirmed payment.
+        key: Permanent key of the payment.
+        attempt: Number of the attempt to send the payment, or 0 before the first attempt.
+        cents: Amount in hundredths of the currency.
+        reference: The platform's reference if the payment is confirmed.
     """
 
     id: int
@@ -190,13 +190,13 @@ class PaymentEvent:
 
     @property
     def in_doubt(self) -> bool:
-        """True if it is unknown whether the platform has paid. Only valid for the last event of a key."""
+        """True if it is unknown whether the platform has paid. Only meaningful for the last event of a key."""
         return self.event == "sending"
 
 
 @dataclass(frozen=True)
 class Researcher:
-    """An account of the researcher's page."""
+    """A researcher's account."""
 
     id: int
     name: str

@@ -1,4 +1,4 @@
-"""Alembic's environment: runs the migrations on the given connection, in its open transaction."""
+"""Alembic environment that runs the migrations in the open transaction of a given connection."""
 
 from alembic import context
 

@@ -1,4 +1,4 @@
-"""Migration: the first tables.
+"""Create the first version of all tables.
 
 MariaDB commits each table separately, so an interrupted upgrade may have created some of them.
 """
@@ -17,7 +17,6 @@ JSON = sa.Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
 
 
 def upgrade() -> None:
-    """Create all tables, in an order that keeps foreign keys valid."""
     _studies_and_people()
     _progress()
     _money_and_researchers()

@@ -1,4 +1,7 @@
-"""Migration: several hosts."""
+"""Support several hosts: add the table `host` and the column `person.host`.
+
+An interrupted upgrade may have added one of them already.
+"""
 
 import sqlalchemy as sa
 from alembic import op
@@ -11,7 +14,6 @@ TIME = sa.DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
 
 
 def upgrade() -> None:
-    """Add the table `host` and the column `person.host`, unless an interrupted upgrade already has."""
     found = sa.inspect(op.get_bind())
     if "host" not in {column["name"] for column in found.get_columns("person")}:
         op.add_column("person", sa.Column("host", sa.String(100), nullable=True))
