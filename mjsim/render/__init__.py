@@ -1,4 +1,4 @@
-"""Off-screen rendering, the only part of `mjsim` that uses OpenGL. Names are loaded at their first use."""
+"""Off-screen rendering with OpenGL. Submodules are imported at first use."""
 
 import lazy_loader
 

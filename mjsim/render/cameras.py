@@ -13,22 +13,24 @@ from mjsim.house.scene.avatar import EYE
 from mjsim.values.errors import RenderError
 from mjsim.values.person_parameters import PICTURE_ASPECT
 
-# Nearer than any surface to an eye inside a body of radius 0.2 m, and farther than any view indoors, m
+# Distances of the clipping planes in metres. The body keeps the eye farther than `NEAR` from all surfaces.
 NEAR = 0.04
 FAR = 100.0
-_MARGIN = 0.01  # tolerance of culling, far above rounding errors in single precision, m
+_MARGIN = 0.01  # tolerance of culling, far above rounding errors in single precision, in metres
 _NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)  # geom type that the rasteriser does not draw
-_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)  # comparing with the enumeration itself takes ten times as long
+_GEOM = int(
+    mujoco.mjtObj.mjOBJ_GEOM
+)  # an integer, because comparing with the enumeration takes ten times as long
 
 
 @dataclass(frozen=True, eq=False)
 class CameraPose:
     """A pinhole camera."""
 
-    position: NDArray[np.float64]  # eye point in the house frame, m, shape (3,)
+    position: NDArray[np.float64]  # eye point in the house frame, in metres, shape (3,)
     # camera axes in the house frame as columns: x right, y up, z backward, shape (3, 3)
     rotation: NDArray[np.float64]
-    fovy: float  # vertical field of view, rad
+    fovy: float  # vertical field of view, in radians
 
     def __post_init__(self) -> None:
         position = np.asarray(self.position, dtype=np.float64)
@@ -44,13 +46,16 @@ class CameraPose:
 
     @classmethod
     def looking_at(cls, position: ArrayLike, target: ArrayLike, fovy: float) -> "CameraPose":
-        """Make an upright camera at `position` (3,), m, that looks at `target` (3,), m, with a field of view in rad."""
+        """Create an upright camera at `position` that looks at `target`, both in metres, shape (3,)."""
         eye = np.asarray(position, dtype=np.float64)
         return cls(eye, look_rotation(np.asarray(target, dtype=np.float64) - eye), fovy)
 
 
 def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return camera axes (3, 3) that look along `direction`, with up closest to +z, or +y for vertical directions."""
+    """Return the axes, shape (3, 3), of an upright camera that looks along `direction`.
+
+    For a vertical direction, the top of the image is towards +y.
+    """
     length = np.linalg.norm(direction)
     if not length > 0.0:
         raise RenderError(f"a camera cannot look along {direction!r}; give a target away from its position")
@@ -63,13 +68,13 @@ def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class ViewVolume:
-    """The volume that a draw call shows."""
+    """View volume of a draw call."""
 
-    position: NDArray[np.float64]  # eye point, m, (3,)
-    rotation: NDArray[np.float64]  # camera axes as columns: right, up, backward, (3, 3)
-    half_height: float  # half height of the image at distance 1 m, or half height in m if orthographic
-    near: float = NEAR  # distance of the near plane, m
-    far: float = FAR  # distance of the far plane, m
+    position: NDArray[np.float64]  # eye point in metres, shape (3,)
+    rotation: NDArray[np.float64]  # camera axes as columns: right, up, backward, shape (3, 3)
+    half_height: float  # half height of the image at a distance of 1 m, or in metres if orthographic
+    near: float = NEAR  # distance of the near plane, in metres
+    far: float = FAR  # distance of the far plane, in metres
     orthographic: bool = False
 
     @classmethod
@@ -77,7 +82,7 @@ class ViewVolume:
         return cls(pose.position, pose.rotation, float(np.tan(pose.fovy / 2)))
 
     def metres(self, raw: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Convert reversed depth (1 near, 0 far) to distance along the optical axis, m, inf for the background."""
+        """Convert reversed depth (1 near, 0 far) to distance along the optical axis in metres."""
         depth = np.divide(self.near * self.far, self.near + raw.astype(np.float64) * (self.far - self.near))
         if self.orthographic:
             depth = self.far - raw.astype(np.float64) * (self.far - self.near)
@@ -87,7 +92,7 @@ class ViewVolume:
     def aim(self, scene: Any) -> None:
         top = self.half_height if self.orthographic else self.half_height * self.near
         forward = -self.rotation[:, 2]
-        for camera in scene.camera:  # a stereo pair, of which a mono image uses the mean
+        for camera in scene.camera:  # MuJoCo averages the two cameras of a scene if it is not in stereo
             camera.pos, camera.forward, camera.up = self.position, forward, self.rotation[:, 1]
             camera.frustum_center, camera.frustum_width = 0.0, 0.0
             camera.frustum_bottom, camera.frustum_top = -top, top
@@ -101,8 +106,8 @@ class ViewVolume:
 def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) -> CameraPose:
     """Return the pose of a camera of the model, or `camera` itself if it is a pose. `aspect` is width over height.
 
-    The eye has the person's horizontal field of view in images of any shape. Other cameras have their vertical field of
-    view, as in MuJoCo. Raises a RenderError for an unknown camera.
+    The eye camera keeps the person's horizontal field of view at every aspect ratio. Other cameras keep their vertical
+    field of view, as in MuJoCo. Raises a RenderError for an unknown camera.
     """
     if isinstance(camera, CameraPose):
         return camera
@@ -118,14 +123,16 @@ def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) 
 
 
 class Bounds(NamedTuple):
-    """Bounds of the geoms of a model, each in its own frame."""
+    """Bounding spheres and boxes of a model's geoms, in the geoms' frames."""
 
-    radii: NDArray[np.float64]  # radii of spheres around the origins, m, 0 for unbounded geoms, (ngeom,)
-    boxes: NDArray[np.float64]  # centres and half sizes of boxes, m, (ngeom, 6)
+    radii: NDArray[
+        np.float64
+    ]  # radii of spheres around the origins in metres, 0 for unbounded geoms, shape (ngeom,)
+    boxes: NDArray[np.float64]  # centres and half sizes of boxes in metres, shape (ngeom, 6)
 
     @classmethod
     def of(cls, model: Any) -> "Bounds":
-        """Compute the bounds of a model. Unlike in MuJoCo, planes with a size are bounded, as they are when drawn."""
+        """Compute the bounds of a model. Planes of finite size are bounded, unlike in MuJoCo."""
         radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
         plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
         finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
@@ -138,7 +145,7 @@ class Bounds(NamedTuple):
 def outside(
     view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Mask of spheres wholly outside a view, (n,). Some near its corners are missed. Radius 0 means unbounded."""
+    """Return a mask (n,) of the spheres outside a view. Some near its corners are missed. Radius 0 means unbounded."""
     right, up, backward = ((centres - view.position) @ view.rotation).T
     ahead, reach = -backward, radii + _MARGIN
     vertical, horizontal = view.half_height, view.half_height * aspect
@@ -154,7 +161,7 @@ def outside(
 
 @contextmanager
 def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
-    """Hide the geoms of the mask `hidden`, (ngeom,), from a scene."""
+    """Temporarily hide geoms from a scene. `hidden` is a mask of shape (ngeom,)."""
     geoms = scene.geoms[: scene.ngeom]
     # Geoms that do not belong to the model map to the extra entry at the end, which is False.
     owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]

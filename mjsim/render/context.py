@@ -1,8 +1,8 @@
 """The OpenGL context of the process, created at first use.
 
-EGL's display belongs to the process, so the context does too. Every use takes a lock, makes the context current in the
-calling thread, and afterwards restores the previous one. So any thread can draw, and other libraries' contexts are not
-affected. A switch takes about 0.03 ms.
+Each use acquires a lock, makes the context current in the calling thread, and restores the previous context
+afterwards. Any thread can therefore draw, and the contexts of other libraries are not affected. A switch takes about
+0.03 ms.
 """
 
 import atexit
@@ -27,19 +27,19 @@ EGL_REMEDY = (
     "`mjsim doctor` shows what is there"
 )
 TIMEOUT_VARIABLE = "MJSIM_GL_TIMEOUT"
-MAX_START_TIME = 60.0  # default timeout for starting a driver, s; the slowest drivers take a few seconds
+MAX_START_TIME = 60.0  # default timeout for starting an OpenGL driver, in seconds
 _MAIN_THREAD_ONLY = ("glfw", "cgl")
 _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshader")
 
 
 @dataclass(frozen=True)
 class GlInfo:
-    """The OpenGL driver of this process."""
+    """OpenGL driver of this process."""
 
     vendor: str  # GL_VENDOR
     renderer: str  # GL_RENDERER: the device or the software rasterizer
     version: str  # GL_VERSION
-    software: bool  # True if the CPU draws
+    software: bool  # True if the CPU renders
 
 
 def is_software(renderer: str) -> bool:
@@ -109,7 +109,7 @@ class _ProcessContext:
             return False
 
     def _ensure(self) -> None:
-        if self._failure is not None:  # a second attempt would give a less useful error, or hang again
+        if self._failure is not None:  # a second attempt could hang again
             raise self._failure
         if self._gl is None:
             try:
@@ -149,7 +149,6 @@ class _ProcessContext:
 
 @contextlib.contextmanager
 def _as_render_errors() -> Iterator[None]:
-    """Turn errors of the driver, such as a lost GPU or exhausted memory, into RenderErrors."""
     try:
         yield
     except (mujoco.FatalError, *_opengl_errors()) as error:
@@ -167,7 +166,7 @@ def _opengl_errors() -> tuple[type[Exception], ...]:
 def _start() -> tuple[ModuleType, Any]:
     """Load the backend and create a context, or raise a RenderError after a timeout.
 
-    A driver that hangs cannot be interrupted, so it starts in a thread, which is abandoned if it hangs.
+    A driver that hangs cannot be interrupted, so it is started in a thread that can be abandoned.
     """
     limit = _time_limit()
     answers: queue.SimpleQueue[tuple[ModuleType, Any] | RenderError] = queue.SimpleQueue()
@@ -232,9 +231,9 @@ release = _PROCESS.release
 
 
 def gl_info() -> GlInfo:
-    """Return vendor, renderer and version of OpenGL in this process, for records of runs.
+    """Return the vendor, renderer and version of OpenGL in this process.
 
-    A missing GPU driver falls back to software without a warning.
+    Without a GPU driver, OpenGL silently uses software rendering.
 
     Raises:
         RenderError: No OpenGL context can be created.

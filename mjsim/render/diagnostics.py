@@ -36,8 +36,8 @@ MODULES = {
     "ortools": "ortools",
     "opencv-python-headless": "cv2",
     "pyopengl": "OpenGL",
-}  # distribution -> module that fails to import if it does not fit the others
-# dm-control requires labmaze, which has no wheels for newer Pythons and which only mazes need.
+}  # module of each distribution that fails to import if the versions are incompatible
+# First Python version for which labmaze, a requirement of dm-control that only mazes need, has no wheels.
 WITHOUT_LABMAZE = (3, 13)
 INSTALL_DM_CONTROL = "pip install --no-deps dm-control"
 _REINSTALL = "its version does not fit the others; reinstall with pip install --upgrade mjsim"
@@ -45,22 +45,22 @@ _REINSTALL = "its version does not fit the others; reinstall with pip install --
 
 @dataclass(frozen=True)
 class EnvironmentReport:
-    """Versions, conflicts and graphics of this machine."""
+    """Package versions, conflicts and OpenGL driver of this machine."""
 
     python: str  # version of the interpreter
     platform: str  # operating system and processor
-    versions: Mapping[str, str | None]  # distribution -> version, or None if not installed
-    broken: Mapping[str, str]  # distribution -> error at import
-    hidden: tuple[str, ...]  # hints about packages that are shadowed by others of the same name
-    cache: str  # folder and size of compiled code
+    versions: Mapping[str, str | None]  # version of each distribution, None if not installed
+    broken: Mapping[str, str]  # import error of each broken distribution
+    hidden: tuple[str, ...]  # advice about packages that are shadowed by others of the same name
+    cache: str  # folder and size of the compiled-code cache
     egl_vendors: tuple[str, ...]  # names of EGL vendor files
     gl: "GlInfo | None"  # driver, or None if no context can be created
-    problem: str | None  # reason why there is no context, or None
-    advice: tuple[str, ...]  # one step per entry
+    problem: str | None  # reason why no context can be created, or None
+    advice: tuple[str, ...]  # suggested repairs
 
     @property
     def usable(self) -> bool:
-        """True if everything that trials need can be imported, and frames can be drawn."""
+        """True if all packages that trials need can be imported, and frames can be drawn."""
         missing = {name for name, version in self.versions.items() if version is None}
         if sys.version_info >= WITHOUT_LABMAZE:
             missing.discard(DM_CONTROL)  # trials do not need it
@@ -86,7 +86,7 @@ def environment_report() -> EnvironmentReport:
     gl: GlInfo | None = None
     problem: str | None = None
     try:
-        # If MuJoCo or NumPy is broken, this import fails, which the report has to show.
+        # Imported here so that the report can show an import error of MuJoCo or NumPy.
         from mjsim.render.context import gl_info
 
         gl = gl_info()

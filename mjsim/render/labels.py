@@ -1,4 +1,4 @@
-"""Labels of the pixels of a segmentation: instances and categories."""
+"""Instance and category labels of segmentation images."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,27 +13,25 @@ from mjsim.values.errors import RenderError
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
 _PERSON_ROOT = "avatar/base"
-_SAME = 1e-6  # largest distance of the same geom in two compositions, m
+_SAME = 1e-6  # tolerance in metres when matching a geom between two models
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Maps geom ids to instances and categories, where -1 stays -1."""
+    """Maps geom ids to instances and categories. The background, -1, stays -1."""
 
-    instances: tuple[
-        str, ...
-    ]  # `house`, `person`, keys of receptacles and names of objects, by instance number
-    categories: tuple[
-        str, ...
-    ]  # `house`, `person`, `receptacle` and the objects' categories, by category number
-    # instance number of each geom, then -1 for the background, int32, (ngeom + 1,)
+    # `house`, `person`, receptacle keys and object names, by instance number
+    instances: tuple[str, ...]
+    # `house`, `person`, `receptacle` and the objects' categories, by category number
+    categories: tuple[str, ...]
+    # instance number of each geom, then -1 for the background, shape (ngeom + 1,)
     instance_of_geom: NDArray[np.int32]
-    # category number of each instance, then -1 for the background, int32
+    # category number of each instance, then -1 for the background
     category_of_instance: NDArray[np.int32]
 
     @classmethod
     def of(cls, scene: Scene) -> "Labels":
-        """Label a composed episode. Equal episodes have equal labels."""
+        """Create the labels of a composed scene. Equal episodes have equal labels."""
         model, keys = scene.model, tuple(scene.receptacles)
         instances = (HOUSE, PERSON, *keys, *scene.index.names)
         of_geom = np.zeros(model.ngeom + 1, np.int32)
@@ -51,22 +49,22 @@ class Labels:
         return cls(instances, categories, of_geom, np.array(of_instance, np.int32))
 
     def instance_map(self, segmentation: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Convert geom ids of any shape to instance numbers."""
+        """Convert an array of geom ids to instance numbers."""
         return np.asarray(self.instance_of_geom[segmentation])
 
     def category_map(self, segmentation: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Convert geom ids of any shape to category numbers."""
+        """Convert an array of geom ids to category numbers."""
         return np.asarray(self.category_of_instance[self.instance_of_geom[segmentation]])
 
     def pixel_counts(self, segmentation: NDArray[np.int32]) -> dict[str, int]:
-        """Count the pixels of each visible instance, by name, from geom ids of any shape."""
+        """Return the number of pixels of each visible instance, by name, in an array of geom ids."""
         seen = self.instance_of_geom[segmentation].ravel()
         counts = np.bincount(seen[seen >= 0], minlength=len(self.instances))
         return {name: int(count) for name, count in zip(self.instances, counts, strict=True) if count}
 
 
 def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
-    """Find the geoms of a receptacle. If its body was fused into the house, compare poses with its own model."""
+    """Find the geoms of a receptacle. If they were merged into the house, match them by their poses."""
     model = scene.model
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
     if body >= 0:
@@ -93,7 +91,6 @@ def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
 
 
 def _descends(model: Any, root: int) -> NDArray[np.bool_]:
-    """Mask of `root` and its descendants, (nbody,)."""
     inside = np.zeros(model.nbody, dtype=bool)
     inside[root] = True
     for body in range(root + 1, model.nbody):  # parents come before their children

@@ -1,4 +1,4 @@
-"""Markers: decorative geoms in the house that are added for one frame. Walls hide them, except x-ray markers."""
+"""Markers: decorative geoms that are added to a scene for one frame. Walls hide all except x-ray markers."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024
-# A marker emits most of its colour and reflects a little light: it looks solid, and the same in every room.
+# A marker emits most of its colour and reflects a little light, so that it looks solid and similar in every room.
 _EMITTED = 0.62
 _LIT = 0.32
-_HIDDEN_OPACITY = 0.3  # opacity of x-ray markers behind something
+_HIDDEN_OPACITY = 0.3  # opacity of x-ray markers behind other geoms
 _AMBIENT = 0.3  # ambient light that MuJoCo adds to a scene without lights
-_DEPTH_TOLERANCE = 1e-4  # depth difference between two passes that may be due to rounding
-_OUTLINE = 1.4  # radius of the dark sphere behind an outlined one, relative to its radius
+_DEPTH_TOLERANCE = 1e-4  # tolerance for rounding errors when comparing the depths of two passes
+_OUTLINE = 1.4  # radius of an outline, relative to the radius of its sphere
 _OUTLINE_RGBA = (0.03, 0.06, 0.20, 1.0)
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
@@ -39,27 +39,27 @@ class MarkerLike(Protocol):
 
     @property
     def position(self) -> Sequence[float] | NDArray[np.float64]:
-        """Centre in the house frame, m, shape (3,)."""
+        """Centre in the house frame, in metres, shape (3,)."""
         ...
 
     @property
     def size(self) -> Sequence[float] | NDArray[np.float64]:
-        """Radius (1,), radius and half length (2,), or half sizes (3,), m."""
+        """Size in metres: radius (1,), radius and half length (2,), or half sizes (3,)."""
         ...
 
     @property
     def rgba(self) -> Sequence[float] | NDArray[np.float64]:
-        """Colour and opacity, 0 to 1, (4,)."""
+        """Colour and opacity, 0 to 1, shape (4,)."""
         ...
 
     @property
     def x_ray(self) -> bool:
-        """True if the marker also shows, dimmed, through walls."""
+        """True if the marker is visible through walls, dimmed."""
         ...
 
 
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
-    """Append markers to a scene's geoms. `flat` makes them opaque with their exact colour, for a scene without lights.
+    """Append markers to a scene's geoms. With `flat`, they are opaque with their exact colour.
 
     Raises:
         RenderError: There are too many markers, or one has an unknown shape or invalid numbers.
@@ -83,7 +83,7 @@ def add_decorative_geom(
     position: NDArray[np.float64],
     rgba: NDArray[np.float32],
 ) -> Any:
-    """Append an upright geom that belongs to no model, and that has no gloss and no segmentation."""
+    """Append an upright matt geom that belongs to no model and does not appear in segmentation images."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, shape, size, position, np.eye(3).ravel(), rgba)
     # Initialization does not reset these, so a slot may still refer to a geom of another scene.
@@ -101,9 +101,9 @@ def blend_hidden(
     scene_depth: NDArray[np.float32],
     marker_depth: NDArray[np.float32],
 ) -> None:
-    """Blend `colour` into `frame`, both (h, w, 3), in place where a marker is behind the scene.
+    """Blend `colour` into `frame` in place, wherever a marker is behind the scene.
 
-    Depths are reversed: 1 at the near plane, 0 for the background, (h, w).
+    Images have shape (h, w, 3). Depths have shape (h, w), with 1 at the near plane and 0 for the background.
     """
     hidden = (marker_depth > 0) & (marker_depth < scene_depth * (1 - _DEPTH_TOLERANCE))
     mixed = frame[hidden] * (1 - _HIDDEN_OPACITY) + colour[hidden] * _HIDDEN_OPACITY
@@ -111,7 +111,7 @@ def blend_hidden(
 
 
 def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
-    """Return the markers that a frame can show, in order. Raise a RenderError like `add_markers`."""
+    """Return the markers inside a view and their outlines. Raise a RenderError for an invalid marker."""
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
@@ -138,7 +138,7 @@ class _Outline:
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
-    """Return the sizes (3,) of a marker in MuJoCo's convention, m. Raise a RenderError if they are invalid."""
+    """Return a marker's size as MuJoCo defines it, in metres, shape (3,). Raise a RenderError if it is invalid."""
     if marker.shape not in _SHAPES:
         raise RenderError(f"marker shape {marker.shape!r} is unknown; use one of {sorted(_SHAPES)}")
     size = _numbers(marker, "size", _SIZES[marker.shape])

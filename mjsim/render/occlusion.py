@@ -1,7 +1,7 @@
-"""Occlusion culling: skipping geoms that are wholly behind one wall, as most are in a house of rooms.
+"""Occlusion culling: skip geoms that are completely hidden by one wall, as most are in a house with several rooms.
 
-Each large opaque box in view is replaced by the rectangle through its middle. A geom that is wholly in the shadow of
-the rectangle, with the eye as the light source, is invisible because the box covers it.
+Each large opaque box in view is replaced by the rectangle through its middle. A geom that is completely in the shadow
+of the rectangle, with the eye as the light source, is invisible because the box covers it.
 """
 
 from typing import Any
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import Bounds, ViewVolume
 from mjsim.support.kernels import inlined, kernel
 
-_MIN_HALF_SIZE = 0.4  # smallest half size of the faces of boxes that are tested, m
-_TESTED = 40  # number of tested boxes, largest in the view first; more boxes hide nothing else in a house
-_MARGIN = 0.01  # tolerance, far above rounding errors in single precision, m
+_MIN_HALF_SIZE = 0.4  # minimum half size of a face that may hide geoms, in metres
+_TESTED = 40  # number of boxes that are tested, those that look largest first
+_MARGIN = 0.01  # tolerance, far above rounding errors in single precision, in metres
 
 
 class BoxOccluders:
-    """The large boxes of a model that may hide other geoms. `shown` is a mask of drawn geoms, (ngeom,)."""
+    """The large boxes of a model that may hide other geoms. `shown` is a mask of drawn geoms, shape (ngeom,)."""
 
     def __init__(self, model: Any, bounds: Bounds, shown: NDArray[np.bool_]) -> None:
         size = model.geom_size
@@ -38,7 +38,7 @@ class BoxOccluders:
         rotations: NDArray[np.float64],
         seen: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
-        """Mask of the geoms in `seen` that are wholly outside a perspective view or behind a box, (ngeom,)."""
+        """Return a mask (ngeom,) of the geoms in `seen` that are outside a perspective view or hidden by a box."""
         result = np.zeros(len(seen), dtype=bool)
         if view.orthographic:
             return result
@@ -53,7 +53,7 @@ class BoxOccluders:
     def _shadows(
         self, view: ViewVolume, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return inward normals (k, 5, 3) of the planes around the boxes' shadows, and their distances (k, 5), m.
+        """Return the planes that bound the boxes' shadows: inward normals (k, 5, 3), and distances in metres (k, 5).
 
         Four planes go through the eye and the edges of the rectangle. The fifth is the rectangle's own.
         """
@@ -64,7 +64,7 @@ class BoxOccluders:
         centre, normal = positions - view.position, axes[rows, self._thin]
         across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
-        # The near plane could cut a hole into a box nearer than this.
+        # The near plane could cut open a box that is closer than this.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)
@@ -82,7 +82,6 @@ class BoxOccluders:
 def _side_planes(
     centre: NDArray[np.float64], across: NDArray[np.float64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return inward unit normals (k, 4, 3) of the planes through the eye and the edges of rectangles."""
     one, other = centre + across, centre - across
     corners = np.stack([one + along, other + along, other - along, one - along], axis=1)
     sides = np.cross(corners, np.roll(corners, -1, axis=1))
@@ -91,7 +90,6 @@ def _side_planes(
 
 
 def _pyramid(view: ViewVolume, aspect: float) -> NDArray[np.float64]:
-    """Return inward unit normals (4, 3) of the side planes of a perspective view."""
     right, up, backward = view.rotation.T
     horizontal, vertical = -view.half_height * aspect * backward, -view.half_height * backward
     sides = np.stack([horizontal - right, horizontal + right, vertical - up, vertical + up])
@@ -107,10 +105,6 @@ def _outside_or_covered(
     rotations: NDArray[np.float64],
     boxes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Mask of the boxes (c,) that are outside the view, or wholly inside the shadow of an occluder.
-
-    Takes inward normals of the view (4, 3) and the shadows (k, 5, 3), the shadows' offsets, m, and the boxes' frames.
-    """
     result = np.zeros(len(away), np.bool_)
     for c in range(len(away)):
         for side in range(len(pyramid)):
@@ -136,7 +130,6 @@ def _extent(
     rotation: NDArray[np.float64],
     box: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Return the middle and half the extent of a box along a direction, m."""
     middle = reach = 0.0
     for axis in range(3):
         along = normal[0] * rotation[0, axis] + normal[1] * rotation[1, axis] + normal[2] * rotation[2, axis]
@@ -154,7 +147,6 @@ def _opaque(model: Any, ids: NDArray[np.int_]) -> NDArray[np.bool_]:
 
 
 def _see_through_texture(model: Any) -> NDArray[np.bool_]:
-    """Mask of the geoms whose texture has an alpha channel, (ngeom,)."""
     if not model.nmat or not model.ntex:
         return np.zeros(model.ngeom, dtype=bool)
     textures = model.mat_texid.reshape(model.nmat, -1)

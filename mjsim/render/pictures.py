@@ -1,4 +1,4 @@
-"""Pictures of single objects and receptacles, and pictures of houses from above with an exact scale."""
+"""Pictures of objects and receptacles, and floor plans of houses."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ from mjsim.values.errors import AssetError, RenderError
 
 SUPERSAMPLING = 3
 FILL = 0.92  # share of the picture's side that its subject fills
-# The camera looks from the front right (receptacles face -y), and from higher up at flat objects.
+# The camera looks from the front right (receptacles face -y), and from a higher position at flat objects.
 _AZIMUTH = np.deg2rad(28.0)
 _ELEVATION = np.deg2rad(32.0)
 _ELEVATION_FLAT = np.deg2rad(52.0)
-_FLAT = 0.3  # largest height of flat objects, as a share of their width
-# A main light from the upper left, and a weaker one that distinguishes the shaded sides
+_FLAT = 0.3  # maximum height of a flat object, relative to its width
+# A main light from the upper left, and a weaker one for the shaded sides
 _LIGHTS = (
     DirectionalLight((0.75, 0.35, -0.75), diffuse=0.62, ambient=0.42),
     DirectionalLight((-0.7, 0.6, -0.2), diffuse=0.28),
@@ -35,19 +35,19 @@ _LIGHTS = (
 _DISTANCE = 5.0
 _PROFILE = RenderProfile("picture", skybox=False)
 _PAPER = 244  # grey level of the background
-_HEIGHT = 10.0  # height of the camera, above any house of one storey, m
+_HEIGHT = 10.0  # height of the camera above the floor, in metres
 _PLAN_LIGHTS = (DirectionalLight((0.25, -0.35, -1.0), diffuse=0.55, ambient=0.5),)
 _PLAN_PROFILE = RenderProfile("floorplan", supersampling=2.0, skybox=False)
 
 
 def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[np.uint8]]:
-    """Draw all objects and receptacles of a catalogue as RGBA (size, size, 4) with straight alpha.
+    """Draw all objects and receptacles of a catalogue as RGBA images (size, size, 4) with straight alpha.
 
     The keys are `object:<key>` and `receptacle:<key>`.
 
     Raises:
         AssetError: A model file does not compile.
-        RenderError: No OpenGL context can be created, the size is invalid, or a model shows nothing.
+        RenderError: No OpenGL context can be created, the size is invalid, or a model has no visible geoms.
     """
     files = {f"object:{key}": entry.path for key, entry in catalogue.objects.items()}
     files |= {f"receptacle:{key}": entry.path for key, entry in catalogue.receptacles.items()}
@@ -55,7 +55,12 @@ def render_pictures(catalogue: Catalogue, size: int = 96) -> dict[str, NDArray[n
 
 
 def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
-    """Draw an MJCF file as RGBA (size, size, 4) with straight alpha. Raises errors like `render_pictures`."""
+    """Draw an MJCF file as an RGBA image of shape (size, size, 4) with straight alpha.
+
+    Raises:
+        AssetError: The file does not compile.
+        RenderError: No OpenGL context can be created, the size is invalid, or the model has no visible geoms.
+    """
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
@@ -64,7 +69,7 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
 
 
 def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
-    """Draw a compiled model as RGBA (size, size, 4) with straight alpha. `name` is used in errors."""
+    """Draw a compiled model as an RGBA image (size, size, 4) with straight alpha. `name` appears in errors."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if not 1 <= size <= 1024:
@@ -78,7 +83,6 @@ def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
 
 
 def _first_view(model: Any, data: Any) -> ViewVolume:
-    """Return an orthographic view that contains the whole model."""
     low, high = _bounds(model, data)
     centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     flat = (high - low)[2] < _FLAT * max((high - low)[:2])
@@ -96,7 +100,6 @@ def _first_view(model: Any, data: Any) -> ViewVolume:
 
 
 def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the corners of the box around the drawn geoms, m, (3,) each."""
     shown = np.isin(model.geom_group, FIRST_PERSON_GROUPS)
     if not shown.any():
         raise RenderError("a model without geoms in the groups 0 to 2 has no picture; add visual geoms")
@@ -108,7 +111,7 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
-    """Shift and scale the view twice so that the subject fills the picture, the second time finely."""
+    """Shift and scale the view so that the subject fills the picture. The second pass refines the first."""
     for _ in range(2):
         mask = rasteriser.geometry(view)[0] >= 0
         if not mask.any():
@@ -143,12 +146,12 @@ def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> ND
 class FloorPlan:
     """An orthographic picture from above. North (+y) is up."""
 
-    rgb: NDArray[np.uint8]  # uint8, (height, width, 3), rows from the top
-    bounds: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax, m
+    rgb: NDArray[np.uint8]  # shape (height, width, 3), rows from the top
+    bounds: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax, in metres
     pixels_per_metre: float
 
     def to_pixels(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Convert points in the house (k, 2), m, to columns and rows (k, 2). Pixel centres are at half-integers."""
+        """Convert floor points in metres to columns and rows, both (k, 2). Pixel centres are at half-integers."""
         points = np.asarray(xy, dtype=np.float64)
         corner = np.array([self.bounds[0], self.bounds[3]])
         return np.asarray((points - corner) * [self.pixels_per_metre, -self.pixels_per_metre])
@@ -160,7 +163,10 @@ def render_floorplan(
     bounds: tuple[float, float, float, float],
     pixels_per_metre: float = 60.0,
 ) -> FloorPlan:
-    """Draw a house from above, without ceilings (geom group 1) and person, within (xmin, ymin, xmax, ymax), m."""
+    """Draw a house from above, without ceilings (geom group 1) and without the person.
+
+    `bounds` are (xmin, ymin, xmax, ymax) in metres.
+    """
     xmin, ymin, xmax, ymax = bounds
     if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax and pixels_per_metre > 0):
         raise RenderError(
@@ -196,7 +202,7 @@ def _person_geoms(model: Any) -> NDArray[np.bool_]:
 
 
 def largest_scale(bounds: tuple[float, float, float, float]) -> float:
-    """Return the largest scale, pixels per metre, at which bounds (xmin, ymin, xmax, ymax), m, can be drawn."""
+    """Return the largest scale, in pixels per metre, at which an area (xmin, ymin, xmax, ymax) can be drawn."""
     xmin, ymin, xmax, ymax = bounds
     return (MAX_SIDE / _PLAN_PROFILE.supersampling - 1) / max(xmax - xmin, ymax - ymin)
 
@@ -204,11 +210,13 @@ def largest_scale(bounds: tuple[float, float, float, float]) -> float:
 def render_house_map(
     catalogue: Catalogue, bounds: tuple[float, float, float, float], pixels_per_metre: float = 40.0
 ) -> NDArray[np.uint8]:
-    """Draw a tidy house from above within (xmin, ymin, xmax, ymax), m, as RGBA, uint8, (height, width, 4).
+    """Draw a house without misplaced objects from above, as an RGBA image of shape (height, width, 4).
+
+    `bounds` are (xmin, ymin, xmax, ymax) in metres.
 
     Raises:
         AssetError: The house does not compile.
-        RenderError: As for `render_floorplan`.
+        RenderError: The bounds are invalid, or no OpenGL context can be created.
     """
     model = compiled_house(catalogue).model
     data = mujoco.MjData(model)

@@ -1,4 +1,4 @@
-"""Render profiles: quality and cost of frames."""
+"""Render profiles, which trade image quality for speed."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ class RenderProfile:
 
     Attributes:
         name: Name in records and error messages.
-        supersampling: Factor of 1 to 4 by which frames are drawn larger and then reduced.
+        supersampling: Factor, 1 to 4, by which frames are drawn larger before they are reduced.
         samples: Multisamples per pixel, 0 for none.
         shadow_size: Side of a shadow map in texels, 0 for no shadows.
         reflections: True if reflective materials mirror the scene.
-        skybox: True if the model's skybox is the background.
+        skybox: True if the model's skybox is drawn.
         textures: True if materials show their textures.
         contact_shadows: True for dark spots under free objects near the floor, for profiles without shadow maps.
     """
@@ -44,11 +44,11 @@ class RenderProfile:
 
 
 DRAFT = RenderProfile("draft", skybox=False, textures=False)
-"""Flat colours."""
+"""Flat colours without textures."""
 # A frame of 640 x 480 is drawn at 800 x 600. On a CPU, this costs 8 ms, and multisampling would cost 40 ms.
 FAST = RenderProfile("fast", supersampling=1.25, contact_shadows=True)
 """Smooth edges and contact shadows, at little cost on a CPU."""
-# Smaller shadow maps make floors speckled in a house of this size.
+# Smaller shadow maps cause speckled floors.
 QUALITY = RenderProfile("quality", supersampling=1.5, samples=4, shadow_size=4096, reflections=True)
 """Multisampling, fine shadows and reflections."""
 
@@ -57,7 +57,7 @@ PROFILES = {profile.name: profile for profile in (DRAFT, FAST, QUALITY)}
 
 
 def resolve_profile(profile: str | RenderProfile) -> RenderProfile:
-    """Return a profile itself, or find it by name. Raise a RenderError for an unknown name."""
+    """Return the profile of a given name, or a given profile. Raise a RenderError for an unknown name."""
     if isinstance(profile, RenderProfile):
         return profile
     if profile not in PROFILES:

@@ -1,4 +1,4 @@
-"""Renderers: first-person frames with depth and segmentation, and fast frames from cameras that rest."""
+"""Off-screen renderers for colour, depth and segmentation, and a faster one for stationary cameras."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -14,27 +14,27 @@ from mjsim.render.markers import MarkerLike, blend_hidden
 from mjsim.render.profiles import RenderProfile, resolve_profile
 from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, Layer, Rasteriser, reduced
 
-REST = 25  # number of frames without movement after which a geom counts as resting
+REST = 25  # number of frames without movement after which a geom counts as stationary
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Images of one moment from one camera, rows from the top. Channels that were not requested are None."""
+    """Images from one camera at one moment, rows from the top. Channels that were not requested are None."""
 
     camera: CameraPose
-    rgb: NDArray[np.uint8] | None  # colour, uint8, (height, width, 3)
-    # distance along the optical axis, m, inf for the background, float32, (height, width)
+    rgb: NDArray[np.uint8] | None  # colour, shape (height, width, 3)
+    # distance along the optical axis in metres, inf for the background, shape (height, width)
     depth: NDArray[np.float32] | None
-    segmentation: NDArray[np.int32] | None  # geom ids, -1 for the background, int32, (height, width)
+    segmentation: NDArray[np.int32] | None  # geom ids, -1 for the background, shape (height, width)
 
 
 class OffScreenRenderer:
-    """Owner of the rasteriser of one model. Close it, or use it as a context manager.
+    """Base class of renderers. Close a renderer after use, or use it as a context manager.
 
     Args:
         model: Compiled model.
-        width: Width of frames, pixels.
-        height: Height of frames, pixels.
+        width: Width of frames in pixels.
+        height: Height of frames in pixels.
         profile: `draft`, `fast`, `quality` or a custom profile.
         groups: Geom groups to draw (docs/models.md).
 
@@ -67,14 +67,14 @@ class OffScreenRenderer:
 
 
 class Renderer(OffScreenRenderer):
-    """Draws a model off screen.
+    """Draws a model off-screen.
 
-    Any thread may call it, one at a time. Frames are bit-identical across calls and processes on one OpenGL driver (see
-    `gl_info`). Poses are those of the last `mj_forward` or `mj_step` of the data.
+    Any thread may use a renderer, but only one at a time. Frames are bit-identical across calls and processes on one
+    OpenGL driver (see `gl_info`). Call `mj_forward` after changing the data, because poses are not computed here.
 
     Raises:
-        RenderError: In all methods that draw, for an unknown camera, an invalid marker, data of another model, or a
-            closed renderer.
+        RenderError: Raised by all drawing methods for an unknown camera, an invalid marker, data of another model, or
+            a closed renderer.
     """
 
     @property
@@ -92,12 +92,12 @@ class Renderer(OffScreenRenderer):
     def rgb(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.uint8]:
-        """Draw a colour image (height, width, 3), contiguous, rows from the top.
+        """Draw a contiguous colour image of shape (height, width, 3), rows from the top.
 
         Args:
             data: State of the renderer's model.
             camera: Name of a camera of the model, or a pose.
-            markers: Markers to draw. The scene hides them, except those with `x_ray`.
+            markers: Markers to draw. Geoms in front hide all except x-ray markers.
         """
         with context.current_context():
             view = self._look(data, camera)
@@ -106,15 +106,15 @@ class Renderer(OffScreenRenderer):
     def depth(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.float32]:
-        """Draw distances along the optical axis, m, (height, width), inf for the background.
+        """Draw distances along the optical axis in metres, shape (height, width), inf for the background.
 
-        Glass counts as solid, and so do markers, if given."""
+        Glass and markers count as solid."""
         with context.current_context():
             view = self._look(data, camera)
             return view.metres(self._rasteriser.geometry(view, markers)[1])
 
     def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
-        """Draw geom ids, (height, width), -1 for the background. Glass counts as solid."""
+        """Draw geom ids, shape (height, width), -1 for the background. Glass counts as solid."""
         with context.current_context():
             return self._rasteriser.geometry(self._look(data, camera))[0]
 
@@ -144,7 +144,7 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> tuple[Frame, ...]:
-        """Draw the same moment from several cameras, with one update of the scene."""
+        """Draw the same moment from several cameras."""
         poses = [camera_pose(self._model, data, camera, self.width / self.height) for camera in cameras]
         with context.current_context():
             self._rasteriser.update(data)
@@ -169,12 +169,11 @@ class Renderer(OffScreenRenderer):
 
 
 class LayeredRenderer(OffScreenRenderer):
-    """Draws a model off screen, several times as fast as a `Renderer` while the camera rests.
+    """Draws a model off-screen, several times as fast as a `Renderer` while the camera is stationary.
 
-    Moving things and markers are drawn over a picture of resting things, according to their depth. Moving things behind
-    others show faintly, as x-ray markers do. Everything is drawn in one pass with profiles that have shadow maps,
-    reflections or multisampling, because there a moving thing changes everything, and if a moving thing is translucent,
-    because it has no depth.
+    Moving geoms and markers are drawn over a cached image of stationary geoms, according to their depth. Moving geoms
+    behind others show faintly, as x-ray markers do. The cache is not used with shadow maps, reflections or
+    multisampling, or while a translucent geom moves.
     """
 
     def __init__(self, model: Any, **options: Any) -> None:
@@ -189,7 +188,7 @@ class LayeredRenderer(OffScreenRenderer):
         self._rest: Layer | None = None
 
     def rgb(self, data: Any, camera: CameraPose, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Draw a colour image (height, width, 3), rows from the top. The camera rests if it is the same object."""
+        """Draw a colour image (height, width, 3). Pass the same `camera` object while the camera is stationary."""
         with context.current_context():
             self._rasteriser.update(data)
             view, still = ViewVolume.of(camera), camera is self._camera
@@ -249,7 +248,6 @@ class _Solid:
 
 
 def _translucent(model: Any) -> NDArray[np.bool_]:
-    """Mask of the translucent geoms, (ngeom,)."""
     material = model.geom_matid
     opacity = (
         np.where(material >= 0, model.mat_rgba[material, 3], 1.0) if model.nmat else np.ones(model.ngeom)

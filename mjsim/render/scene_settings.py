@@ -16,15 +16,15 @@ _Flag = mujoco.mjtRndFlag
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity, to replace the model's lights."""
+    """Directional light that replaces the model's lights."""
 
-    direction: tuple[float, float, float]  # direction of its rays, of any length
-    diffuse: float  # strength on a perpendicular surface
-    ambient: float = 0.0  # strength everywhere
+    direction: tuple[float, float, float]  # direction of the rays, need not be normalized
+    diffuse: float  # intensity on a perpendicular surface
+    ambient: float = 0.0  # intensity on all surfaces
 
 
 def checked_size(pixels: int) -> int:
-    """Return a valid side of a frame. Raise a RenderError if it is not an integer from 1 to `MAX_SIDE`."""
+    """Return a frame's width or height. Raise a RenderError if it is not an integer from 1 to `MAX_SIDE`."""
     if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
         raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
     return int(pixels)
@@ -43,7 +43,7 @@ def visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
 
 @contextmanager
 def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
-    """Temporarily set the buffer sizes of a model, pixels, which a new MuJoCo context reads from there."""
+    """Temporarily set the buffer sizes in a model, from which a new MuJoCo context reads them."""
     general, quality = model.vis.global_, model.vis.quality
     kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
     general.offwidth, general.offheight = size

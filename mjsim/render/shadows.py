@@ -1,4 +1,4 @@
-"""Contact shadows: soft dark spots under free objects near the floor, where shadow maps would be too slow.
+"""Contact shadows: soft dark spots under free objects near the floor, as a fast replacement for shadow maps.
 
 A spot is a flat box with a soft round texture, added to the scene for one frame. It is as wide as the object above it,
 and fades as the object is lifted. It affects neither depth nor segmentation.
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import ViewVolume, outside
 from mjsim.render.markers import add_decorative_geom
 
-# Material of the house with a round texture whose alpha fades outwards. Without it there are no spots.
+# Material with a round texture whose alpha fades outwards. Houses without it have no contact shadows.
 MATERIAL = "shadow_round"
-BORDER = 0.05  # width of a spot beyond the object, since the texture is faint at the edge, m
-# Height of a spot above the object's lowest point, m. It is above rugs and drawn shadows (at most 5 mm, docs/models.md)
-# and below the bottom of a plate (7 mm), which would look grey under it.
+BORDER = 0.05  # width of a spot beyond the object in metres, because the texture is faint at the edge
+# Height of a spot above the object's lowest point, in metres. Spots must be above rugs (at most 5 mm, docs/models.md),
+# and below the bottom of a plate (7 mm).
 LIFT = 0.006
 _THICKNESS = 1e-4
-REACH = 0.3  # height of an object above which it has no spot, m
+REACH = 0.3  # height above which an object has no contact shadow, in metres
 
 
 class ContactShadows:
-    """Contact shadows of the free bodies of a model. `shown` is a mask of drawn geoms, (ngeom,)."""
+    """Contact shadows of the free bodies of a model. `shown` is a mask of drawn geoms, shape (ngeom,)."""
 
     def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
@@ -39,7 +39,7 @@ class ContactShadows:
 
     @property
     def count(self) -> int:
-        """Largest number of geoms that `add` appends."""
+        """Maximum number of geoms that `add` appends."""
         return len(self._starts)
 
     def add(
@@ -50,7 +50,7 @@ class ContactShadows:
         positions: NDArray[np.float64],
         rotations: NDArray[np.float64],
     ) -> None:
-        """Append the spots in view to a scene with space for `count` more geoms."""
+        """Append the visible spots to a scene that has room for `count` more geoms."""
         if not len(self._starts) or self._material < 0:
             return
         low, high = self._boxes(positions[self._geoms], rotations[self._geoms])
@@ -75,7 +75,6 @@ class ContactShadows:
     def _boxes(
         self, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the lower and upper corners (n, 3) of the bodies' axis-aligned boxes."""
         middle = positions + np.einsum("cij,cj->ci", rotations, self._bounds[:, :3])
         reach = np.einsum("cij,cj->ci", np.abs(rotations), self._bounds[:, 3:])
         lower = np.minimum.reduceat(middle - reach, self._starts, axis=0)
