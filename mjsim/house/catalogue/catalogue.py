@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """An object model that episodes can misplace."""
+    """An object model that can be misplaced in an episode."""
 
     key: str  # key in the catalogue, such as `mug`
     label: str  # name shown to participants, such as `Blue mug`
@@ -132,7 +132,7 @@ class Catalogue:
 
     @classmethod
     def read(cls, house: HouseRef) -> "Catalogue":
-        """Read and check a catalogue. A home that has not been generated yet is not generated.
+        """Read and check a catalogue. Unlike `mjsim.load_catalogue`, this never generates a home.
 
         Raises:
             AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or

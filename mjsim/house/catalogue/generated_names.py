@@ -108,7 +108,7 @@ def stream(seed: int, *purpose: str) -> "np.random.Generator":
 
     Purposes have independent generators, so drawing more for one does not change the others.
     """
-    import numpy as np  # slow import: every command parses house names, even for --help
+    import numpy as np  # imported here because it is slow and every command parses house names, even for --help
 
     digest = hashlib.sha256("/".join(purpose).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]

@@ -63,7 +63,7 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points (k, 3), in metres, whose outline from above contains a geom and whose z range equals the geom's.
+    """Return points (k, 3) in metres that enclose a geom seen from above and have the same z range as the geom.
 
     Raises:
         AssetError: The geom is a plane or a height field.

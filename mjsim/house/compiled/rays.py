@@ -58,7 +58,7 @@ def moving_geoms(model: mujoco.MjModel) -> Mask:
 
 
 def sees(model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, point: Floats) -> bool:
-    """Return True if no static solid geom is between two points (3,), in metres."""
+    """Return True if no static solid geom is on the line between two points (3,), in metres."""
     return first_hit(model, data, eye, point - eye, through=moving_geoms(model), reach=1.0)[0] >= 1.0
 
 

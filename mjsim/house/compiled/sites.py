@@ -23,7 +23,7 @@ class RoomMap:
     ]  # labels shown to participants ("Kitchen") by room key, in the catalogue's order
     keys: tuple[str, ...]  # room key of each of the k rectangles
     centers: NDArray[np.float64]  # centres in metres, shape (k, 2)
-    half_sizes: NDArray[np.float64]  # half extents along the rectangle's own axes in metres, shape (k, 2)
+    half_sizes: NDArray[np.float64]  # half extents in metres along the rectangle's own axes, shape (k, 2)
     axes: NDArray[np.float64]  # rectangle axes as columns, shape (k, 2, 2)
 
     @classmethod
@@ -130,7 +130,7 @@ class ReceptacleGeometry:
     center: NDArray[
         np.float64
     ]  # centre of the volume in which objects count as delivered, in metres, shape (3,)
-    half_size: NDArray[np.float64]  # half extents along the volume's own axes in metres, shape (3,)
+    half_size: NDArray[np.float64]  # half extents in metres along the volume's own axes, shape (3,)
     rotation: NDArray[np.float64]  # axes of the volume as columns, shape (3, 3)
     approach: NDArray[np.float64]  # floor point at which a person stands to use it, in metres, shape (2,)
 

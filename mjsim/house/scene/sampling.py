@@ -229,7 +229,6 @@ def _start(episode: Episode, navigable: NavigablePoints, rng: np.random.Generato
 def _start_candidates(
     centroid: NDArray[np.float64], rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
-    """Yield the objects' centroid (2,), then random points in growing circles around it."""
     yield centroid
     for radius in RADIUS_STEP * np.arange(1, RADII + 1):
         for _ in range(DRAWS_PER_RADIUS):

@@ -80,7 +80,6 @@ class PotentialVisibility:
 
 
 def _balls(scene: Scene) -> tuple[Floats, Floats]:
-    """Return bounding balls of the objects: centres (n, 3) in the object frames, and radii (n,), in metres."""
     scene = scene if scene.visuals else scene.counterpart(visuals=True)
     model, owner = scene.model, scene.index.geom_owner
     data = mujoco.MjData(model)
@@ -177,7 +176,6 @@ def _may_see(
 
 @kernel
 def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegments) -> int:
-    """Return `_OPEN` if some ray to the centre or an edge of a ball passes no wall, else `_HIDDEN`."""
     ray = center - eye
     level = math.hypot(ray[0], ray[1])
     distance = math.hypot(level, ray[2])
@@ -196,7 +194,6 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegme
 
 @kernel
 def _is_blocked(start: Floats, end: Floats, reach: float, walls: _WallSegments) -> bool:
-    """Return True if the first `reach` (a fraction) of the line from `start` to `end`, (3,) each, meets a wall."""
     for w in range(len(walls.centers)):
         enter, leave = 0.0, reach
         for k in range(3):

@@ -113,7 +113,6 @@ def cast_down(
 
 @kernel
 def _into_geom(start: Floats, along: Floats, geom: int, shapes: Shapes) -> float:
-    """Return how far along a ray in the geom's frame it enters a geom that is not a box, or -1."""
     kind, size = shapes.types[geom], shapes.sizes[geom]
     if kind != _MESH:
         return _into_round(start, along, size, kind)

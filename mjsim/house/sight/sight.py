@@ -20,7 +20,7 @@ from mjsim.house.sight.drawn_state import drawn_state, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.person_parameters import PersonParameters
 
-# Rays go to points at this fraction of the half extents. The corners of a box around a round object are empty.
+# Rays aim at points at this fraction of the half extents, because the corners of a bounding box are often empty.
 INSET = 0.7
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
 _MARGIN = 1e-6  # tolerance for rounding errors, in metres
@@ -163,7 +163,6 @@ def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaz
 def _object_hits(
     scene: Scene, data: mujoco.MjData, gaze: _Gaze, among: Collection[str] | None, *, once: bool
 ) -> Iterator[int]:
-    """Yield an object's index for each ray that hits the object first, at most once per object if `once`."""
     scene, data = drawn_state(scene, data)
     sight, names = _sight(scene), scene.index.names
     looked_for = frozenset(names if among is None else among)
@@ -228,7 +227,6 @@ def _open_rays(
 def _bounding_boxes(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask
 ) -> tuple[Floats, Floats]:
-    """Return the lower and upper corners, both (n, 3), of axis-aligned boxes around the wanted objects."""
     low, high = np.full((len(wanted), 3), np.inf), np.full((len(wanted), 3), -np.inf)
     for geom, i, box in zip(sight.geoms, sight.owners, sight.boxes):  # noqa: B905 - numba has no `strict`
         if not wanted[i]:

@@ -36,7 +36,7 @@ _KIND = {
 class Compiled:
     """A compiled model in its initial state."""
 
-    subject: str  # how findings name the model, such as `object mug`
+    subject: str  # name of the model in findings, such as `object mug`
     path: Path
     model: mujoco.MjModel
     data: mujoco.MjData  # initial state, with computed poses of bodies, geoms and sites
@@ -60,7 +60,7 @@ class Compiled:
         return np.flatnonzero(seen)
 
     def points(self, geom: int) -> NDArray[np.float64]:
-        """Return points (k, 3), in metres, with the same outline from above and the same bounding box as a geom."""
+        """Return points (k, 3) in metres that enclose a geom seen from above and share its bounding box."""
         rotation = self.data.geom_xmat[geom].reshape(3, 3)
         return outline_points(self.model, geom, self.data.geom_xpos[geom], rotation)
 

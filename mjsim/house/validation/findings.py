@@ -14,7 +14,7 @@ class Finding:
     """A fault of a model or an episode."""
 
     rule: str  # broken rule, such as `mass`: a heading in docs/models.md
-    subject: str  # what is faulty, such as `object mug`, `house` or `object_03`
+    subject: str  # faulty model or object, such as `object mug`, `house` or `object_03`
     message: str  # description of the fault, with the faulty value
     remedy: str
     severity: Severity = (

@@ -25,7 +25,7 @@ HEADROOM = 2.0  # height of the tallest person's eyes, in metres
 _RAYS = 3000
 # Geom groups in which things can hang: colliding geoms, ceilings and lamps
 _HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)
-_CHEST = 1.0  # start height of vertical rays, in metres; free wherever a person can stand
+_CHEST = 1.0  # start height of vertical rays, in metres, which is free wherever a person can stand
 
 
 def check_floor(floor: WalkableFloor) -> list[Finding]:
@@ -166,7 +166,6 @@ def _places(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
-    """Return the centres (k, 2) of colliding geoms on the walkable floor that are too low to count as obstacles."""
     compiled, found = floor.compiled, [np.empty((0, 2))]
     points, area = floor.walkable
     for geom in compiled.solid:
@@ -181,7 +180,6 @@ def _low_things(floor: WalkableFloor) -> NDArray[np.float64]:
 
 
 def _free(compiled: Compiled, point: NDArray[np.float64], up: float) -> float:
-    """Return the distance from chest height above a point (2,) to the next solid geom, up (1) or down (-1)."""
     geom = np.zeros(1, np.int32)
     start, along = np.array([*point, _CHEST]), np.array([0.0, 0.0, up])
     distance = mujoco.mj_ray(compiled.model, compiled.data, start, along, _HANGING, 1, -1, geom)

@@ -26,8 +26,8 @@ AREA = 0.1  # maximum floor area that a mesh's convex hull may cover but the mes
 _SIDE = 24  # number of grid points along each side of a hull's outline
 _MAX_CROSSINGS = 50
 SIZE = (1.5, 150.0)  # minimum and maximum side of the rectangle around all rooms, in metres
-GRAVITY = (0.0, 0.0, -9.81)  # in m/s^2
-GRAVITY_SLACK = 0.1  # tolerance in m/s^2
+GRAVITY = (0.0, 0.0, -9.81)  # standard gravity in m/s^2
+GRAVITY_SLACK = 0.1  # accepted deviation from the standard gravity in m/s^2
 OVERLAP = 0.05  # maximum overlap of two rooms in m^2
 MOUNT = "mount:"
 RESERVED = "avatar"
@@ -111,7 +111,6 @@ def _options(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _names(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
-    """Find names with prefixes that are reserved for receptacles, objects and the person."""
     model = compiled.model
     taken = {RESERVED, *catalogue.receptacles}
     kinds = (("body", model.nbody), ("geom", model.ngeom), ("site", model.nsite))

@@ -180,7 +180,6 @@ def _grip(
 
 
 def _distance(compiled: Compiled, geom: int, at: NDArray[np.float64]) -> float:
-    """Return the distance from a point (3,) to the bounding box of a geom along the geom's own axes."""
     box = compiled.model.geom_aabb[geom]
     local = compiled.data.geom_xmat[geom].reshape(3, 3).T @ (at - compiled.data.geom_xpos[geom])
     return float(np.linalg.norm(np.maximum(np.abs(local - box[:3]) - box[3:], 0.0)))

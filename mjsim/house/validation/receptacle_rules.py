@@ -162,7 +162,6 @@ def _contacts(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _ray(compiled: Compiled, start: NDArray[np.float64], along: NDArray[np.float64]) -> tuple[float, int]:
-    """Return the distance and id of the first colliding geom along a ray, or -1 and -1 if it hits none."""
     geom = np.array([-1], np.int32)
     groups = np.array([1, 0, 0, 1, 0, 0], np.uint8)
     return mujoco.mj_ray(compiled.model, compiled.data, start, along, groups, 1, -1, geom), int(geom[0])

@@ -143,7 +143,7 @@ class Carrying:
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:
-        """Count strain in this control step, and return the hands whose loads have been strained for too long."""
+        """Count strained control steps, and return the hands whose loads have been strained for too long."""
         person, options = self._person, self._person.options
         left, right = person.held
         if left is None and right is None:

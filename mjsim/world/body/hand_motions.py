@@ -61,7 +61,6 @@ def pick(
 
 
 def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
-    """Move the hand above an object, then down to it, following the object if it moves."""
     steps = person.steps(person.motion.reach_time)
     for _ in person.swing(
         hand, lambda: person.rig.to_body(person.grips.point(item, grip)), steps, ACROSS_FIRST
@@ -71,7 +70,6 @@ def _reach(person: Person, hand: int, item: int, grip: int) -> Steps:
 
 
 def _lift(person: Person, hand: int, goal: NDArray[np.float64], pitch: float) -> Steps:
-    """Lift straight up first, to avoid low obstacles, then move the hand to the body."""
     for _ in range(person.steps(person.motion.align_time)):
         yield
     for _ in person.swing(hand, lambda: goal, person.steps(person.motion.lift_time), UP_FIRST):
@@ -122,7 +120,6 @@ def _hand_in_body(person: Person, receptacle: ReceptacleGeometry, local: Vector)
 
 
 def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Vector) -> Steps:
-    """Move up to the hover height, then across to the hover position (3,) in the receptacle's frame."""
     target = person.rig.hand_targets[hand]
 
     def above() -> Vector:
@@ -183,7 +180,6 @@ def deepest_overlap(
 
 
 def _settle(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Withdraw the hand upwards, and wait until the released object rests."""
     options, motion = person.options, person.motion
     still = 0
     for step in range(person.steps(options.settle_time)):

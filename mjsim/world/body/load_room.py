@@ -28,8 +28,8 @@ EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 class BodyMotion(NamedTuple):
     """Pose and command of the body, and the clearance around it."""
 
-    pose: Floats  # x, y, heading, and further values, in metres and radians, shape (10,) or longer
-    command: Floats  # forward and left velocity, yaw rate, and further values, in m/s and rad/s, shape (3,) or longer
+    pose: Floats  # starts with x, y (metres) and heading (radians), shape (10,) or longer
+    command: Floats  # starts with the forward and left velocity (m/s) and the yaw rate (rad/s), shape (3,) or longer
     clearance: ClearanceField  # clearance at the heights of carried objects
 
 
@@ -96,7 +96,6 @@ def _sideways(
 
 @kernel
 def _room(forward: float, left: float, horizon: float, body: BodyMotion) -> tuple[float, float, float]:
-    """Return the clearance at a point of the body frame after `horizon` seconds, and its direction of increase."""
     pose, command = body.pose, body.command
     forward += command[FORWARD] * horizon
     left += command[LEFT] * horizon

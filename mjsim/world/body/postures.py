@@ -29,10 +29,10 @@ class Hands(NamedTuple):
     """Control of both hands, left before right, in the body frame."""
 
     targets: Floats  # commanded positions in metres, shape (2, 3)
-    velocities: Floats  # velocities of the targets in m/s, shape (2, 3)
+    velocities: Floats  # target velocities in m/s, shape (2, 3)
     compliance: Floats  # offsets by which the hands yield to contacts, in metres, shape (2, 2)
     goals: Floats  # buffer for the goals of the targets, in metres, shape (2, 3)
-    rest: Floats  # rest posture of the left hand in metres, shape (3,)
+    rest: Floats  # rest posture of the left hand, in metres, shape (3,)
     loads: Floats  # horizontal radius of each object around its grip and extent below the grip, in metres, shape (n, 2)
     pace: Floats  # gain (1/s), speed limit (m/s) and acceleration limit (m/s^2) of the targets, shape (3,)
 
@@ -51,7 +51,7 @@ class Holding(NamedTuple):
     left: int  # index of the object in the hand, or -1
     right: int
     moving: int  # hand that a motion moves, or -1
-    posture: Floats  # posture of a loaded left hand in metres, shape (3,)
+    posture: Floats  # posture of a loaded left hand, in metres, shape (3,)
 
 
 def posture_pace(motion: MotionParameters) -> Floats:
@@ -162,7 +162,6 @@ def _give_way(
     carrying: CarryingParameters,
     dt: float,
 ) -> None:
-    """Move a hand's offset along a contact's normal. At its limit, keep the body from moving into the contact."""
     command, target, offset = body.command, hands.targets[hand], hands.compliance[hand]
     c, s = math.cos(body.pose[HEADING]), math.sin(body.pose[HEADING])
     away_f, away_l = c * nx + s * ny, c * ny - s * nx

@@ -34,7 +34,7 @@ class RigState:
 
     motion: Vector  # see `Rig.motion`, shape (4,)
     hand_targets: Vector  # see `Rig.hand_targets`, in metres, shape (2, 3)
-    previous_hand_targets: Vector  # `hand_targets` of the previous control step in metres, shape (2, 3)
+    previous_hand_targets: Vector  # `hand_targets` in the previous control step, shape (2, 3)
     command: Vector  # previous servo commands: velocities of x, y and yaw, pitch, hand positions, shape (10,)
 
 
@@ -127,12 +127,12 @@ class Rig:
 
     @property
     def hands(self) -> Vector:
-        """Hand positions in the body frame in metres, shape (2, 3)."""
+        """Positions (2, 3) of the hands in the body frame, in metres."""
         return self.pose[4:].reshape(2, 3).copy()
 
     @property
     def eye(self) -> Vector:
-        """Position of the eye in the house frame in metres, shape (3,)."""
+        """Position (3,) of the eye in the house frame, in metres."""
         x, y, heading, pitch = self.pose[:4].tolist()
         return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
 

@@ -114,10 +114,6 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
 
 @kernel
 def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
-    """Return the fill height below an object at each centre (k, 2), and the cost of that position, in metres.
-
-    The mean gap below the object adds to the cost, because objects tip over on a slope.
-    """
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
     reach = np.maximum(
         half + _SIDE_GAP, _MAX_SPACING

@@ -153,7 +153,6 @@ class Event(Tier):
         return result
 
     def _play(self, motion: ActiveMotion, until: int) -> StepStates | None:
-        """Play a motion up to control step `until`, and report the events of that step."""
         plan, state, item = motion.plan, self.episode_state, motion.item
         before = float(plan.trajectory.vectors[until - 2, TIME]) if until > 1 else self.time
         rows = self._kinematic.play(plan.trajectory, motion.played, until)

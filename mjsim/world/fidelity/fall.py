@@ -63,7 +63,6 @@ def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle
 
 
 def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, int]]:
-    """Simulate one control step unless all released objects sleep, and return its events."""
     if not full.is_settled:
         full.person.rig.advance()
     events = list(full.monitor.check(held))

@@ -20,10 +20,10 @@ from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, 
 Floats = NDArray[np.float64]
 
 # Layout of `KinematicState.vector`.
-TIME = 0  # in seconds
+TIME = 0  # simulated time in seconds
 BODY = 1  # body state, laid out as in `mjsim.world.body.rig`
 HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, in metres
-HAND_SPEEDS = HANDS + 6  # in m/s
+HAND_SPEEDS = HANDS + 6  # velocities of the hands in m/s
 GRASPS = HAND_SPEEDS + 6  # for each hand, 2 * object + grip, or -1
 STATE_SIZE = GRASPS + 2
 

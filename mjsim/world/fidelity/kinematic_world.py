@@ -81,12 +81,12 @@ class KinematicWorld:
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """The person's body state, a view of shape (BODY_SIZE,)."""
+        """The person's body state (BODY_SIZE,). This is a view."""
         return self._body
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Positions of the hands in the body frame in metres, a view of shape (2, 3)."""
+        """Positions (2, 3) of the hands in the body frame, in metres. This is a view."""
         return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
 
     @property
@@ -193,7 +193,6 @@ def _floor(scene: Scene) -> Floor:
 
 
 def _grip_poses(scene: Scene) -> NDArray[np.float64]:
-    """Return the pose of each object in the frame of a hand that holds it at grip 0 or 1, shape (n, 2, 7)."""
     model, names = scene.model, scene.index.names
     poses = np.zeros((len(names), 2, 7))
     for item, name in enumerate(names):

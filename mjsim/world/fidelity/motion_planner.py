@@ -104,7 +104,6 @@ class MotionPlanner:
         return grip
 
     def _bring_over(self, item: int, receptacle: ReceptacleGeometry) -> tuple[Slot, float]:
-        """Turn to a receptacle and move the load over it. Return the slot and the load's extent below the hand."""
         heading = square_heading(self._person, receptacle)
         self._face(receptacle.center, heading, self._times.receptacle_tolerance)
         extent = self._load_extent(receptacle)
@@ -139,7 +138,6 @@ class MotionPlanner:
         return self._kinematic.state.vector[first : first + 3].copy()
 
     def _face(self, point: Vector, heading: float, tolerance: float) -> None:
-        """Stand still and turn to a point (3,), or to a heading unless it is NaN."""
         kinematic, steps = self._kinematic, self._steps(self._times.turn_timeout)
         room = self._room(steps)
         motion_primitives.face(
@@ -155,7 +153,6 @@ class MotionPlanner:
         *,
         in_house: bool = False,
     ) -> None:
-        """Move the hand to a goal (3,) in a number of control steps. By default, the head keeps its pitch."""
         kinematic, room = self._kinematic, self._room(steps)
         gaze = _towards(kinematic.pitch_target) if gaze is None else gaze
         movement = HandMovement(self._hand, goal, in_house, steps, order, gaze)

@@ -136,7 +136,7 @@ class Tier(ABC):
     @property
     @abstractmethod
     def hands(self) -> NDArray[np.float64]:
-        """Copy of the positions of the left and the right hand in the body frame, in metres, shape (2, 3)."""
+        """Positions (2, 3) of the left and the right hand in the body frame, in metres. This is a copy."""
 
     @property
     @abstractmethod
@@ -187,7 +187,6 @@ class Tier(ABC):
         return cast(Steps, steps)
 
     def _step_each(self, choose: Callable[[Observation], Move | None], limit: int) -> Steps | None:
-        """Take up to `limit` control steps with moves from `choose`, until it returns None or an event occurs."""
         seen, moves = [self.observation()], list[Move]()
         hashes, health = list[int](), list[tuple[float, ...]]()
 

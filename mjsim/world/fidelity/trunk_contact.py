@@ -55,7 +55,6 @@ def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> N
 
 @kernel
 def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int, end: int) -> bool:
-    """Move the disc out of the polygons near[start:end], and turn its velocity along them. Return True on success."""
     for _ in range(_MAX_ROUNDS):
         free = True
         for entry in range(start, end):

@@ -18,7 +18,7 @@ CHECK_DISTANCE = (
 )
 
 MAX_FLIGHT = 1.0  # maximum horizontal distance from the point of release, in metres
-_MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # range of heights of an object inside the house, in metres
+_MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # range of heights at which an object is inside the house, in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,6 @@ class AnomalyDetector:
         return bool(np.hypot(x - release.x, y - release.y) > MAX_FLIGHT)
 
     def _passed_through(self, data: mujoco.MjData, item: int) -> bool:
-        """Return True if a static colliding geom is between an object's anchor and its centre."""
         body = int(self._bodies[item])
         start = self.anchors[item]
         path = data.xipos[body] - start

@@ -50,7 +50,7 @@ class HealthSample(NamedTuple):
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The seven numbers in the order of the attributes, the left hand before the right."""
+        """The seven numbers of the sample in the order of the attributes, the left hand before the right."""
         overlaps = (self.penetration_m, self.trunk_penetration_m)
         return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
 

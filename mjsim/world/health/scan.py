@@ -16,9 +16,11 @@ from mjsim.world.body.grips import site_angle, site_gap
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-OUTSIDE = 0.3  # Positions up to this far from the rooms count as inside, in metres, because doorways are between rooms.
+OUTSIDE = (
+    0.3  # Doorways are outside the rooms, so positions up to this far from a room count as inside. In metres.
+)
 
-_TOLERANCE = 1e-6  # in metres
+_TOLERANCE = 1e-6  # tolerance for rounding errors, in metres
 
 # Results of a scan.
 NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
@@ -59,11 +61,11 @@ class ScanArrays(NamedTuple):
     # Squares of three limits, shape (3,): distance from the anchor (metres) beyond which an object is `DISPLACED`,
     # speed (m/s) above which it is `FAST`, and speed (m/s) below which it is `SLOW`.
     limits: Floats
-    boxes: Floats  # result of `static_boxes`
+    boxes: Floats  # boxes returned by `static_boxes`
     rooms: tuple[Floats, Floats, Floats]  # see `RoomMap.rectangles`
     grip_sites: NDArray[np.intp]  # see `Grips.sites`
     anchors: (
-        Floats  # see `AnomalyDetector.anchors`; an anchor moves along if `boxes` show that the path is clear
+        Floats  # See `AnomalyDetector.anchors`. An anchor moves along if `boxes` show that the path is clear.
     )
     flags: NDArray[np.uint8]  # output: flags of each object, shape (n,)
     # Output, shape (6,): both overlaps of a `HealthSample`, at least 0, then its weld errors in metres and in radians.

@@ -56,7 +56,7 @@ class Obstacles(NamedTuple):
     positions: Floats  # positions of all objects in metres, shape (n, 2) or wider
     is_loose: NDArray[np.bool_]  # True for objects on the floor, shape (n,)
     target: int  # index of the object to pick or place, which is not an obstacle, or -1
-    walls: Floats  # edges (x, y, x, y) of the navigable floor in metres, shape (e, 4)
+    walls: Floats  # edges of the navigable floor, each as x, y, x, y in metres, shape (e, 4)
 
 
 class Walk(NamedTuple):

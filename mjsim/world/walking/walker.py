@@ -19,7 +19,7 @@ from mjsim.world.walking.path_following import (
 )
 
 BACK_OFF = Move(forward=-0.4, left=0.3)
-BACK_OFF_TIME = 0.6  # in seconds
+BACK_OFF_TIME = 0.6  # how long a blocked person steps back, in seconds
 
 
 class Walker:
