@@ -1,6 +1,6 @@
-"""Navmesh, geodesic distances, and the routing problem of a task with its planners.
+"""Navmesh, geodesic distances, routing problems and their planners.
 
-The package works with distances and names only. Sessions use `Planner`, and `mjsim plan` uses `solver`.
+The package works only with distances and names. Sessions use `Planner`, and `mjsim plan` uses `solver`.
 """
 
 import lazy_loader

@@ -1,9 +1,8 @@
 """Independent checks of plans, which share no code with the solvers.
 
-`check` is fast enough for every plan. `verify_optimal` may take seconds. A certificate contains a bound on the rest
-of the task from every state. A shorter tour than claimed could only run through states whose cost so far plus bound
-is below the claim. `verify_optimal` visits all of these, layer by layer of picks. If none of them ends a tour, the
-claim holds.
+`check` is fast enough for every plan. `verify_optimal` may take seconds. A certificate yields a lower bound on the rest
+of the task from every state. A tour shorter than claimed can pass only through states whose cost so far plus bound is
+below the claim. `verify_optimal` visits all these states. If no tour ends in one of them, the claim holds.
 """
 
 from dataclasses import dataclass
@@ -17,31 +16,34 @@ from planner.plan import Certificate, Plan, Proof, Status, VisitKind
 from planner.problem import RoutingProblem
 from planner.relaxation_checker import Relaxation, closed
 
-EXHAUSTIVE_OBJECTS = 7  # up to this number of objects, all tours are tried
-CHECK_ROWS = 1 << 16  # largest table that `check` fills, in about 2 s
-VERIFY_ROWS = 1 << 20  # largest table that `verify_optimal` fills, in about 30 s
-MAX_STATES = 30_000_000  # largest number of states that `verify_optimal` visits
+EXHAUSTIVE_OBJECTS = 7  # maximum number of objects for which all tours are tried
+CHECK_ROWS = 1 << 16  # maximum number of table rows that `check` fills, in about 2 s
+VERIFY_ROWS = 1 << 20  # maximum number of table rows that `verify_optimal` fills, in about 30 s
+MAX_STATES = 30_000_000  # maximum number of states that `verify_optimal` visits
 
 # Location, remaining objects (bit mask), and bins of the carried objects.
 State = tuple[int, int, tuple[int, ...]]
 
 
 def check(problem: RoutingProblem, plan: Plan) -> float:
-    """Check a plan against the constraints of equation 1 (PAPER section 2), and derive a lower bound on tour length, m.
+    """Check a plan against the constraints of equation 1 (PAPER section 2). Return a lower bound on tours in metres.
 
-    Up to seven objects, every order of visits is tried. Beyond, the bound follows from a spanning tree or from the
-    certificate's table if that has at most 2^16 rows. Otherwise it is 0. A solver's search is not repeated, so the
-    derived bound may be below `plan.lower_bound`.
+    With up to seven objects, every order of visits is tried. With more, the bound follows from a spanning tree, or from
+    the certificate's table if that has at most 2^16 rows. Otherwise it is 0. The solver's search is not repeated, so
+    the bound may be below `plan.lower_bound`.
 
     Raises:
-        ProblemError: A visit is impossible or repeated, an object is left over, the cost is wrong, the lower bound
+        ProblemError: A visit is impossible or repeated, an object is not delivered, the cost is wrong, the lower bound
             exceeds the cost, an optimal plan has a gap, or the certificate claims more than it proves.
     """
     return derive(problem, plan, CHECK_ROWS)[0]
 
 
 def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, Relaxation | None]:
-    """Check like `check`, with tables of at most `max_rows`. Also return the relaxation if its table was filled."""
+    """Check a plan with tables of at most `max_rows` rows. Return a lower bound on tours in metres.
+
+    Also return the relaxation if its table was filled.
+    """
     _check_numbers(plan, replayed(problem, plan))
     rounding, certificate = allowance(problem, plan), plan.certificate
     if len(problem.shipments) + len(problem.onboard) <= EXHAUSTIVE_OBJECTS:
@@ -61,22 +63,22 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
         relaxation = Relaxation(problem, group, prices)
         derived = relaxation.root
     _refuse(certificate.root * certificate.unit, derived, rounding, "certificate's root")
-    if certificate.proof is not Proof.RELAXATION:  # with it, a search may have raised the bound
+    if certificate.proof is not Proof.RELAXATION:  # a search may have raised the relaxation's bound
         _refuse(plan.lower_bound, derived, rounding, "lower bound")
     return derived, relaxation
 
 
 def allowance(problem: RoutingProblem, plan: Plan) -> float:
-    """Return by how much the claims of a plan may exceed the truth because of rounding, m."""
+    """Return the maximum excess of a plan's claims due to rounding, in metres."""
     return problem.tolerance(plan.cost) + 2 * (problem.resolution or 0.0)
 
 
 def shortest_tour(
     problem: RoutingProblem, limit: float, max_states: float = np.inf
 ) -> tuple[float, int] | None:
-    """Return the length of the shortest tour below a limit, m, and the number of visited states.
+    """Return the length of the shortest tour below a limit in metres, and the number of visited states.
 
-    The length is infinite if there is no such tour. The result is None after more than `max_states`.
+    The length is infinite if there is no such tour. The result is None if more than `max_states` states were visited.
     """
     d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
@@ -110,7 +112,7 @@ def shortest_tour(
 
 
 def replayed(problem: RoutingProblem, plan: Plan) -> float:
-    """Return the length of a plan's tour, m. Raises ProblemError if a visit is not feasible."""
+    """Return the length of a plan's tour in metres. Raises ProblemError if a visit is not feasible."""
     n = len(problem.shipments)
     loose, held = set(range(n)), set(range(n, len(problem.names)))
     here, cost = problem.start, 0.0
@@ -159,7 +161,6 @@ def _refuse(claimed: float, derived: float, rounding: float, what: str) -> None:
 def _claim(
     problem: RoutingProblem, certificate: Certificate
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return the group of each shipment in the certificate's table, (n,), and the price of picking it, m, (n,)."""
     n = len(problem.shipments)
     if certificate.proof is Proof.FULL_TABLE:
         return np.arange(n), np.zeros(n)
@@ -176,7 +177,7 @@ def _claim(
 
 
 def _spanning_tree(problem: RoutingProblem) -> float:
-    """Return the length of a minimum spanning tree of all locations of the tour, m (Prim's algorithm)."""
+    """Apply Prim's algorithm to all locations of the tour."""
     direct, total = closed(problem), 0.0
     apart = {j: direct[problem.start, j] for j in problem.used if j != problem.start}
     while apart:
@@ -188,19 +189,19 @@ def _spanning_tree(problem: RoutingProblem) -> float:
 
 @dataclass(frozen=True)
 class Verified:
-    """Facts about a plan, found without trusting its solver."""
+    """Results of a verification, which does not trust the solver."""
 
-    cost: float  # length of its feasible tour, m
-    lower_bound: float  # no tour is shorter than this, m
-    optimal: bool  # True if bound and tour length agree within twice the problem's tolerance
+    cost: float  # length of the plan's tour in metres
+    lower_bound: float  # verified lower bound on all tours in metres
+    optimal: bool  # True if the bound and the tour length agree within twice the problem's tolerance
     states: int  # number of states visited beyond the certificate's table
-    why: str = ""  # reason why a claim of the plan is not verified, empty if all are
+    why: str = ""  # reason why the plan's lower bound was not verified, or empty
 
 
 def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX_STATES) -> Verified:
-    """Verify the tour of a plan, and as far as possible its lower bound, from the problem and the certificate alone.
+    """Verify a plan's tour and, if possible, its lower bound, using only the problem and the certificate.
 
-    The search ends after `max_states`.
+    The search ends after `max_states` states.
 
     Raises:
         ProblemError: The tour is not feasible or has another length, the certificate claims more than it proves, or
@@ -229,13 +230,9 @@ def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX
 def _shorter(
     problem: RoutingProblem, relaxation: Relaxation | None, limit: float, max_states: int
 ) -> tuple[bool, int] | None:
-    """Return True if there is a tour shorter than a limit, m, and the number of visited states.
-
-    The result is None if there are too many states.
-    """
     if relaxation is not None:
         found = relaxation.shorter(limit, max_states)
         if found is None or not found[0] or relaxation.exact:
-            return found  # otherwise the tour may use connections that are shorter than the given distances
+            return found  # if not exact, the tour may use connections shorter than the given distances
     shortest = shortest_tour(problem, limit, max_states // 30)
     return None if shortest is None else (shortest[0] < limit, shortest[1])

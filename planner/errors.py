@@ -1,4 +1,4 @@
-"""Errors of the planner."""
+"""Exceptions of the planner."""
 
 
 class PlannerError(Exception):

@@ -1,7 +1,7 @@
 """Exact any-angle shortest paths on a navmesh.
 
-Paths are shortest among the inflated obstacle polygons, to 0.1 mm (`navmesh.TOLERANCE`). Paths on a grid would be
-several percent longer.
+Paths around the inflated obstacles are shortest to within 0.1 mm (`navmesh.TOLERANCE`). Paths along grid cells would be
+several per cent longer.
 """
 
 from dataclasses import dataclass, field
@@ -20,22 +20,20 @@ from planner.visibility_graph import (
     visible_vertices,
 )
 
-MAX_CACHED = 4096  # points whose visible vertices are cached; queries often repeat bins and resting objects
+MAX_CACHED = 4096  # maximum number of points whose visible vertices are cached
 
 
 @dataclass(frozen=True, eq=False)
 class ShortestPath:
     """A shortest path and its length."""
 
-    # corners including both ends, which may be snapped, (k, 2) with k >= 2, m
+    # corners and both ends, which may be snapped, in metres, shape (k, 2) with k >= 2
     points: NDArray[np.float64]
-    geodesic_distance: float  # length, m
+    geodesic_distance: float  # length of the path in metres
 
 
 @dataclass(frozen=True, eq=False)
 class _Query:
-    """Points on the navmesh (n, 2), m, the island of each, (n,), and the vertices that they see."""
-
     points: NDArray[np.float64]
     island: NDArray[np.int64]
     views: Views
@@ -43,10 +41,12 @@ class _Query:
 
 @dataclass(frozen=True, eq=False)
 class Geodesics:
-    """Shortest paths and distances between points of a navmesh.
+    """Shortest paths and distances between points of a navmesh, in metres.
 
     A point that is not navigable is replaced by the nearest point of the largest island (`NavMesh.snap`). The distance
-    to that point does not count. A navigable point on a smaller island stays there.
+    to that point does not count. A navigable point on a smaller island is not replaced. All methods raise
+    NotNavigableError if no navigable point is within `max_snap` of a point, and UnreachableError if two points are on
+    different islands.
 
     Example:
         >>> wall = np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 3.0], [2.0, 3.0]])
@@ -56,8 +56,8 @@ class Geodesics:
         True
     """
 
-    navmesh: NavMesh  # walkable floor
-    max_snap: float = 1.0  # largest distance to the nearest navigable point, m
+    navmesh: NavMesh
+    max_snap: float = 1.0  # maximum distance from a point to the nearest navigable point, in metres
     _graph: VisibilityGraph = field(init=False, repr=False)
     _remembered: dict[tuple[float, float], tuple[NDArray[np.int32], NDArray[np.float64]]] = field(
         init=False, repr=False, default_factory=dict
@@ -67,7 +67,7 @@ class Geodesics:
         object.__setattr__(self, "_graph", VisibilityGraph.build(self.navmesh))
 
     def shortest_path(self, a: ArrayLike, b: ArrayLike) -> ShortestPath:
-        """Return the shortest path between two points, each (2,), m. Raises as `distances`."""
+        """Return the shortest path between two points (x, y) in metres."""
         points, islands = self._locate([np.asarray(a, np.float64), np.asarray(b, np.float64)])
         straight = float(direct_distances(points[:1], points[1:], self._graph.walls)[0, 0])
         if np.isfinite(straight) and islands[0] == islands[1]:
@@ -79,11 +79,7 @@ class Geodesics:
         return ShortestPath(path, length)
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the symmetric matrix (n, n) of geodesic distances between points (n, 2), all in m.
-
-        Raises NotNavigableError if no navigable point is within `max_snap` of a point, and UnreachableError if two
-        points are on different islands.
-        """
+        """Return the symmetric matrix (n, n) of geodesic distances between n points (n, 2), in metres."""
         query = self._query(*self._locate(points))
         result = self._between(query, query)
         result = np.minimum(result, result.T)
@@ -91,23 +87,22 @@ class Geodesics:
         return result
 
     def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances (n,) from one point (2,) to points (n, 2), all in m. Raises as `distances`."""
+        """Return the geodesic distances (n,) from one point to n points (n, 2), in metres."""
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
         return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances (s, t) from points (s, 2) to points (t, 2), all in m. Raises as `distances`."""
+        """Return the geodesic distances (s, t) from points (s, 2) to points (t, 2), in metres."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
         return self._between(source, target)
 
     def _locate(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return points (n, 2), m, snapped if they are not navigable, and the island of each, (n,)."""
         array = np.array(points, dtype=np.float64).reshape(-1, 2)
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
             islands[k] = self.navmesh.island_of(point) or 0
-            # Also snap points navigable only within the tolerance, because no tangents start inside an obstacle.
+            # Points navigable only within the tolerance are also snapped: no tangents start inside an obstacle.
             array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 
@@ -120,18 +115,16 @@ class Geodesics:
         return _Query(points, islands, Views(starts, seen, lengths))
 
     def _view(self, x: float, y: float, island: int) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Return the vertices that a point, m, sees along tangents, and the distances to them, m."""
         view = self._remembered.get((x, y))
         if view is None:
             if len(self._remembered) >= MAX_CACHED:
                 self._remembered.clear()
             graph = self._graph
             view = visible_vertices(x, y, graph.vertices, graph.island == island, graph.walls, TOLERANCE)
-            self._remembered[x, y] = view  # `view` is returned because another thread may clear the cache now
+            self._remembered[x, y] = view  # another thread may clear the cache, so do not read it again
         return view
 
     def _between(self, sources: _Query, targets: _Query) -> NDArray[np.float64]:
-        """Return the distances from sources to targets, m."""
         graph = self._graph
         apart = sources.island[:, None] != targets.island[None, :]
         if apart.any():

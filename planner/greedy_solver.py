@@ -1,4 +1,4 @@
-"""The nearest possible visit first: a baseline, and the first plan of other planners."""
+"""The greedy planner, which is a baseline and provides the first plan of other planners."""
 
 import time
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from planner.solvers import SolveLimit
 
 @dataclass(frozen=True)
 class GreedySolver:
-    """Always makes the nearest possible visit."""
+    """Planner that always chooses the nearest possible visit."""
 
     name: str = "greedy"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan in milliseconds. Seed and limit have no effect."""
+        """Solve a problem within milliseconds. The seed and the limit have no effect."""
         del seed, limit
         return _plan(problem, spanning_bound(problem))
 
@@ -27,7 +27,7 @@ class GreedySolver:
 
 
 def first_plan(problem: RoutingProblem) -> Plan:
-    """Return the nearest-first tour with the bound 0, which takes less time than any other plan."""
+    """Return the nearest-first tour with a lower bound of 0. No other plan is faster to compute."""
     return _plan(problem, 0)
 
 
@@ -38,7 +38,7 @@ def _plan(problem: RoutingProblem, bound: int) -> Plan:
 
 
 def nearest_first(problem: RoutingProblem) -> list[Visit]:
-    """Return a feasible tour that always makes the nearest possible visit."""
+    """Return a feasible tour that always continues with the nearest possible visit."""
     visits: list[Visit] = []
     here = problem.start
     while options := list(possible_next(problem, visits)):

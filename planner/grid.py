@@ -1,4 +1,4 @@
-"""A grid over the floor, and the cells that line segments cross."""
+"""Floor grids, and line segments indexed by the grid cells that they cross."""
 
 import math
 from typing import NamedTuple
@@ -8,24 +8,24 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-MARGIN = 1e-3  # tolerance for listing segments in cells that they narrowly miss, m
+MARGIN = 1e-3  # distance by which a segment may miss a cell and still be listed in it, in metres
 
 
 class GridFrame(NamedTuple):
-    """Position of the cells of a grid.
+    """Position and size of a grid.
 
     The cell in row r, column c spans x_min + [c, c + 1] resolution and y_min + [r, r + 1] resolution.
     """
 
-    x_min: float  # corner of the first cell, m
+    x_min: float  # corner of the first cell, in metres
     y_min: float
-    resolution: float  # size of a cell, m
+    resolution: float  # side of a cell, in metres
     rows: int  # number of cells along y
     columns: int  # number of cells along x
 
     @classmethod
     def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "GridFrame":
-        """Return the frame that covers bounds (x_min, y_min, x_max, y_max), m."""
+        """Return the frame that covers the bounds (x_min, y_min, x_max, y_max) in metres."""
         x_min, y_min, x_max, y_max = bounds
         columns, rows = (
             max(1, math.ceil(side / resolution - 1e-9)) for side in (x_max - x_min, y_max - y_min)
@@ -33,25 +33,25 @@ class GridFrame(NamedTuple):
         return cls(float(x_min), float(y_min), float(resolution), rows, columns)
 
     def centres(self) -> NDArray[np.float64]:
-        """Return the centres of the cells, (rows, columns, 2), m."""
+        """Return the centres of the cells in metres, shape (rows, columns, 2)."""
         x = self.x_min + (np.arange(self.columns) + 0.5) * self.resolution
         y = self.y_min + (np.arange(self.rows) + 0.5) * self.resolution
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the columns and rows (2, n) of points (n, 2), m. Points outside get the nearest cell."""
+        """Return the columns and rows of n points, shape (2, n). Points outside the grid get the nearest cell."""
         steps = (points - (self.x_min, self.y_min)) / self.resolution
         cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
         return cells.T
 
 
 class SegmentGrid(NamedTuple):
-    """Line segments, listed by the cells that they cross."""
+    """Line segments indexed by the grid cells that they cross."""
 
     frame: GridFrame
-    segments: NDArray[np.float64]  # x, y of both ends, m, (s, 4)
-    starts: NDArray[np.int64]  # first entry of each cell in `listed`, row by row, (rows * columns + 1,)
-    listed: NDArray[np.int64]  # numbers of the segments in each cell
+    segments: NDArray[np.float64]  # x and y of both ends in metres, shape (s, 4)
+    starts: NDArray[np.int64]  # index in `listed` of each cell's first entry, shape (rows * columns + 1,)
+    listed: NDArray[np.int64]  # indices of the segments in each cell, grouped by cell
 
     @classmethod
     def build(cls, frame: GridFrame, segments: NDArray[np.float64]) -> "SegmentGrid":
@@ -63,7 +63,6 @@ class SegmentGrid(NamedTuple):
 
 @kernel
 def row_span(ay: float, by: float, frame: GridFrame) -> tuple[int, int]:
-    """Return the first and last row within `MARGIN` of a segment from y = `ay` to y = `by`, m, clipped to the grid."""
     first = math.floor((min(ay, by) - MARGIN - frame.y_min) / frame.resolution)
     last = math.floor((max(ay, by) + MARGIN - frame.y_min) / frame.resolution)
     return min(max(int(first), 0), frame.rows - 1), min(max(int(last), 0), frame.rows - 1)
@@ -71,7 +70,6 @@ def row_span(ay: float, by: float, frame: GridFrame) -> tuple[int, int]:
 
 @kernel
 def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: GridFrame) -> tuple[int, int]:
-    """Return the first and last column in a row within `MARGIN` of a segment from a to b, m, clipped to the grid."""
     low = frame.y_min + row * frame.resolution - MARGIN
     high = low + frame.resolution + 2.0 * MARGIN
     start, end = 0.0, 1.0
@@ -88,7 +86,10 @@ def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Gri
 def crossed_cells(
     frame: GridFrame, segments: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the numbers, row by row, of cells within `MARGIN` of segments (s, 4), m, and of these segments."""
+    """Return the cell and the segment of each pair that is within `MARGIN`.
+
+    Cells are numbered row by row. `segments` contains x and y of both ends in metres, shape (s, 4).
+    """
     cells, numbers = [0], [0]
     for k in range(len(segments)):
         ax, ay, bx, by = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
@@ -103,7 +104,7 @@ def crossed_cells(
 
 @kernel
 def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -> bool:
-    """Return True if the closed segment from a to b, m, both on the grid, touches no wall."""
+    """Return True if the closed segment from a to b, both on the grid, touches no wall."""
     frame = walls.frame
     first, last = row_span(ay, by, frame)
     for row in range(first, last + 1):
@@ -117,7 +118,7 @@ def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -
 
 @kernel
 def touch(ax: float, ay: float, bx: float, by: float, wall: NDArray[np.float64]) -> bool:
-    """Return True if the closed segment from a to b and a wall (4,) have a common point."""
+    """Return True if the closed segment from a to b and a wall have a point in common."""
     cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
     if max(cx, dx) < min(ax, bx) or min(cx, dx) > max(ax, bx):
         return False

@@ -1,4 +1,4 @@
-"""Distances in whole units, so that lengths of tours are summed and compared exactly."""
+"""Distances in whole units, with which tour lengths are summed and compared exactly."""
 
 import math
 from collections.abc import Sequence
@@ -9,29 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TOLERANCE = 1e-9  # relative excess that an optimal tour may have over the shortest one
-FINE = 1 << 44  # largest distance in units, if no coarser unit is exact; 2^18 legs cannot overflow
-TIE = 1e-10  # difference of tours that may be due to rounding, as a share of the largest distance
-COARSE = 1 << 20  # largest distance in units with which tours of 40 objects fit into 32 bits
-ROUND = 1e-15  # error of decimal fractions in binary, as a share of the largest distance
+TOLERANCE = 1e-9  # maximum relative excess of an optimal tour over the shortest one
+FINE = 1 << 44  # largest distance in units if no coarser unit is exact; sums of 2^18 legs fit into int64
+TIE = 1e-10  # difference between tours that may be due to rounding, relative to the largest distance
+COARSE = 1 << 20  # largest distance in units at which tours of 40 objects fit into 32 bits
+ROUND = 1e-15  # rounding error of decimal fractions in floats, relative to the largest distance
 
 
 @dataclass(frozen=True, eq=False)
 class IntegerDistances:
     """Distances of a problem in whole units."""
 
-    unit: float  # m per unit
-    tie: int  # largest difference between tours that count as equal, units
-    rounding: float  # largest rounding error of a leg, units; 0 if the unit is exact
-    used: Sequence[int]  # locations that tours visit
-    # rounded distances, symmetric, 0 for locations that no tour visits, (k, k)
+    unit: float  # length of a unit in metres
+    tie: int  # maximum difference between tours that count as equal, in units
+    rounding: float  # maximum rounding error of a leg in units, 0 if the unit is exact
+    used: Sequence[int]  # indices of the locations that every tour visits
+    # rounded distances, symmetric, 0 for locations that no tour visits, shape (k, k)
     legs: NDArray[np.int64]
 
     @cached_property
     def metric(self) -> NDArray[np.int64]:
-        """The distances closed to a metric, (k, k).
+        """Shortest connections in the rounded distances, shape (k, k).
 
-        Rounding can violate the triangle inequality, on which solvers rely, by a unit. Closing restores it.
+        Rounding can violate the triangle inequality by one unit. Shortest connections satisfy it, and solvers rely on
+        it.
         """
         return shortest_connections(self.legs, self.used)
 
@@ -44,10 +45,10 @@ class IntegerDistances:
 def integer_distances(
     distances: NDArray[np.float64], used: Sequence[int], resolution: float | None
 ) -> IntegerDistances:
-    """Round distances, m, (k, k), between the `used` locations to whole units.
+    """Round distances in metres between the `used` locations to whole units.
 
-    The unit is the resolution, if given. Otherwise it is a power of ten of which all distances are multiples, or 2^-44
-    of the largest distance. This is so fine that rounding changes a tour by less than `TOLERANCE`.
+    The unit is the resolution if one is given. Otherwise it is a power of ten of which all distances are multiples, or
+    2^-44 of the largest distance, so that rounding changes a tour by less than `TOLERANCE`.
     """
     block = distances[np.ix_(used, used)]
     unit, tie = (resolution, 0) if resolution is not None else _unit(block)
@@ -59,7 +60,6 @@ def integer_distances(
 
 
 def _unit(block: NDArray[np.float64]) -> tuple[float, int]:
-    """Return the unit, m, and the tie, units, for distances, m, (u, u)."""
     largest = float(block.max(initial=0.0))
     if largest == 0.0:
         return 1.0, 0
@@ -71,7 +71,7 @@ def _unit(block: NDArray[np.float64]) -> tuple[float, int]:
 
 
 def shortest_connections(distances: NDArray[Any], used: Sequence[int]) -> NDArray[Any]:
-    """Return the shortest connections over the `used` locations, given symmetric distances (k, k)."""
+    """Return the shortest connections via the `used` locations, given symmetric distances of shape (k, k)."""
     shortest = distances.copy()
     for k in used:  # Floyd-Warshall; SciPy's version treats a distance of 0 as a missing edge
         np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :], out=shortest)

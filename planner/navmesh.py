@@ -1,7 +1,7 @@
-"""The floor where a person can stand: free space outside the obstacles inflated by the person's radius.
+"""Navigable floor: free space outside the obstacles, which are inflated by the person's radius.
 
-An occupancy grid answers most queries. A cell that is completely on one island, or off all of them, decides for all
-its points. In a cell that an outline crosses, the exact polygons decide.
+A grid answers most queries. If a cell lies entirely on one island, or outside all islands, so do all its points. Only
+cells that an outline crosses need the exact polygons.
 """
 
 import math
@@ -18,26 +18,27 @@ from shapely.geometry import MultiPolygon, Polygon
 from planner.errors import NavMeshError, NotNavigableError
 from planner.grid import GridFrame, crossed_cells
 
-TOLERANCE = 1e-4  # depth by which a path may cut into an inflated obstacle, m
-SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary, in case of rounding errors, m
-ARC_SEGMENTS = 8  # segments per quarter circle; paths differ by 0.01 % from those around true circles
-BLOCKED, MIXED = -1, -2  # codes of cells outside all islands, and of cells that an outline crosses
+TOLERANCE = 1e-4  # maximum depth to which a path may cut into an inflated obstacle, in metres
+SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary in metres, to allow for rounding errors
+ARC_SEGMENTS = 8  # segments per quarter circle; path lengths are within 0.01 % of those around true circles
+BLOCKED, MIXED = -1, -2  # values for a cell outside all islands and for a cell that an outline crosses
 
 
 @dataclass(frozen=True, eq=False)
 class NavMesh:
     """The navigable part of a floor.
 
-    A point is navigable inside the bounds and outside the obstacles inflated by the agent's radius, boundary
-    included, to a tolerance of 0.05 mm. Bounds are not inflated.
+    A point is navigable if it is inside the bounds and not inside an obstacle inflated by the agent's radius. Points on
+    the boundary are navigable, with a tolerance of 0.05 mm. Bounds are not inflated.
 
     Attributes:
-        bounds: (x_min, y_min, x_max, y_max), m.
-        agent_radius: Inflation of the obstacles, m.
-        frame: Position of the grid's cells.
+        bounds: (x_min, y_min, x_max, y_max) in metres.
+        agent_radius: Distance by which obstacles are inflated, in metres.
+        frame: Position and size of the grid.
         islands: Connected polygons of free space, largest first.
-        solid: Inflated obstacles shrunk by `TOLERANCE`, which paths may not touch.
-        cells: Island that contains the whole cell, `BLOCKED` or `MIXED`, shape (rows, columns) int32.
+        solid: Inflated obstacles shrunk by `TOLERANCE`. Paths may not touch them.
+        cells: For each cell, the index of the island that contains all of it, `BLOCKED` or `MIXED`, as int32 of shape
+            (rows, columns).
     """
 
     bounds: tuple[float, float, float, float]
@@ -61,13 +62,13 @@ class NavMesh:
         """Inflate obstacles and find the islands of free space.
 
         Args:
-            obstacles: Convex polygons, each with vertices (k, 2), m, in any order.
-            bounds: (x_min, y_min, x_max, y_max), m.
-            agent_radius: Inflation of the obstacles, m.
-            resolution: Size of a grid cell, m.
+            obstacles: Convex polygons, each with its vertices in any order, in metres, shape (k, 2).
+            bounds: (x_min, y_min, x_max, y_max) in metres.
+            agent_radius: Distance by which obstacles are inflated, in metres.
+            resolution: Side of a grid cell in metres.
 
         Raises:
-            NavMeshError: An obstacle, the bounds or a size is not valid.
+            NavMeshError: An obstacle, the bounds or a size is invalid.
             NotNavigableError: No free space is left.
         """
         box = _box(bounds)
@@ -93,16 +94,16 @@ class NavMesh:
 
     @property
     def area(self) -> float:
-        """Area of the largest island, m²."""
+        """Area of the largest island in square metres."""
         return float(self.islands[0].area)
 
     @cached_property
     def topdown_map(self) -> NDArray[np.int32]:
-        """The floor from above: the island of each cell's centre, 0 for the largest, -1 off all islands.
+        """Index of the island at the centre of each grid cell, 0 for the largest island, -1 outside all islands.
 
-        Shape (rows, columns), read-only. Row r, column c is centred on the point (x_min + (c + 0.5) resolution,
-        y_min + (r + 0.5) resolution). Row 0 has the smallest y, so draw the map with the origin at the lower left.
-        `frame` contains these numbers, and `frame.centres()` returns all centres.
+        The array is read-only and has the shape (rows, columns). The centre of row r, column c is at (x_min + (c + 0.5)
+        resolution, y_min + (r + 0.5) resolution). Row 0 has the smallest y, so draw the map with the origin at the
+        lower left. `frame.centres()` returns all centres.
         """
         islands = self.cells.copy()
         mixed = self.cells == MIXED
@@ -111,7 +112,7 @@ class NavMesh:
         return islands
 
     def island_of(self, point: ArrayLike) -> int | None:
-        """Return the index into `islands` of the island that contains a point (2,), m, or None."""
+        """Return the index of the island that contains a point (x, y) in metres, or None if there is none."""
         x, y = _point(point)
         island = self._cell(x, y)
         if island == MIXED:
@@ -119,14 +120,14 @@ class NavMesh:
         return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Return True if a person can stand at a point (2,), m, on any island."""
+        """Return True if a person can stand at a point (x, y) in metres, on any island."""
         return self.island_of(point) is not None
 
     def snap(self, point: ArrayLike, max_distance: float = 1.0, island: int = 0) -> NDArray[np.float64]:
-        """Return the point of an island (by default the largest) nearest to a point, (2,), m.
+        """Return the point of an island, by default the largest, that is nearest to a point (x, y) in metres.
 
-        This is the point itself if it is on the island, without the tolerance of `is_navigable`. Raises
-        NotNavigableError if the island is farther away than `max_distance`, m.
+        A point on the island is returned unchanged, without the tolerance of `is_navigable`. Raises NotNavigableError
+        if the island is more than `max_distance` metres away.
         """
         x, y = _point(point)
         cell = self._cell(x, y)
@@ -143,13 +144,13 @@ class NavMesh:
         return nearest
 
     def sample(self, rng: np.random.Generator, count: int | None = None) -> NDArray[np.float64]:
-        """Draw a point, (2,), or `count` points, (count, 2), uniformly from the largest island, m.
+        """Draw one point, or `count` points of shape (count, 2), uniformly from the largest island, in metres.
 
         Drawing `count` points at once gives the same points as `count` calls.
         """
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
-        if count is None:  # without arrays, which is ten times as fast
+        if count is None:  # ten times as fast as with arrays
             while True:
                 x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
                 cell = self._cell(x, y)
@@ -169,21 +170,19 @@ class NavMesh:
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:
-        """Edges of the navigable floor: x, y of both ends, m, shape (e, 4).
+        """Edges of the navigable floor as x and y of both ends, in metres, shape (e, 4).
 
         A point is navigable if a ray from it crosses an odd number of edges.
         """
         return _outline(self._outer)
 
     def _cell(self, x: float, y: float) -> int:
-        """Return the entry of `cells` for a point, m, or that of the nearest cell if the point is outside the grid."""
         x_min, y_min, size, rows, columns = self.frame
         row, column = int((y - y_min) / size), int((x - x_min) / size)
         return int(self.cells.item(min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)))
 
 
 def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.object_]]:
-    """Return the polygons of free space, the largest first, and the same polygons shrunk by `SNAP_CLEARANCE`."""
     islands = np.array(sorted(_polygons(free), key=lambda p: -p.area), dtype=object)
     inner = shapely.buffer(islands, -SNAP_CLEARANCE, join_style="mitre")
     kept = shapely.area(inner) > 0
@@ -191,7 +190,6 @@ def _islands(free: shapely.Geometry) -> tuple[NDArray[np.object_], NDArray[np.ob
 
 
 def _cells(frame: GridFrame, islands: NDArray[np.object_], outer: NDArray[np.object_]) -> NDArray[np.int32]:
-    """Return `NavMesh.cells`. Adjacent cells that no outline crosses are on the same island, or off all islands."""
     crossed, _ = crossed_cells(frame, np.concatenate([_outline(islands), _outline(outer)]))
     mixed = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
     mixed.ravel()[crossed] = True
@@ -205,7 +203,6 @@ def _cells(frame: GridFrame, islands: NDArray[np.object_], outer: NDArray[np.obj
 
 
 def _islands_at(outer: NDArray[np.object_], points: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the island, or `BLOCKED`, of each point (n, 2), m, according to the exact polygons."""
     found = np.full(len(points), BLOCKED, dtype=np.int32)
     for index in reversed(range(len(outer))):
         found[shapely.intersects_xy(outer[index], points)] = index

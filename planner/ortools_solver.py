@@ -1,4 +1,4 @@
-"""The paper's planner: OR-Tools routing for equation 1 (PAPER section 2)."""
+"""The paper's planner, which solves equation 1 with OR-Tools routing (PAPER section 2)."""
 
 import math
 import time
@@ -14,26 +14,26 @@ from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
 from planner.solvers import SolveLimit
 
-FIRST_SOLUTIONS = (1, 10)  # limits of the first searches of `improve`
-DEFAULT_SOLUTIONS = 200  # 0.1 s for 6 objects, 2 s for 24
-MAX_INSERTED = 250  # largest number of nodes for which insertion is worth its time
-MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, s
-MAX_SECONDS = 60.0  # time limit, s, of a search that is limited by solutions, in case it finds too few
+FIRST_SOLUTIONS = (1, 10)  # maximum number of solutions of the first searches of `improve`
+DEFAULT_SOLUTIONS = 200  # maximum number of solutions; 0.1 s for 6 objects, 2 s for 24
+MAX_INSERTED = 250  # maximum number of nodes for which the insertion heuristic is used
+MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, in seconds
+MAX_SECONDS = 60.0  # time limit in seconds of a search that is limited by solutions but may find too few
 
 
 @dataclass(frozen=True)
 class OrToolsSolver:
-    """Parallel cheapest insertion, then guided local search.
+    """Planner that uses parallel cheapest insertion, then guided local search.
 
-    A limit on work counts solutions that the local search accepts.
+    `SolveLimit.work` counts the solutions that the local search accepts.
     """
 
     name: str = "ortools"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan the rest of a task within solutions or seconds, whichever ends first. The seed has no effect.
+        """Solve a problem within a number of solutions or seconds, whichever ends first. The seed has no effect.
 
-        The plan is OPTIMAL up to three objects, for which all tours are tried. Otherwise it is FEASIBLE with the bound
+        With up to three objects, all tours are tried and the plan is OPTIMAL. Otherwise it is FEASIBLE, with the bound
         of a spanning tree.
         """
         del seed
@@ -51,9 +51,9 @@ class OrToolsSolver:
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the nearest-first tour at once, then the tours of searches of 1 solution, 10, and all.
+        """Yield the nearest-first tour immediately, then better tours from searches for 1, 10 and all solutions.
 
-        Each search starts again. The short ones cost little compared with the last.
+        Each search starts from the beginning. The short ones take little time compared with the last.
         """
         started = time.perf_counter()
         best = GreedySolver().solve(problem)
@@ -75,7 +75,7 @@ def _with_budget(limit: SolveLimit | None) -> SolveLimit:
 
 
 def best_of_all(problem: RoutingProblem, distances: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """Return the best tour and its length in integer distances (k, k), by trying all tours. For few objects only."""
+    """Return the best tour and its length in integer distances, by trying all tours. Suitable only for few objects."""
     best: list[Visit] = []
     best_length = math.inf
 
@@ -112,7 +112,7 @@ def _search(
         routing.AddSearchMonitor(routing.solver().CustomLimit(limit.stop.is_set))
     solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MAX_INSERTED else None
     if solution is None:
-        # Insertion fails if the hands are full, because it inserts pairs before single nodes, or if time runs out.
+        # Insertion fails if time runs out, or if the hands are full when it inserts pairs before single nodes.
         greedy = nearest_first(problem)
         node = {visit: k + 1 for k, visit in enumerate(visit_of)}
         first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)
@@ -128,7 +128,6 @@ def _search(
 
 
 def _nodes(problem: RoutingProblem) -> list[Visit]:
-    """Return the visits of nodes 1, 2, ...: pick and place of each shipment in turn, then places of onboard objects."""
     n = len(problem.shipments)
     nodes = [visit for k in range(n) for visit in (problem.pick(k), problem.place(k))]
     return nodes + [problem.place(k) for k in range(n, len(problem.names))]

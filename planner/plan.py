@@ -1,4 +1,4 @@
-"""Plans: visits in order, their cost, and the certificate of their lower bound."""
+"""Plans, and certificates of their lower bounds."""
 
 import enum
 import math
@@ -10,13 +10,15 @@ from planner.errors import ProblemError
 
 
 class Proof(enum.Enum):
-    """Kind of proof of a lower bound.
+    """Type of proof of a lower bound.
 
-    EXHAUSTIVE: Every order of visits was tried, or excluded because it cannot be shorter.
-    FULL_TABLE: The cost-to-go of every set of objects left was computed.
-    RELAXATION: The same for a relaxed problem that counts objects by groups, with a price on each pick. If the bound
-        exceeds that of the relaxation, a search excluded only states that cannot lead to a shorter tour.
-    SPANNING_TREE: A tour connects all its locations.
+    EXHAUSTIVE: Every order of visits was tried, or was excluded because it cannot be shorter.
+    FULL_TABLE: The cost-to-go was computed for every set of remaining objects.
+    RELAXATION: The cost-to-go was computed for a relaxed problem, which counts objects by group and puts a price on
+    each
+        pick. If the plan's bound exceeds the relaxation's, a search excluded all states that cannot lead to a shorter
+            tour.
+    SPANNING_TREE: No tour is shorter than the minimum spanning tree of its locations.
     """
 
     EXHAUSTIVE = "exhaustive"
@@ -27,16 +29,16 @@ class Proof(enum.Enum):
 
 @dataclass(frozen=True)
 class Certificate:
-    """A claim about the shortest tour, in whole units of length and in the metric of rounded distances."""
+    """Proof of a lower bound on the shortest tour, in whole units of the rounded distances."""
 
     proof: Proof
-    unit: float  # m per unit
-    # lower bound without a search, units: the optimum (full table, exhaustive), the relaxation's bound at the start,
-    # or the spanning tree's length. A plan's lower bound may be higher if the solver completed a search.
+    unit: float  # length of a unit in metres
+    # lower bound in units before any search: the optimum (full table, exhaustive), the relaxation's bound at the start,
+    # or the spanning tree's length. The plan's lower bound is higher if a search has raised it.
     root: int
-    # groups of shipments that the relaxation counts together, each shipment in one group
+    # groups of shipments that the relaxation counts together; each shipment is in one group
     groups: tuple[tuple[int, ...], ...] = ()
-    multipliers: tuple[int, ...] = ()  # price of picking each shipment, units
+    multipliers: tuple[int, ...] = ()  # price of picking up each shipment, in units
 
 
 class Status(enum.Enum):
@@ -48,7 +50,7 @@ class Status(enum.Enum):
 
 
 class VisitKind(enum.StrEnum):
-    """Kind of a visit."""
+    """Action of a visit."""
 
     PICK = "pick"
     PLACE = "place"
@@ -58,7 +60,7 @@ class Visit(NamedTuple):
     """One step of a task."""
 
     kind: VisitKind
-    object: str  # name
+    object: str  # name of the object
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,10 @@ class Plan:
 
     Attributes:
         visits: Visits in order.
-        cost: Length of the open tour, m.
-        lower_bound: Lower bound of all feasible tours, m.
+        cost: Length of the open tour in metres.
+        lower_bound: Lower bound on all feasible tours in metres.
         status: OPTIMAL if and only if cost equals lower_bound up to rounding.
-        seconds: Wall time of the search. Nothing reproducible may depend on it.
+        seconds: Wall time of the search. It is not reproducible.
         certificate: Proof of the lower bound, or None for a plan read from a record.
 
     Raises:
@@ -95,6 +97,6 @@ class Plan:
             raise ProblemError(f"Plan.status must be a Status, got {self.status!r}")
 
     def improves_on(self, other: "Plan") -> bool:
-        """Return True if this plan is shorter, or known to be closer to the shortest, by more than rounding."""
+        """Return True if this plan is shorter than another, has a higher lower bound, or differs in status."""
         shorter = self.cost < other.cost - 1e-9
         return shorter or self.lower_bound > other.lower_bound + 1e-9 or self.status is not other.status

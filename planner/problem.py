@@ -1,4 +1,4 @@
-"""The routing problem of equation 1 (capacitated pickup and delivery with an open tour), and its tours."""
+"""The routing problem of equation 1: capacitated pickup and delivery with an open tour."""
 
 import math
 import time
@@ -14,13 +14,13 @@ from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
 from planner.plan import Certificate, Plan, Status, Visit, VisitKind
 
-MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # range in which tour lengths and units are normal floats, m
-ASYMMETRY = 1e-12  # relative difference of a distance between both directions that counts as rounding
+MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # range of the largest distance, in which all sums are normal floats
+ASYMMETRY = 1e-12  # maximum relative difference between the two directions of a distance, due to rounding
 
 
 @dataclass(frozen=True)
 class Shipment:
-    """An object to fetch, by indices into the distance matrix."""
+    """An object to fetch. The pickup and the delivery are indices into the distance matrix."""
 
     pickup: int
     delivery: int
@@ -28,23 +28,25 @@ class Shipment:
 
 @dataclass(frozen=True, eq=False)
 class RoutingProblem:
-    """The rest of a task from any state (PAPER section 2).
+    """The remaining part of a task, from any of its states (PAPER section 2).
 
     Objects are numbered: first the shipments, then the onboard objects.
 
     Attributes:
-        distances: Geodesic distances between locations, m, shape (k, k), symmetric, zero diagonal.
+        distances: Geodesic distances between locations in metres, shape (k, k), symmetric with a zero diagonal.
         start: Index of the person's location.
         shipments: Loose objects. Several may share a pickup or a delivery.
-        onboard: Index of the delivery of each carried object.
-        capacity: Largest number of objects that can be carried.
-        names: Names of the objects, in the order of their numbers, which are the default names.
-        resolution: Precision of the distances, m. They are rounded to it, and tours count as equal if they differ only
-            by the rounding of their legs. None if distances are exact. Tours are then compared to 1e-9 of their length.
+        onboard: Index of the delivery location of each carried object.
+        capacity: Maximum number of objects that can be carried.
+        names: Unique names of the objects, in the order of their numbers. The default names are the numbers.
+        resolution: Precision in metres to which distances are rounded, or None if they are exact. With a resolution,
+            tours count as equal if they differ only by the rounding of their legs. Otherwise they count as equal if
+            they differ by at most 1e-9 of their length.
 
     Raises:
-        ProblemError: Distances are not square, negative, not finite, too large, too small or asymmetric, an index is
-            out of range, more is onboard than the capacity, or names are not unique or not one per object.
+        ProblemError: The distances are not square, negative, not finite, too large, too small or asymmetric, an index
+            is out of range, more objects are onboard than the capacity allows, or names are not unique or not one per
+            object.
 
     Example:
         >>> distances = np.array([[0.0, 3.0, 5.0], [3.0, 0.0, 4.0], [5.0, 4.0, 0.0]])
@@ -80,11 +82,11 @@ class RoutingProblem:
 
     @cached_property
     def integers(self) -> IntegerDistances:
-        """The distances in whole units."""
+        """The distances, rounded to whole units."""
         return integer_distances(self.distances, self.used, self.resolution)
 
     def tolerance(self, length: float) -> float:
-        """Return the largest difference between tours of about this length that count as equal, m."""
+        """Return the maximum difference in metres at which tours of about this length count as equal."""
         if self.resolution is None:
             return TOLERANCE * length
         return 2 * self.resolution * (len(self.shipments) + len(self.names))
@@ -95,7 +97,7 @@ class RoutingProblem:
         return {name: k for k, name in enumerate(self.names)}
 
     def pick(self, shipment: int) -> Visit:
-        """Return the visit that picks a shipment."""
+        """Return the visit that picks up a shipment."""
         return Visit(VisitKind.PICK, self.names[shipment])
 
     def place(self, number: int) -> Visit:
@@ -111,7 +113,7 @@ class RoutingProblem:
         return shipment.pickup if visit.kind is VisitKind.PICK else shipment.delivery
 
     def stops(self, visits: Iterable[Visit]) -> list[int]:
-        """Return the indices of the start and of the location of each visit."""
+        """Return the location indices of the start and of each visit."""
         return [self.start, *map(self.location, visits)]
 
     def _check_distances(self) -> None:
@@ -137,7 +139,6 @@ class RoutingProblem:
             )
 
     def _check_scale(self) -> None:
-        """Reject distances whose sums or smallest parts do not fit into floats."""
         distances = self.distances[np.ix_(self.used, self.used)]
         if not self.used or not distances.any():
             return
@@ -166,7 +167,7 @@ class RoutingProblem:
 
 
 def possible_next(problem: RoutingProblem, visits: Sequence[Visit] = ()) -> Iterator[Visit]:
-    """Yield the visits that capacity and precedence allow after the given ones."""
+    """Yield the next visits that capacity and precedence allow after the given visits."""
     done, n = set(visits), len(problem.shipments)
     load = len(problem.onboard)
     for visit in visits:
@@ -187,20 +188,21 @@ def tour_length(
 ) -> float:
     """Return the length of an open tour.
 
-    `distances`, (k, k), replace the problem's own. With integers below 2^53 the result is exact.
+    If `distances` of shape (k, k) are given, they replace the problem's own. The result is exact for integers below
+    2^53.
     """
     stops = problem.stops(visits)
     return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
 
 
 def spanning_bound(problem: RoutingProblem) -> int:
-    """Return the length of the minimum spanning tree of a tour's locations, units, as a lower bound of tours."""
+    """Return the length in units of the minimum spanning tree of all visited locations, a lower bound on tours."""
     from scipy.sparse.csgraph import minimum_spanning_tree  # imported late, because it is slow to import
 
     used = problem.used
     if len(used) == 1:
         return 0
-    # A stored 0 would mean a missing edge, so add 1 to every edge and subtract it again from the tree.
+    # SciPy treats 0 as a missing edge, so add 1 to every edge and subtract it again from the tree.
     tree = minimum_spanning_tree(problem.integers.legs[np.ix_(used, used)] + 1)
     return int(tree.sum()) - (len(used) - 1)
 
@@ -213,11 +215,12 @@ def make_plan(
     started: float,
     certificate: Certificate,
 ) -> Plan:
-    """Make a plan whose lower bound also holds for the given distances, which are not in whole units.
+    """Make a plan from a tour that was found with integer distances.
 
-    `metric`, (k, k), contains the integer distances in which the problem was solved, and no tour is shorter than
-    `bound` in them. `started` is `time.perf_counter()` at the start of solving. The plan is OPTIMAL if the tour meets
-    the bound in the integer distances and, to the problem's tolerance, in the given ones.
+    `metric` contains these distances, shape (k, k), and `bound` is a lower bound on the tours in them. `started` is the
+    value of `time.perf_counter()` at the start of solving. The plan's lower bound also holds for the problem's own
+    distances. The plan is OPTIMAL if the tour meets the bound in the integer distances and, within the problem's
+    tolerance, in its own.
     """
     integers, cost = problem.integers, tour_length(problem, visits)
     lower = certificate.unit * (bound - integers.rounding * len(visits))  # legs may have been rounded up

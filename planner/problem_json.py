@@ -13,7 +13,7 @@ from planner.plan import Certificate, Plan, Proof, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
 FORMAT = 2
-EXACT = 1 << 53  # largest integer up to which all integers are exact as floats
+EXACT = 1 << 53  # all integers up to this one are exact as floats
 PROBLEM = (
     'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
     'and if need be "start": 0, "onboard": [1], "capacity": 2'
@@ -56,10 +56,11 @@ class _Claim(Struct, forbid_unknown_fields=True):
 
 
 def problem_from_json(text: str | bytes) -> RoutingProblem:
-    """Read a problem: distances, shipments (`{"pickup": i, "delivery": j}`), start, onboard (`[j, ...]`), capacity.
+    """Read a routing problem from JSON.
 
-    `start` is 0 by default, `onboard` empty and `capacity` 2. Indices count the rows of `distances`, which are in
-    metres. `onboard` contains the delivery of each carried object.
+    The fields are `distances` in metres, `shipments` (`{"pickup": i, "delivery": j}`), `start` (0 by default),
+    `onboard` (the delivery of each carried object, none by default) and `capacity` (2 by default). Indices refer to
+    rows of `distances`.
 
     Raises:
         ProblemError: The text is not JSON, a field is missing, unknown or of the wrong type, or the problem is
@@ -76,7 +77,7 @@ def problem_from_json(text: str | bytes) -> RoutingProblem:
 
 
 def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
-    """Write the visits (location indices), cost and lower bound (m), status and seconds of a plan."""
+    """Write a plan as JSON: visits as location indices, cost and lower bound in metres, status, and seconds."""
     return json.dumps(
         {
             "visits": [problem.location(visit) for visit in plan.visits],
@@ -89,10 +90,10 @@ def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
-    """Write a plan of a problem with its certificate.
+    """Write a plan and its certificate as JSON.
 
-    A visit is `["pick", k]` or `["place", k]` of shipment k, or `["place onboard", k]` of an object carried at the
-    start. k counts from 0 as in the problem.
+    A visit is `["pick", k]` or `["place", k]` for shipment k, or `["place onboard", k]` for the object k that is
+    carried at the start. Both count from 0.
     """
     fields = {name: getattr(plan, name) for name in ("cost", "lower_bound", "status", "certificate")}
     visits = [_action(problem, visit) for visit in plan.visits]
@@ -101,7 +102,7 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
-    """Read the output of `claim_to_json` for a plan of this problem. Its claims are not checked.
+    """Read a plan of this problem as written by `claim_to_json`, without checking its claims.
 
     Raises:
         ProblemError: The text is not JSON, a field is missing, unknown or of the wrong type, or a visit names an
@@ -123,7 +124,7 @@ def _decode(text: str | bytes, kind: type[T], hint: str) -> T:
         return found
     except UnicodeError as error:
         raise ProblemError(f"not UTF-8 ({error}); {hint}") from error
-    except ValueError as error:  # the message names the value's path and both types
+    except ValueError as error:  # msgspec's message names the path and the type of the faulty value
         raise ProblemError(f"{error}; {hint}") from error
     except RecursionError as error:
         raise ProblemError(f"nested too deeply; {hint}") from error

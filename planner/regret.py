@@ -1,4 +1,4 @@
-"""Regrets: costs of possible next visits compared with the best one."""
+"""Regrets: the extra costs of possible next visits compared with the best one."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ from planner.route import TaskState
 from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
-RADIUS = 1.0  # m
-MIN_RADIUS = 0.1  # radius below which no further pass is tried, m
-MAX_ROWS = 1 << 14  # maximum table rows for a pass's lower bound
+RADIUS = 1.0  # default for the largest regret that is computed exactly, in metres
+MIN_RADIUS = 0.1  # radius below which no further pass is tried, in metres
+MAX_ROWS = 1 << 14  # maximum number of table rows of a pass's lower bound
 MAX_STATES = 3_000_000  # maximum number of states in a pass, about 200 MB
-SAME = 1e-6  # m
+SAME = 1e-6  # maximum difference between equal tour lengths, in metres
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class Regret:
     """The regret of a possible next visit."""
 
     visit: Visit
-    cost: float  # length of the rest of the task if this visit is next, m
-    regret: float  # excess of that over the least such cost, m
+    cost: float  # length of the remaining tour in metres if this visit is next
+    regret: float  # excess in metres over the cost of the best visit
     proven: bool  # True if cost and regret are proven: exact, or lower bounds if `capped`
     capped: bool = False  # True if cost and regret are only lower bounds
 
 
 class RegretEvaluator:
-    """Evaluates possible and actual visits of a task with the exact planner. Results are bit-identical.
+    """Computes the regrets of possible and actual visits with the exact planner. Results are bit-identical.
 
-    `limit` is that of each search beyond 18 objects left, or None for the planner's own budget. `all` finds regrets up
-    to `radius`, m, exactly.
+    `limit` applies to each search with more than 18 remaining objects. If it is None, the planner's own budget applies.
+    `all` computes regrets up to `radius`, in metres, exactly.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class RegretEvaluator:
         self._last: tuple[TaskState, dict[Visit, Regret]] | None = None
 
     def limited(self, limit: SolveLimit) -> "RegretEvaluator":
-        """Return a new evaluator like this one with a limit for each search, for use in a thread."""
+        """Return a copy of this evaluator with a limit on each search, for use in another thread."""
         return RegretEvaluator(
             self._geodesics, solver=self._solver, capacity=self._capacity, limit=limit, radius=self._radius
         )
@@ -67,7 +67,7 @@ class RegretEvaluator:
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
         """Return the regret of each possible next visit, the best visit first.
 
-        `plan` is the plan for this state or an earlier one. If it is proven and for this state, the search is skipped.
+        `plan` is a plan for this state or an earlier one. If it is for this state and proven, the search is skipped.
         Raises UnreachableError if objects cannot be fetched or delivered.
         """
         if self._last is None or not same_state(self._last[0], state):
@@ -82,9 +82,10 @@ class RegretEvaluator:
         return dict(self._last[1])
 
     def of(self, state: TaskState, visit: Visit, plan: Plan | None = None) -> float | None:
-        """Return the exact regret of a visit, m, or None if the visit is not possible or nothing is proven.
+        """Return the exact regret of a visit in metres, or None if the visit is impossible or its regret is unproven.
 
-        Arguments and errors are those of `all`.
+        `plan` is a plan for this state or an earlier one, or None. Raises UnreachableError if objects cannot be fetched
+        or delivered.
         """
         if self._last is not None and same_state(self._last[0], state):
             known = self._last[1].get(visit)
@@ -98,7 +99,7 @@ class RegretEvaluator:
             return next(regret.regret for regret in _ranked(problem, *costs) if regret.visit == visit)
         before = plan if plan is not None and _is_best(plan, problem) else None
         before = before or self._solver.solve(problem, limit=self._limit)
-        warm = NOTHING_KNOWN.updated(problem, before)  # halves the time
+        warm = NOTHING_KNOWN.updated(problem, before)  # a warm start halves the time
         *_, rest = self._solver.improve(after(problem, visit), limit=self._limit, warm=warm)
         if not before.status is rest.status is Status.OPTIMAL:
             return None
@@ -143,17 +144,17 @@ def regrets(
 ) -> tuple[Regret, ...]:
     """Return the regrets of all possible next visits, the best visit first.
 
-    The exact planner evaluates all visits at once: from its full table if that fits (18 objects), else by one pass over
-    all tours at most `radius` longer than the best. Larger regrets are lower bounds of at least the radius, and
-    `capped`. If the pass grows too large, the radius is halved, down to 0.1 m. If even that is too much, if the best
-    tour is not proven, and for other capacities and solvers, the rest of the task is solved after each visit.
+    The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and otherwise one pass
+    over all tours that are at most `radius` longer than the best. Regrets above the radius are lower bounds, marked as
+    `capped`. If the pass grows too large, the radius is halved, down to 0.1 m. If this is still too large, if the best
+    tour is not proven, or for other capacities and solvers, the remaining task is solved separately after each visit.
 
     Args:
-        problem: The rest of the task.
+        problem: The remaining task.
         solver: Planner. With the exact one, regrets that are `proven` and not `capped` are exact.
         limit: Limit for each problem that the planner solves.
-        radius: Regrets up to this value are found exactly, m.
-        plan: A plan of this problem, or None. If it is proven, the search for it is skipped.
+        radius: Largest regret that is computed exactly, in metres.
+        plan: Plan of this problem, or None. If it is proven, the search for it is skipped.
 
     Raises:
         ProblemError: The radius is negative.
@@ -169,7 +170,7 @@ def regrets(
 def one_by_one(
     problem: RoutingProblem, solver: Solver, *, limit: SolveLimit | None = None
 ) -> tuple[Regret, ...]:
-    """Solve the rest of the task after each possible next visit, with any solver."""
+    """Compute regrets with any solver, by solving the remaining task after each possible next visit."""
     found = []
     for visit in possible_next(problem):
         plan = solver.solve(after(problem, visit), limit=limit)
@@ -188,7 +189,6 @@ def _ranked(
     longest: float = math.inf,
     least: Costs | None = None,
 ) -> tuple[Regret, ...]:
-    """Return regrets, best first, from costs in units of `unit` m. Costs above `longest` become lower bounds."""
     found = []
     for visit in possible_next(problem):
         cost, capped = costs[visit], costs[visit] > longest
@@ -212,9 +212,9 @@ def _beyond_table(
 def _around_best(
     problem: RoutingProblem, solver: ExactSolver, limit: SolveLimit | None, radius: float, plan: Plan | None
 ) -> tuple[Regret, ...] | None:
-    """Return the regrets up to `radius` above the cost of a proven plan. One pass finds them all.
+    """Compute all regrets in one pass over the tours that are at most `radius` longer than a proven plan.
 
-    None if the pass is too large or there is no proven plan.
+    Return None if the pass is too large or there is no proven plan.
     """
     metric, unit = problem.integers.metric, problem.integers.unit
     if plan is None or plan.status is not Status.OPTIMAL:
@@ -230,7 +230,7 @@ def _around_best(
     table = bound.table
     relaxed = costs_in(bound.instance, table, len(table.bin) - 1, problem.names[:n], problem.names[n:])
     least = {visit: cost - bound.prices for visit, cost in relaxed.items()}
-    dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # no tour is longer
+    dearest = (2 * n + len(problem.onboard)) * int(metric.max())  # upper bound on tour lengths
     while True:
         longest = best + math.floor(min(radius / unit, dearest))
         costs = costs_by_pass(bound, list(possible_next(problem)), longest, MAX_STATES, deadline)
@@ -242,7 +242,6 @@ def _around_best(
 
 
 def _is_best(plan: Plan, problem: RoutingProblem) -> bool:
-    """Return True if a plan is proven, and for this problem rather than an earlier state of the task."""
     visits = {problem.place(k) for k in range(len(problem.names))}
     visits |= {problem.pick(k) for k in range(len(problem.shipments))}
     if plan.status is not Status.OPTIMAL or set(plan.visits) != visits:

@@ -1,4 +1,4 @@
-"""The relaxation of a certificate in plain NumPy: its table, and all states that its bound cannot exclude."""
+"""NumPy implementation of the relaxation behind certificates, independent of the solver's."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planner.errors import ProblemError
 from planner.problem import RoutingProblem
 
-MAX_PRICES = 100  # largest sum of prices in lengths of the longest tour; beyond it, rounding would matter
+MAX_PRICES = 100  # maximum sum of prices relative to the longest tour; rounding errors would matter above it
 
 Lengths = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -17,7 +17,7 @@ Field = NDArray[Any]
 
 
 def closed(problem: RoutingProblem) -> Lengths:
-    """Return the shortest connections through locations of the tour, m, (k, k)."""
+    """Return the shortest connections between locations in metres, via locations of the tour, shape (k, k)."""
     shortest: Lengths = np.minimum(problem.distances, problem.distances.T)
     for k in problem.used:
         shortest = np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :])
@@ -25,27 +25,28 @@ def closed(problem: RoutingProblem) -> Lengths:
 
 
 class StateArrays(NamedTuple):
-    """States of a task, each field (states,)."""
+    """States of a task, with one array entry per state."""
 
-    left: Field  # objects left, as bits
-    place: Field  # bin b, or m + i at object i that was just picked, or m + n at the start
-    held: Field  # bin of the object in hand, or m for an empty hand
-    cost: Field  # length so far with the prices of picks, m
+    left: Field  # remaining objects (bit mask)
+    place: Field  # b at bin b, m + i at object i that was just picked up, m + n at the start
+    held: Field  # bin of the object in hand, or m for empty hands
+    cost: Field  # length so far plus the prices of picks, in metres
 
 
 class Relaxation:
-    """Shortest relaxed rest of a task from every state, for capacity one or two, in floats.
+    """Cost-to-go of the relaxed problem from every state, for a capacity of one or two.
 
-    A row of the table stands for numbers of objects left per group. Any object of a group may be picked, but none twice
-    in a row, each at a price, m. Every real tour is a relaxed tour that pays each price once. An object is left
-    whenever its bin is reached, which is always right in a metric.
+    Each table row corresponds to one combination of the numbers of remaining objects per group. Any object of a group
+    may be picked up, but not twice in a row, and each pick has a price. Every real tour is a relaxed tour that pays
+    each price once. An object is placed whenever its bin is reached, which is never worse in a metric.
 
     Attributes:
-        exact: True if the table holds for the given distances, not only for shortest connections.
-        root: Lower bound of all tours, m.
+        exact: True if the given distances satisfy the triangle inequality. Otherwise the table holds only for shortest
+            connections.
+        root: Lower bound on all tours in metres.
 
     Raises:
-        ProblemError: Prices are so large that rounding could exceed 1e-9 of a tour.
+        ProblemError: The prices are so large that rounding errors could exceed 1e-9 of a tour.
     """
 
     def __init__(self, problem: RoutingProblem, group: Whole, prices: Lengths) -> None:
@@ -64,7 +65,7 @@ class Relaxation:
         self._prices = prices
         size = np.bincount(group, minlength=1)
         strides = np.concatenate([[1], np.cumprod(size + 1)])
-        self._stride = strides[group]  # decrease of the row index when an object is picked
+        self._stride = strides[group]  # decrease of the row index when an object is picked up
         rows = np.arange(strides[-1])
         self._rest = self._filled(group, [rows // s % (k + 1) for s, k in zip(strides, size, strict=False)])
         here, after = self._begin()
@@ -72,13 +73,14 @@ class Relaxation:
         self.root = min(first) - float(prices.sum()) if places[:-1] else 0.0
 
     def _filled(self, group: Whole, left: list[Whole]) -> Lengths:
-        """Return the filled table.
+        """Fill the table.
 
-        Column b m + c is at bin b with an object for bin c (c = b: empty hands), and column m m + i is at object i.
+        Column b m + c is for bin b with an object for bin c in hand (c = b: empty hands). Column m m + i is for object
+        i.
         """
         n, m, home, total = len(self._home), self._bins, self._home, np.sum(left, axis=0)
         leave, to_bin, between = self._d[:m, :m], self._d[m:-1, :m], self._d[m:-1, m:-1].copy()
-        np.fill_diagonal(between, np.inf)  # no object is picked twice in a row
+        np.fill_diagonal(between, np.inf)  # no object is picked up twice in a row
         if self._hands == 1:
             between[:] = np.inf
         own = to_bin[np.arange(n), home]
@@ -105,10 +107,10 @@ class Relaxation:
         return table
 
     def shorter(self, limit: float, max_states: int) -> tuple[bool, int] | None:
-        """Return True if there is a tour shorter than a limit, m, and the number of visited states.
+        """Return True if a tour shorter than a limit in metres exists, and the number of visited states.
 
-        All states whose cost so far plus bound is below the limit are visited, layer by layer of picks. The result is
-        None if there are more than `max_states`.
+        Every state whose cost so far plus bound is below the limit is visited. The result is None if there are more
+        than `max_states`.
         """
         limit += float(self._prices.sum())
         here, after = self._begin()
@@ -127,7 +129,6 @@ class Relaxation:
         return False, states
 
     def _begin(self) -> tuple[StateArrays, StateArrays]:
-        """Return the states after the first leg: those with all objects left, and those after one pick."""
         n, m, held = len(self._home), self._bins, self._carried
         everything = (1 << n) - 1
         if len(held) == 2:
@@ -140,12 +141,10 @@ class Relaxation:
         return self._placed(start), _joined([NONE, *self._picked(start)])
 
     def _placed(self, states: StateArrays) -> StateArrays:
-        """Return the states after a leg to the bin of the object in hand."""
         left, place, held, cost = (field[states.held < self._bins] for field in states)
         return StateArrays(left, held, np.full_like(held, self._bins), cost + self._d[place, held])
 
     def _picked(self, states: StateArrays) -> Iterator[StateArrays]:
-        """Yield the states after a leg to an object and, with two objects in hand, a leg to either bin."""
         m = self._bins
         for j, c in enumerate(self._home.tolist()):
             left, place, held, cost = (field[(states.left >> j & 1).astype(bool)] for field in states)
@@ -161,7 +160,6 @@ class Relaxation:
             )
 
     def _rest_of(self, states: StateArrays) -> Lengths:
-        """Return lower bounds of the cost-to-go, including prices, m, (states,)."""
         m, row = self._bins, np.zeros(len(states.left), np.int64)
         for j, stride in enumerate(self._stride.tolist()):
             row += stride * (states.left >> j & 1)
@@ -171,7 +169,6 @@ class Relaxation:
         return rest
 
     def _best(self, parts: list[StateArrays], limit: float) -> StateArrays:
-        """Return the shortest path to each state from which a tour shorter than the limit may exist."""
         states = _joined(parts)
         kept = states.cost + self._rest_of(states) < limit
         states = StateArrays(*(field[kept] for field in states))

@@ -1,4 +1,4 @@
-"""The state of a task, routes through the rest of it, and the interface of plan sources."""
+"""Task states, routes through the remaining visits, and the interface of plan sources."""
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
@@ -15,11 +15,11 @@ class TaskState:
     """The state of a task in progress.
 
     Attributes:
-        position: Position of the person, m.
-        loose: Position of each object that is neither carried nor delivered, by name, m.
+        position: Position of the person in metres.
+        loose: Position in metres of each object that is neither carried nor delivered, by name.
         carried: Names of the carried objects.
-        deliveries: Place where a person stands to deliver each loose or carried object, by name, m. May contain more
-            names.
+        deliveries: Position in metres where a person stands to deliver each loose or carried object, by name. Other
+            names are ignored.
 
     Raises:
         ProblemError: An object is both loose and carried, is carried twice, or has no delivery.
@@ -43,19 +43,19 @@ class TaskState:
 
 @dataclass(frozen=True)
 class Route:
-    """The remaining visits in order."""
+    """The remaining visits of a plan, in order."""
 
     visits: tuple[Visit, ...]
-    plan: Plan  # the original plan, including visits that are done by now
+    plan: Plan  # the original plan, including completed visits
 
     @property
     def next(self) -> Visit | None:
-        """The next visit, or None if everything is done."""
+        """The next visit, or None after the last one."""
         return self.visits[0] if self.visits else None
 
 
 def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
-    """Return the visits still to be done if the done ones are the first ones, else None."""
+    """Return the visits that remain in a state, or None if the state is not reached by the visits in this order."""
     loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
     carried = {visit.object for visit in visits} - loose
     done = 0
@@ -75,28 +75,28 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
 class PlanSource(abc.ABC):
     """A source of routes for the planner."""
 
-    # starts a search for better plans in the background; None if each plan is final
+    # runs a search for better plans in the background; None if each plan is final
     start: Callable[[Callable[[], None]], object] | None = None
 
     @abc.abstractmethod
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """Return the remaining visits of a route, or None if another plan is due."""
+        """Return the remaining visits of a route, or None if a new plan is needed."""
 
     @abc.abstractmethod
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
-        """Return a new route (see `Planner.ask`). `route` is the previous one."""
+        """Return a new route for a state, given the previous one. `shown` is explained at `Planner.ask`."""
 
     def check(self, state: TaskState) -> None:  # noqa: B027 - optional
-        """Raise UnreachableError, with names, if objects cannot be fetched or delivered."""
+        """Raise UnreachableError, with the names of the objects, if objects cannot be fetched or delivered."""
 
     @property
     def pending(self) -> bool:
-        """True if `better` has to be called."""
+        """True if a background search has results that `better` has not returned yet."""
         return False
 
     def better(self, state: TaskState, route: Route) -> Route | None:  # noqa: ARG002 - each plan is final
-        """Return a route for the same task that is better or has a better bound, or None."""
+        """Return a shorter route for the same task, or the same route with a better bound, or None."""
         return None
 
     def close(self) -> None:  # noqa: B027 - optional
-        """Stop searching."""
+        """Stop the background search, if any."""

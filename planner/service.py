@@ -1,4 +1,4 @@
-"""The planner of a session, which answers immediately, from a thread, or live for a person."""
+"""The planner of a session, which works in the caller's thread, in one background thread, or live for a participant."""
 
 import contextlib
 import enum
@@ -16,28 +16,29 @@ from planner.route import PlanSource, Route, TaskState
 from planner.solvers import SolveLimit
 
 T = TypeVar("T")
-REGRET_SECONDS = 5.0  # limit on the wall time for the regrets of one state in live mode, s
+REGRET_SECONDS = 5.0  # maximum wall time for the regrets of one state in live mode, in seconds
 
 
 class Mode(enum.Enum):
-    """Mode of a planner. The value is the largest number of threads."""
+    """Execution mode of a planner. The value is the maximum number of threads."""
 
-    INLINE = 0  # answers immediately
-    THREAD = 1  # gives the same answers from a thread, in order; callers wait for those that they need
-    LIVE = 32  # gives a first plan immediately, and better plans and regrets from threads
+    INLINE = 0  # plans in the caller's thread
+    THREAD = 1  # gives the same results from one background thread, in order
+    LIVE = 32  # returns a first plan immediately, and computes better plans and regrets in threads
 
 
 class Planner:
-    """Keeps the route of a task, and finds the regrets of its alternatives.
+    """Plans the route of a task and computes the regrets of its alternatives.
 
-    A route is kept while the done visits are its first ones and no object was pushed far. Otherwise there is a new plan
-    (PAPER section 2). In the modes `INLINE` and `THREAD`, answers are reproducible, because budgets count work. In
-    `LIVE`, the caller never waits for a proof, and answers depend on the machine's speed.
+    A route is kept while the participant follows it and no object is pushed far. Otherwise a new plan is made (PAPER
+    section 2). In the modes `INLINE` and `THREAD`, results are reproducible because search budgets count work instead
+    of time. In `LIVE` mode, the caller never waits for a proof of optimality, and results depend on the machine's
+    speed.
 
     Args:
-        source: Makes the plans.
-        evaluator: Finds the regrets.
-        mode: Mode of the planner.
+        source: Source of the plans.
+        evaluator: Evaluator that computes the regrets.
+        mode: Execution mode.
 
     Attributes:
         replans: Number of new plans made because the route no longer fitted.
@@ -50,17 +51,19 @@ class Planner:
         self._executor = None if mode is Mode.INLINE else ThreadPoolExecutor(mode.value, "planner")
         self._route: Route | None = None
         self._prepared: TaskState | None = None
-        self._task: tuple[TaskState, Plan] | None = None  # the last state, and its plan
+        self._task: tuple[TaskState, Plan] | None = None  # last requested state and its plan
         self._asked = False
         self._running: list[Future[Any]] = []
-        self._latest: Future[None] | None = None  # last job in the thread
-        self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of that state in live mode
-        self._stop = threading.Event()  # stops the search for these regrets
-        self._late: list[tuple[Any, TaskState, Visit, Plan]] = []  # visits to judge after the task
+        self._latest: Future[None] | None = None  # last job submitted to the thread
+        self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of the last state, in live mode
+        self._stop = threading.Event()  # set to stop the search for these regrets
+        self._late: list[
+            tuple[Any, TaskState, Visit, Plan]
+        ] = []  # visits whose regrets are computed after the task
         self.use(source)
 
     def use(self, source: PlanSource) -> None:
-        """Make plans with this source from now on. The route stays."""
+        """Switch to another source of plans. The current route is kept."""
         self._source = source
         source.start = self._start if self.mode is Mode.LIVE else None
 
@@ -76,14 +79,15 @@ class Planner:
 
     @property
     def next(self) -> Visit | None:
-        """The next visit, or None before the first plan and when everything is done."""
+        """The next visit, or None before the first plan and after the last visit."""
         route = self.route
         return None if route is None else route.next
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> None:
-        """Plan for the state in which the task will start. Raises as `ask`.
+        """Plan in advance for the state in which the task will start.
 
-        In live mode, `seconds` is the longest wait for the proof. Finding the first regrets then loads the kernels.
+        In live mode, wait up to `seconds` for the proof, then compute regrets once to load their kernels. Raises
+        UnreachableError or ProblemError if the task is impossible.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -100,23 +104,24 @@ class Planner:
         shown: bool = True,
         then: Callable[[Route, bool], None] = lambda _route, _new: None,
     ) -> None:
-        """Request the next visits.
+        """Request a route for the current state of the task.
 
         Args:
-            state: The task as it is now.
-            shown: True if the plan is shown. It then depends only on this state. A plan that is not shown starts from
-                earlier ones, which is several times faster, but may result in another one of equally short tours.
-            then: Called with the route, and with True if its plan is new.
+            state: Current state of the task.
+            shown: True if the plan is shown to the participant. It then depends only on this state. A plan that is not
+                shown reuses earlier results, which is several times faster but may select another of several equally
+                short tours.
+            then: Function called with the route, and with True if the route has a new plan.
 
         Raises:
-            UnreachableError: Objects cannot be fetched or delivered. `names` lists them.
+            UnreachableError: Some objects cannot be fetched or delivered. `names` lists them.
             ProblemError: More objects are carried than the capacity allows.
         """
 
         def answer(before: Route | None) -> None:
             first, self._asked = not self._asked, True
             if before is not None and first and state != self._prepared:
-                before = None  # the plan was prepared for another start
+                before = None  # the task starts in another state than the prepared one
             rest = None if before is None else self._source.rest(before, state)
             if before is None or rest is None:
                 self.replans += not first
@@ -127,13 +132,13 @@ class Planner:
             then(route, first or rest is None)
 
         if self.mode is Mode.THREAD:
-            self._source.check(state)  # in the caller's thread, so that an impossible task fails at once
+            self._source.check(state)  # an impossible task fails here, in the caller's thread
         self.do(answer)
 
     def do(self, job: Callable[[Route | None], None]) -> None:
-        """Call a function with the route for the last requested state, once it is known.
+        """Call a function with the route for the last requested state, as soon as that route is available.
 
-        Raises PlannerError if planning failed. In thread mode, the next request raises it.
+        Raises PlannerError if planning failed. In thread mode, the next request raises the error.
         """
         before = self._latest
 
@@ -149,17 +154,17 @@ class Planner:
 
     @property
     def pending(self) -> bool:
-        """True if `improve` has to be called."""
+        """True if a background search has results that `improve` has not returned yet."""
         return self._source.pending
 
     def improve(self, state: TaskState) -> Route | None:
-        """Return a route for the same task that is better or has a better bound, or None. Raises as `ask`."""
+        """Return a shorter route for the same task, or the same route with a better bound, or None."""
         better = None if self._route is None else self._source.better(state, self._route)
         self._route = better or self._route
         return better
 
     def regrets(self) -> Mapping[Visit, Regret]:
-        """Return the regrets of all possible next visits, the best first, or nothing until they are known."""
+        """Return the regrets of all possible next visits, smallest first, or nothing if not computed yet."""
         if self.route is None or self._task is None:
             return {}
         if self.mode is not Mode.LIVE:
@@ -170,13 +175,13 @@ class Planner:
         return self._regrets.result() if self._regrets.done() else {}
 
     def regret(self, visit: Visit) -> float | None:
-        """Return the exact regret of a visit, m, or None if it is not possible or not proven. May take long."""
+        """Compute the exact regret of a visit in metres, or None if it is impossible or unproven. This can be slow."""
         return None if self._task is None else self._evaluator.of(self._task[0], visit, self._task[1])
 
     def judge(self, visit: Visit, label: Any) -> float | None:
-        """Return the regret of a visit that was made.
+        """Return the regret of a completed visit in metres.
 
-        In live mode return None, and let `finish` return it with its label.
+        In live mode, return None. `finish` then returns the regret together with `label`.
         """
         if self.mode is not Mode.LIVE:
             return self.regret(visit)
@@ -185,7 +190,10 @@ class Planner:
         return None
 
     def finish(self) -> list[tuple[Any, float | None]]:
-        """End the task. Return the labels and regrets of postponed visits. Raises PlannerError if planning failed."""
+        """End the task. Return the label and regret of each visit that `judge` postponed.
+
+        Raises PlannerError if planning failed.
+        """
         self.settle()
         _ = self.route
         self._forget_regrets()
@@ -193,17 +201,17 @@ class Planner:
         return [(label, self._evaluator.of(state, visit, plan)) for label, state, visit, plan in late]
 
     def settle(self) -> None:
-        """In thread mode, wait for all answers and change to inline mode."""
+        """In thread mode, wait for all results and switch to inline mode."""
         if self.mode is Mode.THREAD:
             self.wait()
             self.mode = Mode.INLINE
 
     def wait(self, seconds: float | None = None) -> None:
-        """Wait for the threads, for a limited time if `seconds` is given."""
+        """Wait until all threads are idle, or for at most `seconds` if given."""
         futures.wait(self._running, seconds)
 
     def close(self) -> None:
-        """Wait for all answers, and stop searching for better ones."""
+        """Wait for all requested routes, stop background searches, and shut down the threads."""
         self.settle()
         self._source.close()
         self._forget_regrets()
@@ -221,7 +229,6 @@ class Planner:
         return self._route
 
     def _set_task(self, state: TaskState, plan: Plan) -> None:
-        """Set the state of the task. A new plan for the same state keeps its regrets."""
         if self._task is not None and same_state(self._task[0], state):
             state = self._task[0]
         else:
@@ -233,7 +240,7 @@ class Planner:
         self._regrets = None
 
     def _find_regrets(self, state: TaskState, plan: Plan, stop: threading.Event) -> Mapping[Visit, Regret]:
-        """Find the regrets of a state in a thread. An impossible task has none, because `ask` reports it."""
+        """Compute the regrets of a state. Planning errors are ignored, because `ask` raises them."""
         with contextlib.suppress(PlannerError):
             found = self._evaluator.limited(SolveLimit(seconds=REGRET_SECONDS, stop=stop)).all(state, plan)
             return {} if stop.is_set() else found

@@ -1,4 +1,4 @@
-"""Routes from a solver: final plans, or first plans at once and better ones from a search in the background."""
+"""Routes from a solver, which a background search can improve."""
 
 import math
 import queue
@@ -16,24 +16,20 @@ from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
-MOVED = 0.3  # how far an object may be pushed before a new plan is needed, m
-TIE = 0.01  # difference below which tours count as equal, m; rounding to 0.1 mm can add up to this
+MOVED = 0.3  # maximum distance that an object may be pushed without a new plan, in metres
+TIE = 0.01  # difference below which tours count as equal, in metres; legs are rounded to 0.1 mm
 PROOF_LIMIT = SolveLimit(seconds=20.0)
 
 
 @dataclass(eq=False)
 class _BackgroundSearch:
-    """A search for a plan better than the shown visits."""
-
     problem: RoutingProblem
-    plans: Iterator[Plan]  # better and better plans
-    stop: threading.Event  # set to stop the search
-    shown: tuple[Visit, ...] = ()  # visits of the shown route that remain in `problem`
-    # new plans, or the exception that ended the search
+    plans: Iterator[Plan]
+    stop: threading.Event
+    shown: tuple[Visit, ...] = ()  # remaining visits of the route shown to the participant
     found: "queue.SimpleQueue[Plan | Exception]" = field(default_factory=queue.SimpleQueue)
 
     def run(self) -> None:
-        """Collect plans until there are no more, or `stop` is set."""
         try:
             for plan in self.plans:
                 self.found.put(plan)
@@ -53,7 +49,7 @@ class _BackgroundSearch:
         return plans
 
     def bounded(self, other: Plan) -> Plan:
-        """Return the plan of the shown visits, with the bound of another plan of the same problem."""
+        """Return the shown visits as a plan, with the lower bound of another plan for the same problem."""
         cost = tour_length(self.problem, self.shown)
         optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + self.problem.tolerance(cost)
         lower = cost if optimal else min(other.lower_bound, cost)
@@ -62,14 +58,15 @@ class _BackgroundSearch:
 
 
 class SolverSource(PlanSource):
-    """Plans the successive states of a task with a solver. Positions are snapped to the largest island of the navmesh.
+    """Plans each state of a task with a solver. Positions are snapped to the largest island of the navmesh.
 
-    With the exact planner, plans that are not shown start from earlier ones: from a full table if that is small enough,
-    else from the multipliers of the bound. The same sequence of states gives the same plans.
+    With the exact planner, plans that are not shown reuse earlier results: the full table if it is small enough,
+    otherwise the multipliers of the lower bound. The same sequence of states always gives the same plans.
 
-    If `start` is set, `plan` returns a first plan within about 50 ms and starts a search for a better one, by default
-    for 20 s. The search uses the multipliers of earlier bounds and the order of the route, by object name. Results
-    depend on the machine's speed. Only kernels of the exact planner run without the interpreter lock.
+    If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a better one,
+    which lasts up to 20 s by default. The search reuses the multipliers of earlier bounds and the order of objects in
+    the previous route. Results then depend on the machine's speed. Only the kernels of the exact planner release the
+    interpreter lock.
     """
 
     def __init__(
@@ -92,7 +89,7 @@ class SolverSource(PlanSource):
         self.problems.check(state)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """Return the remaining visits if the done ones are the first and no object was pushed far, else None."""
+        """Return the remaining visits of a route, or None if the participant left it or an object was pushed far."""
         return None if self._moved(state, state.loose) else remaining(route.visits, state)
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
@@ -106,7 +103,7 @@ class SolverSource(PlanSource):
         return self._follow(state, plan.visits, plan)
 
     def adopt(self, state: TaskState) -> None:
-        """Treat the present route, of another source, as planned in this state."""
+        """Accept the current route, made by another source, as planned in this state."""
         self._planned = dict(state.loose)
 
     def _follow(self, state: TaskState, visits: tuple[Visit, ...], plan: Plan) -> Route:
@@ -115,14 +112,14 @@ class SolverSource(PlanSource):
 
     @property
     def pending(self) -> bool:
-        """True if the search has found something since the last call of `better`."""
+        """True if the background search has produced results since the last call of `better`."""
         return self._search is not None and not self._search.found.empty()
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """Return another route if it is shorter by more than rounding from where the person is now.
+        """Return a new route if it is shorter than the current one by more than rounding, from the person's position.
 
-        Otherwise return the present route with a better bound, or None. So the suggestion does not alternate between
-        equal tours.
+        Otherwise return the current route with a better bound, or None. This keeps the suggestion from alternating
+        between tours of equal length.
         """
         search = self._search
         plans = search.drain() if search is not None else []
@@ -133,7 +130,7 @@ class SolverSource(PlanSource):
             self._warm = self._warm.updated(search.problem, plan)
         best = plans[-1]
         new = remaining(best.visits, state)
-        if new is None:  # the plan begins with visits that were not made: search again from here
+        if new is None:  # the participant made other visits than this plan, so search again
             self._show(self._new_search(state, route), rest)
             return None
         if self.problems.length(state, new) < self.problems.length(state, rest) - TIE:
@@ -143,13 +140,13 @@ class SolverSource(PlanSource):
         return Route(rest, bounded) if bounded.improves_on(route.plan) else None
 
     def close(self) -> None:
-        """Stop the search, which ends with its present layer after a fraction of a second."""
+        """Stop the background search. Its thread ends within a fraction of a second."""
         if self._search is not None:
             self._search.stop.set()
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        """Return a final plan. If it is shown, it depends only on this problem."""
+        """Solve a problem. A plan that is shown reuses no earlier results."""
         if shown or self._table is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
         plan = self._table.plan(problem)
@@ -161,7 +158,6 @@ class SolverSource(PlanSource):
         return plan
 
     def _new_search(self, state: TaskState, route: Route | None) -> _BackgroundSearch:
-        """Return a search that starts from the results of earlier ones."""
         self.close()
         problem, stop = self.problems.problem(state), threading.Event()
         picks = () if route is None else (v.object for v in route.visits if v.kind is VisitKind.PICK)
@@ -172,7 +168,6 @@ class SolverSource(PlanSource):
         return _BackgroundSearch(problem, self._improving(problem, limit), stop)
 
     def _show(self, search: _BackgroundSearch, shown: tuple[Visit, ...]) -> None:
-        """Start a search for a plan better than these visits."""
         self._search, search.shown = search, shown
         assert self.start is not None  # noqa: S101 - for the type checker
         self.start(search.run)

@@ -1,4 +1,4 @@
-"""The interface of solvers, their limits, and their names."""
+"""Solver interface, search limits, and the registry of solvers by name."""
 
 import importlib
 import math
@@ -15,24 +15,24 @@ if TYPE_CHECKING:  # the command line imports this module and must not load NumP
     from planner.plan import Plan
     from planner.problem import RoutingProblem
 
-# Name -> module and class. To add a planner, add its module and an entry here.
+# Module and class of each solver, by name. To add a solver, write its module and add an entry here.
 SOLVERS = {
     "exact": ("planner.exact.solver", "ExactSolver"),
     "ortools": ("planner.ortools_solver", "OrToolsSolver"),
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 60_000_000  # budget of the exact search for offline use, states; about 30 s with 30 objects
+PATIENT_WORK = 60_000_000  # maximum states of an exact search in offline use, about 30 s with 30 objects
 
 
 @dataclass(frozen=True)
 class SolveLimit:
-    """Limit of a search.
+    """Limits of a search. A limit of None does not apply.
 
     Attributes:
-        work: Amount of work in the solver's own unit. Results are bit-identical on every machine.
-        seconds: Wall time. Results depend on the machine.
-        stop: Event that stops the solver soon, set by another thread.
+        work: Maximum work, in a unit that the solver defines. Results are bit-identical on every machine.
+        seconds: Maximum wall time in seconds. Results depend on the machine's speed.
+        stop: Event that another thread sets to end the search early.
     """
 
     work: int | None = None
@@ -51,7 +51,7 @@ class SolveLimit:
 
 @dataclass(frozen=True)
 class Deadline:
-    """A point in time of `time.perf_counter()` (None means never), or an event that another thread sets."""
+    """The end of a search: a time of `time.perf_counter()`, or never if None, or an event set by another thread."""
 
     at: float | None
     stop: threading.Event | None = None
@@ -65,30 +65,30 @@ NEVER = Deadline(None)
 
 
 class Solver(Protocol):
-    """A planner for routing problems."""
+    """Interface of a planner for routing problems."""
 
     @property
     def name(self) -> str:
-        """Name in run records."""
+        """Name of the solver in run records."""
 
     def solve(self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None) -> "Plan":
-        """Return a plan. Without a limit on time, the same arguments give the same visits."""
+        """Solve a problem. Without a time limit, the same arguments always give the same visits."""
 
     def improve(
         self, problem: "RoutingProblem", *, seed: int = 0, limit: SolveLimit | None = None
     ) -> "Iterator[Plan]":
-        """Yield a first plan at once, then each plan that is shorter or has a better bound.
+        """Yield a first plan immediately, then every plan that is shorter or has a better lower bound.
 
-        The last plan is the result of `solve` for the same arguments, except with limits on time. The caller may stop
-        the iteration at any time.
+        The last plan equals the result of `solve` for the same arguments, unless there is a time limit. The caller may
+        stop iterating at any time.
         """
 
 
 def solver(name: str) -> Solver:
-    """Return the planner of this name, or of `package.module:attribute`: a class, or a function without arguments.
+    """Create a planner from its name, or by calling a `package.module:attribute` without arguments.
 
     Raises:
-        PlannerError: There is no such planner, or it cannot be made.
+        PlannerError: No planner has this name, or creating it failed.
 
     Example:
         >>> import numpy as np
@@ -107,7 +107,7 @@ def solver(name: str) -> Solver:
         )
     try:
         found = pkgutil.resolve_name(name)()
-    except (Exception, SystemExit) as error:  # user code may raise anything on import
+    except (Exception, SystemExit) as error:  # user code may raise any exception on import
         raise PlannerError(
             f"cannot make the planner {name!r}: {type(error).__name__}: {error}; "
             "modules are searched for in the current folder and among those installed"

@@ -1,4 +1,4 @@
-"""Routing problems of the states of a task. Positions are replaced by the nearest navigable points."""
+"""Routing problems for the states of a task, with positions snapped to the navmesh."""
 
 import math
 from collections.abc import Sequence
@@ -12,23 +12,24 @@ from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 from planner.route import XY, TaskState
 
-RESOLUTION = 1e-4  # precision of geodesics, m
+RESOLUTION = 1e-4  # precision of geodesic distances, in metres
 
 
 class TaskProblems:
-    """Makes the routing problems of the successive states of a task, and caches distances."""
+    """Creates the routing problems for successive states of a task, and caches distances."""
 
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
         self._capacity = capacity
-        self._snapped: dict[XY, XY] = {}  # navigable point for each position
+        self._snapped: dict[XY, XY] = {}  # nearest navigable point of each position
         self._row: dict[XY, int] = {}  # row of each place in `_distances`
         self._distances: NDArray[np.float64] = np.zeros((0, 0))
 
     def problem(self, state: TaskState) -> RoutingProblem:
-        """Return the routing problem of a state: shipments in the order of `loose`, onboard as in `carried`, by name.
+        """Return the routing problem of a state. The order of objects is that of `loose`, then of `carried`.
 
-        Raises UnreachableError as `check`, and ProblemError if more objects are carried than the capacity allows.
+        Raises UnreachableError if objects cannot be fetched or delivered, and ProblemError if more objects are carried
+        than the capacity allows.
         """
         at = self._places(state)
         places = list(dict.fromkeys(at.values()))
@@ -52,11 +53,14 @@ class TaskProblems:
         )
 
     def check(self, state: TaskState) -> None:
-        """Raise UnreachableError, with names, if objects cannot be fetched or delivered."""
+        """Raise UnreachableError, with the names of the objects, if objects cannot be fetched or delivered."""
         self._places(state)
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
-        """Return the length of an open tour from the state's position, m. Raises as `check`."""
+        """Return the length of an open tour from the person's position in metres.
+
+        Raises UnreachableError if objects cannot be fetched or delivered.
+        """
         at = self._places(state)
         stops = [at[visit] for visit in visits]
         if not stops:
@@ -71,7 +75,6 @@ class TaskProblems:
         return float(x), float(y)
 
     def _places(self, state: TaskState) -> dict[Visit, XY]:
-        """Return the navigable position of each visit that may remain."""
         wanted = {Visit(VisitKind.PICK, name): at for name, at in state.loose.items()}
         for name in (*state.loose, *state.carried):
             wanted[Visit(VisitKind.PLACE, name)] = state.deliveries[name]
@@ -90,7 +93,7 @@ class TaskProblems:
         return places
 
     def _between(self, places: list[XY]) -> NDArray[np.float64]:
-        """Return distances between places. Only rows of places that are new since the last call are computed."""
+        """Return the distances between places. Only those of new places are computed."""
         old = [p for p in places if p in self._row]
         new = [p for p in places if p not in self._row]
         order = {p: k for k, p in enumerate([*old, *new])}

@@ -18,29 +18,29 @@ from mjsim.support.kernels import kernel
 from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
-SLACK = 1e-9  # bound on the rounding errors of lengths, m
-REPEATED = 1e-9  # distance below which two corners count as one, m
+SLACK = 1e-9  # upper bound on rounding errors of path lengths, in metres
+REPEATED = 1e-9  # distance below which two corners count as one, in metres
 
 
 class Edges(NamedTuple):
-    """A graph in the plane, in the format of a `csr_array`."""
+    """A graph of points in the plane, in compressed sparse row format."""
 
-    vertices: NDArray[np.float64]  # x and y of each vertex, m, and further columns, (v, 2 or more)
-    starts: NDArray[np.int32]  # first edge of each vertex, (v + 1,)
-    ends: NDArray[np.int32]  # vertex that each edge leads to, (e,)
-    lengths: NDArray[np.float64]  # of the edges, m, (e,)
+    vertices: NDArray[np.float64]  # positions in metres in the first two columns
+    starts: NDArray[np.int32]  # index of each vertex's first edge, shape (v + 1,)
+    ends: NDArray[np.int32]  # vertex at the end of each edge, shape (e,)
+    lengths: NDArray[np.float64]  # length of each edge in metres, shape (e,)
 
 
 class Views(NamedTuple):
-    """The vertices that some points see."""
+    """Vertices that are visible from each of m points, in compressed sparse row format."""
 
-    starts: NDArray[np.int32]  # first entry of each of m points in the other arrays, (m + 1,)
-    seen: NDArray[np.int32]  # seen vertices, grouped by point, (k,)
-    lengths: NDArray[np.float64]  # distances to them, m, (k,)
+    starts: NDArray[np.int32]  # index of each point's first entry in the other arrays, shape (m + 1,)
+    seen: NDArray[np.int32]  # visible vertices, grouped by point, shape (k,)
+    lengths: NDArray[np.float64]  # distance from the point to each visible vertex in metres, shape (k,)
 
 
 class Paths(NamedTuple):
-    """Length of the shortest known path to each vertex, m, (v,), and its previous vertex, or -1, (v,)."""
+    """Shortest known distance to each vertex in metres, and its predecessor or -1. Both have shape (v,)."""
 
     over: NDArray[np.float64]
     before: NDArray[np.int32]
@@ -48,13 +48,13 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class VisibilityGraph:
-    """Static part of the shortest-path search, built once per navmesh."""
+    """Visibility graph of a navmesh, built once."""
 
-    # x, y of each reflex vertex, then of the ring's previous and next vertex, m, (v, 6)
+    # x and y of each reflex vertex, and of its two neighbours on the ring, in metres, shape (v, 6)
     vertices: NDArray[np.float64]
-    island: NDArray[np.int64]  # island of each vertex, (v,)
-    walls: SegmentGrid  # edges of the solid obstacles
-    edges: Edges  # pairs of vertices that see each other
+    island: NDArray[np.int64]  # island of each vertex, shape (v,)
+    walls: SegmentGrid  # edges of the obstacles
+    edges: Edges  # edges between vertices that see each other
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
@@ -102,10 +102,6 @@ def _edges(geometry: shapely.Geometry) -> NDArray[np.float64]:
 
 @kernel
 def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) -> bool:
-    """Return True if a line from (x, y) passes a vertex, (6,), with both of its neighbours on one side.
-
-    All are in m.
-    """
     ux, uy = vertex[0] - x, vertex[1] - y
     before = ux * (vertex[3] - vertex[1]) - uy * (vertex[2] - vertex[0])
     after = ux * (vertex[5] - vertex[1]) - uy * (vertex[4] - vertex[0])
@@ -118,9 +114,9 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 def vertex_pairs(
     vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the numbers i < j of vertices (v, 6) that see each other along a line tangent at both, each (pairs,).
+    """Return the indices i < j of vertices that see each other along a line that is tangent at both.
 
-    `island` is that of each vertex, (v,). `walls` are the edges of the solid obstacles, with a tolerance `slack`, m.
+    `vertices` and `island` are those of `VisibilityGraph`. `slack` is the tolerance of the tangent test in metres.
     """
     rows, columns = [0], [0]
     for i in range(vertices.shape[0]):
@@ -145,7 +141,7 @@ def visible_vertices(
     walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the usable vertices, of (v, 6), that a point sees along tangents, and their distances, m, each (seen,)."""
+    """Return the usable vertices that a point sees along tangents, and their distances in metres."""
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]
@@ -159,10 +155,7 @@ def visible_vertices(
 def direct_distances(
     a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
 ) -> NDArray[np.float64]:
-    """Return straight distances from points a (s, 2) to b (t, 2), infinite if a wall is between, (s, t).
-
-    All are in m.
-    """
+    """Return the straight distances from points `a` to points `b`, infinite if a wall is between, shape (s, t)."""
     result = np.full((a.shape[0], b.shape[0]), np.inf)
     for i in range(a.shape[0]):
         for j in range(b.shape[0]):
@@ -175,17 +168,17 @@ def direct_distances(
 def search_from(
     graph: Edges, views: Views, point: int, goal: NDArray[np.float64], rest: NDArray[np.float64]
 ) -> tuple[Paths, int]:
-    """Find shortest paths from a point, nearest to the goal first (A*; Hart, Nilsson and Raphael 1968).
+    """Find shortest paths from a point with A* (Hart, Nilsson and Raphael 1968).
 
-    Among equally short paths it finds that of Dijkstra's algorithm, with the earlier last corners. `point` is the
-    number of the start in `views`. Without a goal, (2,) or empty, it finds the paths to all vertices. `rest` is the
-    length of the last leg from each vertex to the goal, infinite if it is not seen, m, (v,). Return the paths, and the
-    last vertex of the shortest path to the goal, or -1.
+    Among equally short paths, it selects the same one as Dijkstra's algorithm. `point` is the index of the start in
+    `views`. `goal` has shape (2,), or is empty to find the paths to all vertices. `rest` is the straight distance from
+    each vertex to the goal in metres, infinite if the goal is not visible, shape (v,). Return the paths, and the last
+    vertex of the shortest path to the goal, or -1.
     """
     size = len(graph.vertices)
     paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))
     last, best = -1, np.inf
-    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); this sentinel stays last
+    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); a sentinel stays last
     for k in range(views.starts[point], views.starts[point + 1]):
         vertex = views.seen[k]
         paths.over[vertex] = views.lengths[k]
@@ -210,14 +203,12 @@ def search_from(
 
 @kernel
 def earlier(paths: Paths, vertex: int) -> float:
-    """Return the path length at a vertex's predecessor, m, or 0 if the predecessor is the start."""
     before = paths.before[vertex]
     return float(paths.over[before]) if before >= 0 else 0.0
 
 
 @kernel
 def at_least(graph: Edges, vertex: int, goal: NDArray[np.float64]) -> float:
-    """Return the straight distance from a vertex to the goal (2,), m, or 0 without a goal."""
     if goal.size == 0:
         return 0.0
     return float(np.hypot(graph.vertices[vertex, 0] - goal[0], graph.vertices[vertex, 1] - goal[1]))
@@ -225,9 +216,9 @@ def at_least(graph: Edges, vertex: int, goal: NDArray[np.float64]) -> float:
 
 @kernel
 def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tuple[float, NDArray[np.float64]]:
-    """Return the shortest path between two points (2, 2), m, over vertices, given the views of both.
+    """Return the length and the points of the shortest path over vertices between two points, in metres.
 
-    The result is its length, m, which is infinite without a path, and its points, m, (k, 2).
+    `ends` has shape (2, 2), and `views` contains the views of both ends. The length is infinite if there is no path.
     """
     rest = np.full(len(graph.vertices), np.inf)
     for k in range(views.starts[1], views.starts[2]):
@@ -252,7 +243,7 @@ def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tupl
 
 @kernel
 def distances(graph: Edges, sources: Views, targets: Views) -> NDArray[np.float64]:
-    """Return the distances over vertices between points, m, (s, t), infinite without a path."""
+    """Return the shortest distances over vertices between points in metres, infinite without a path, shape (s, t)."""
     count, points = len(sources.starts) - 1, len(targets.starts) - 1
     result = np.full((count, points), np.inf)
     nowhere, rest = np.empty(0), np.full(len(graph.vertices), np.inf)

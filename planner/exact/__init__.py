@@ -1,18 +1,18 @@
-"""Exact planning for one or two hands: optimal tours with proof, or the best tour so far with a bound.
+"""Exact planning for a capacity of one or two: a proven optimal tour, or the best known tour with a bound.
 
-Planners of sessions and `mjsim plan` use this package through `solver.ExactSolver`. The equations are in `table`,
-and docs/planners.md, "How the proof works", explains the method.
+The entry point is `solver.ExactSolver`. The equations are in `table`, and the section "How the proof works" of
+docs/planners.md explains the method.
 
-    solver        ExactSolver: the full table for up to 18 objects, else the search; OR-Tools for other problems
-    full_table    fills the full table and follows a shortest tour in it
-    task_table    a full table for the successive states of a task
-    instance      a routing problem as flat arrays of integers
-    table         E, V, W, Y: the recursion and its relaxation; fills small tables without numba
-      table_kernels   fills any table, eight sums and minima at once
-    search        annealing, then passes of a layered beam search that widen until the tour is proven
-      annealing       a first tour: any order of picks, with optimal placing by dynamic programming
-      multipliers     the bound: groups and Lagrangian prices of the relaxation, by subgradient ascent
-      expand, nodes   kernels of a layer: the successors of its states, and the most promising of them
-    table_regret  costs of possible next visits, from a table or from all tours that are short enough
-    warm_start    multipliers, groups and order by name, from one state of a task to the next
+    solver        the full table for up to 18 objects, else the search; OR-Tools for other problems
+    full_table    the table over all subsets of objects, and shortest tours in it
+    task_table    a full table for successive states of a task
+    instance      a routing problem as integer arrays
+    table         the recursion and its relaxation; fills small tables without numba
+      table_kernels   fills any table, eight entries at once
+    search        annealing, then beam searches of increasing width until the tour is proven
+      annealing       a first tour, with objects placed optimally for each order of picks
+      multipliers     the lower bound, from Lagrangian prices fitted by subgradient ascent
+      expand, nodes   kernels that expand a layer of states and keep the best
+    table_regret  costs of possible next visits, from a table or an exhaustive pass
+    warm_start    results of earlier plans, reused in later states of a task
 """

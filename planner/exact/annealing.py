@@ -1,4 +1,4 @@
-"""A good first tour, by simulated annealing over the order of picks with optimal places to leave objects."""
+"""A first tour, by simulated annealing over the order of picks. Objects are placed optimally for each order."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,12 @@ from planner.exact.instance import Instance
 from planner.exact.table import INFINITE
 from planner.exact.warm_start import Start
 
-HOT, COLD = 0.5, 0.01  # first and last temperature, in mean leg lengths
+HOT, COLD = 0.5, 0.01  # first and last temperature, relative to the mean leg length
 
 
 @inlined
 def uniform(state: NDArray[np.uint64]) -> float:
-    """Return the next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014). The state is (1,)."""
+    """Return the next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014), and advance its state."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -24,10 +24,9 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 @kernel
 def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """Return up to four ways to leave objects before the next pick.
+    """Return up to four ways to place objects before the next pick, each as (first bin, second bin, bin still held).
 
-    Each is a bin, a second bin, and the bin of the object still held. `held` and `other` are the bins of the objects in
-    hand, of `m` bins. `m` stands for no bin, or an empty hand.
+    `held` and `other` are the bins of the objects in hand. The number of bins, `m`, stands for no bin or no object.
     """
     never = (m, m, -1)
     if held == m:
@@ -56,10 +55,10 @@ def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
 
 @kernel
 def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
-    """Return the least length of a tour that picks in a given order (n,).
+    """Return the length of the shortest tour with a given order of picks.
 
-    Entry d of row t of `costs`, (n + 1, m + 1), becomes the least cost at pick t with an object for bin d in the other
-    hand (m: none). Row n is the end. Rows before `start` must be valid.
+    Entry [t, d] of `costs`, shape (n + 1, m + 1), becomes the lowest cost at pick t with an object for bin d in the
+    other hand (m: none). Row n is the end of the tour. Rows before `start` must be valid.
     """
     n, m = inst.to_bin.shape
     if start == 0:
@@ -81,7 +80,6 @@ def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[
 
 @inlined
 def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: NDArray[np.int64]) -> None:
-    """Compute the costs `after` at pick x from the costs `before` at pick i. See `decode`."""
     m = inst.bins.shape[0]
     c = inst.home[i]
     from_i, from_x, between = inst.to_bin[i], inst.to_bin[x], inst.bins[c]
@@ -100,7 +98,6 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
 
 @inlined
 def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
-    """Return the least length of a tour whose last pick is i."""
     m = inst.bins.shape[0]
     c = inst.home[i]
     best = before[m] + inst.to_bin[i, c]
@@ -111,10 +108,7 @@ def _finish(inst: Instance, i: int, before: NDArray[np.int64]) -> int:
 
 @kernel
 def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the actions of a shortest tour that picks in a given order (n,).
-
-    An action k >= 0 picks object k, and -1 - b goes to bin b.
-    """
+    """Return the actions of a shortest tour with a given order of picks, as defined in `Solution`."""
     n, m = inst.to_bin.shape
     costs = np.empty((n + 1, m + 1), np.int64)
     decode(inst, order, 0, costs)
@@ -152,9 +146,9 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @inlined
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
-    """Write a neighbour of an order (n,): swap two objects, reverse a section, or move an object.
+    """Write a random neighbour of an order: two objects swapped, a section reversed, or an object moved.
 
-    `state` is that of `uniform`. Return the first position that may have changed.
+    Return the first position that may have changed.
     """
     n = order.size
     i = int(uniform(state) * n)
@@ -163,7 +157,7 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
         j += 1
     kind = uniform(state)
     low, high = min(i, j), max(i, j)
-    for k in range(n):  # loops rather than slices: they compile much faster
+    for k in range(n):  # loops compile much faster than slices
         candidate[k] = order[k]
     if kind < 0.25:
         candidate[i], candidate[j] = order[j], order[i]
@@ -182,7 +176,6 @@ def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArr
 
 
 def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64]]:
-    """Anneal from the order of the indices. See `anneal_from`."""
     return anneal_from(inst, seed, moves, np.arange(inst.home.size), HOT, COLD)
 
 
@@ -190,9 +183,9 @@ def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64
 def anneal_from(
     inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
 ) -> tuple[int, NDArray[np.int64]]:
-    """Anneal from an order of picks (n,), with the first and last temperature in mean leg lengths.
+    """Anneal from a given order of picks. Temperatures are relative to the mean leg length.
 
-    Return the length of the best tour and its order of picks (n,).
+    Return the length of the best tour and its order of picks.
     """
     n, m = inst.to_bin.shape
     state = np.array([seed], np.uint64)
@@ -226,7 +219,7 @@ def anneal_from(
 
 
 def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
-    """Return the order of a warm start, (n,), with missing objects inserted where they lengthen the tour least."""
+    """Return the order of a warm start, with each missing object inserted where it lengthens the tour least."""
     n = len(instance.home)
     order = [*start.order, *start.missing]
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)

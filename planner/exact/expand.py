@@ -1,9 +1,8 @@
-"""Kernels that expand a layer of the search: states by number of picks, pruned by a lower bound of the cost-to-go.
+"""Kernels that expand a layer of the search.
 
-A node is a state (U, place, carried) with the length of the shortest known path to it. Layer k contains states with
-k picked objects. The code of a state is U 2^12 + place. Place b m + d means at bin b with an object for d,
-b m + b at bin b with empty hands, and m m + i at object i with only that object in hand. Reaching a second object
-is not a state, because the next stop is one of two bins.
+Layer k contains states (U, place, carried) with k picked objects. The code of a state is U 2^12 + place, where place b
+m + d means at bin b with an object for d in hand, b m + b means at bin b with empty hands, and m m + i means at object
+i with only that object in hand. Reaching a second object is not a state, because the next stop is one of two bins.
 """
 
 from typing import NamedTuple
@@ -18,24 +17,23 @@ from planner.exact.table import INFINITE, CostTable
 from planner.solvers import Deadline
 
 PLACE_BITS = 12
-SLICE = 1 << 12  # states expanded between two checks of the deadline, which takes about 5 ms
-CARRYING, EMPTY = range(2)  # stages of a layer: states with an object in hand, states with empty hands
-STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices of the progress in a layer
+SLICE = 1 << 12  # number of states expanded between two checks of the deadline, about 5 ms
+CARRYING, EMPTY = range(2)  # stages of a layer, by what the hands hold
+STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices into `progress`
 
 
 class Expanded(NamedTuple):
     """Result of the expansion of a layer."""
 
-    here: Nodes  # the layer, including states reached by leaving an object in its bin
+    here: Nodes  # the layer, including states reached by placing an object in its bin
     after: Nodes  # the next layer
-    smallest: int  # smallest total dropped from the next layer to save memory, or `INFINITE`
+    smallest: int  # smallest total of the states dropped to save memory, or `INFINITE`
     states: int  # number of expanded states
-    end: int  # index of the end of the shortest complete tour, or -1
+    end: int  # index of the state that ends the shortest complete tour, or -1
 
 
 @kernel
 def row_of(table: CostTable, left: int) -> int:
-    """Return the row of the bound's table for a set of objects left."""
     row = 0
     for j in range(table.stride.size):
         if left >> j & 1:
@@ -44,7 +42,7 @@ def row_of(table: CostTable, left: int) -> int:
 
 
 class LegEnd(NamedTuple):
-    """The end of a leg: remaining objects (bit mask), their table row, length so far with multipliers, and parent."""
+    """State at the end of a leg, before an object is picked up or placed."""
 
     left: int
     row: int
@@ -67,7 +65,6 @@ def offer_bin(
 def offer_second(
     inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, j: int, d: int, limit: int
 ) -> None:
-    """Pick j with an object for bin d in hand, and add the states at both bins. `arrival` is at j, before the pick."""
     c = inst.home[j]
     left, row = arrival.left ^ (1 << j), arrival.row - table.stride[j]
     cost = arrival.cost + table.multipliers[j]
@@ -80,7 +77,6 @@ def offer_second(
 
 @inlined
 def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, i: int, limit: int) -> None:
-    """Pick i with empty hands, and add the state there. `arrival` is at i, before the pick."""
     cost = arrival.cost + table.multipliers[i]
     total = cost + table.object[arrival.row - table.stride[i], i]
     if total < limit:
@@ -110,7 +106,7 @@ def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, lim
 def expand(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
-    """Add all successors of a layer's states. Return None if the deadline passes before that."""
+    """Add all successors of a layer's states. Return None if the deadline passes first."""
     progress = np.array([0, 0, 0, INFINITE, 0, -1])
     while True:
         here, after = expand_some(inst, table, here, after, limit, width, progress)
@@ -130,11 +126,7 @@ def expand_some(
     width: int,
     progress: NDArray[np.int64],
 ) -> tuple[Nodes, Nodes]:
-    """Expand a slice of a layer: first states with an object in hand, then states with empty hands.
-
-    `progress`, (6,), contains the stage, the numbers of expanded states and of all states of the stage, and the last
-    three fields of `Expanded`. Totals of added states are below `limit`. `width` states of the next layer will be kept.
-    """
+    """Expand a slice of a layer: first the states with an object in hand, then those with empty hands."""
     if progress[STAGE] == CARRYING and progress[DONE] == 0:
         progress[OF] = here.size[0]
         here = with_room(here, here.size[0])
@@ -161,10 +153,6 @@ def expand_some(
 def expand_carrying(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int]:
-    """Add the successors of states `first` to `last` with an object in hand. This layer must have enough space.
-
-    Return the next layer, the smallest total dropped from it, and the number of expanded states.
-    """
     n, m = inst.to_bin.shape
     smallest, expanded = INFINITE, 0
     for k in range(first, last):
@@ -198,10 +186,6 @@ def expand_carrying(
 def expand_empty(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, first: int, last: int
 ) -> tuple[Nodes, int, int, int]:
-    """Add the successors of states `first` to `last` with empty hands.
-
-    Return the values of `expand_carrying`, then the index of the end of the shortest complete tour, or -1.
-    """
     n, m = inst.to_bin.shape
     smallest, expanded, end = INFINITE, 0, -1
     for k in range(first, last):

@@ -1,4 +1,4 @@
-"""A routing problem for one or two hands as the flat arrays that the kernels use."""
+"""Routing problems for a capacity of one or two, as arrays for the kernels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,28 +13,27 @@ FAR = 1 << 59  # longer than any tour
 
 
 class Instance(NamedTuple):
-    """A problem with n objects, m bins and the root (the person's position), with distances in integer units.
+    """A problem with n objects, m bins and a root (the person's position), with distances in integer units.
 
-    A leg that full hands do not allow is `FAR`. So one hand needs no separate kernels: all legs between objects are
-    `FAR`.
+    A leg that the capacity does not allow has the length `FAR`, so a capacity of one needs no separate kernels.
     """
 
-    between: NDArray[np.int64]  # object to object, (n, n); `FAR` from an object to itself
-    to_bin: NDArray[np.int64]  # object to bin, (n, m)
-    from_bin: NDArray[np.int64]  # bin to object, (m, n)
-    bins: NDArray[np.int64]  # bin to bin, (m, m)
-    home: NDArray[np.int64]  # bin of each object, (n,)
-    root: NDArray[np.int64]  # root to object, (n,)
-    root_bin: NDArray[np.int64]  # root to bin, (m,)
-    carried: NDArray[np.int64]  # bins of the objects carried at the root, (0..2,)
-    tie: int  # largest difference between tours that count as equal, units
-    unit: float  # m per unit
+    between: NDArray[np.int64]  # from object to object, shape (n, n); `FAR` from an object to itself
+    to_bin: NDArray[np.int64]  # from object to bin, shape (n, m)
+    from_bin: NDArray[np.int64]  # from bin to object, shape (m, n)
+    bins: NDArray[np.int64]  # from bin to bin, shape (m, m)
+    home: NDArray[np.int64]  # bin of each object, shape (n,)
+    root: NDArray[np.int64]  # from root to object, shape (n,)
+    root_bin: NDArray[np.int64]  # from root to bin, shape (m,)
+    carried: NDArray[np.int64]  # bins of the objects carried at the root, at most two
+    tie: int  # maximum difference between tours that count as equal, in units
+    unit: float  # length of a unit in metres
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
-    """Convert a problem of capacity one or two, with its integer distances closed to a metric, (k, k).
+    """Convert a problem with a capacity of one or two. `metric` contains its integer distances, shape (k, k).
 
-    Objects are the shipments, and bins the delivery locations in ascending order.
+    Objects are the shipments, and bins are the delivery locations in ascending order.
     """
     pickups = [s.pickup for s in problem.shipments]
     places = sorted({s.delivery for s in problem.shipments} | set(problem.onboard))
@@ -66,7 +65,7 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
 def to_visits(
     instance: Instance, actions: Sequence[int], names: Sequence[str], carried: Sequence[str]
 ) -> list[Visit]:
-    """Convert actions (k >= 0 picks object k, -1 - b leaves all objects of bin b there) to visits."""
+    """Convert actions to visits. An action k >= 0 picks object k, and -1 - b places all objects of bin b."""
     held = list(zip(instance.carried.tolist(), carried, strict=True))
     visits: list[Visit] = []
     for action in actions:

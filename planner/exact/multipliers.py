@@ -1,4 +1,4 @@
-"""Lagrangian multipliers with which the relaxed tour picks each object about once."""
+"""Lagrangian multipliers, fitted so that relaxed tours pick up each object about once."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, cast
@@ -13,34 +13,34 @@ from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
 from planner.solvers import NEVER, Deadline
 
-DECAY = 0.97  # share of the violation kept from one step to the next
+DECAY = 0.97  # share of the average violation that is kept at each step
 MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
-STEP_ROWS = 60_000  # approximate number of rows filled by one fit of a large table
-SLICE = 1 << 13  # rows filled between two checks of the deadline, which takes about 3 ms
-STEP, ROW, BEST = range(3)  # indices of the progress of an ascent
+STEP_ROWS = 60_000  # approximate number of rows filled in one fit of a large table
+SLICE = 1 << 13  # number of rows filled between two checks of the deadline, about 3 ms
+STEP, ROW, BEST = range(3)  # indices into `Ascent.progress`
 
 
 class Ascent(NamedTuple):
     """State of a subgradient ascent of multipliers."""
 
-    current: NDArray[np.float64]  # multipliers, (n,)
-    direction: NDArray[np.float64]  # their last change, (n,)
-    violation: NDArray[np.float64]  # see `Bound`, (n,)
-    best: NDArray[np.int64]  # the multipliers with the best bound, (n,)
-    sizes: NDArray[np.float64]  # length of each step as a share of the gap, (steps,)
-    progress: NDArray[np.int64]  # steps taken, rows filled for the next step, and best bound, units; (3,)
+    current: NDArray[np.float64]  # current multipliers, shape (n,)
+    direction: NDArray[np.float64]  # last change of the multipliers, shape (n,)
+    violation: NDArray[np.float64]  # average violation, as in `Bound`, shape (n,)
+    best: NDArray[np.int64]  # multipliers with the best bound, shape (n,)
+    sizes: NDArray[np.float64]  # length of each step relative to the gap, shape (steps,)
+    progress: NDArray[np.int64]  # number of steps, rows filled for the next step, best bound
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """A lower bound of the cost-to-go from every state of an instance."""
+    """A lower bound on the cost-to-go from every state of an instance."""
 
     instance: Instance
-    table: CostTable  # relaxed cost-to-go
-    root: int  # bound at the root, units
-    # deviation from one pick of each object in relaxed tours, averaged with more weight on recent tours, (n,)
+    table: CostTable
+    root: int  # lower bound at the root, in units
+    # average deviation from one pick of each object, with more weight on recent relaxed tours, shape (n,)
     violation: NDArray[np.float64]
 
     @property
@@ -49,7 +49,7 @@ class Bound:
 
 
 def first_bound(instance: Instance, upper: int) -> Bound:
-    """Fit multipliers with all objects in one group, in about 10 ms. `upper` is the length of a known tour, units."""
+    """Fit multipliers with all objects in one group, in about 10 ms. `upper` is the length of a known tour."""
     n = len(instance.home)
     table = new_table(instance, np.zeros(n, np.int64))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
@@ -57,9 +57,10 @@ def first_bound(instance: Instance, upper: int) -> Bound:
 
 
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
-    """Return the bound that the groups and multipliers of a warm start give, by filling one table.
+    """Return the bound for the groups and multipliers of a warm start, by filling one table.
 
-    The last groups are merged with the first one if the table would have more than `max_rows`.
+    If the table would have more than `max_rows` rows, groups are merged with the first one, beginning with the last
+    group.
     """
     n, group = len(instance.home), start.group.copy()
     while rows_of(group) > max_rows and group.max(initial=0) > 0:
@@ -72,11 +73,11 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
 
 
 def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
-    """Split the groups and fit again until the gap closes, the table has reached its size, or the deadline has passed.
+    """Split groups and refit until the gap is closed, the table reaches `max_rows` rows, or the deadline passes.
 
-    Each split gives the object with the largest violation a group of its own.
+    Each split moves the object with the largest violation into a group of its own.
     """
-    warm = not bound.violation.any()  # after a warm start, fit its groups first
+    warm = not bound.violation.any()  # after a warm start, fit the existing groups first
     while bound.root < upper - bound.instance.tie:
         group: NDArray[np.int64] | None = bound.table.group
         if not warm:
@@ -97,7 +98,6 @@ def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
 def _one_apart(
     group: NDArray[np.int64], violation: NDArray[np.float64], max_rows: int
 ) -> NDArray[np.int64] | None:
-    """Return the groups with one more, or None if every object has one already or the table would be too large."""
     size = np.bincount(group)[group] if len(group) else group
     if size.max(initial=1) == 1:
         return None
@@ -107,10 +107,10 @@ def _one_apart(
 
 
 def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
-    """Group the objects by bin if that gives a better bound.
+    """Group the objects by bin if this gives a better bound.
 
-    If bins are far apart, much of a tour's length depends on the number of visits to each bin. A small table counts
-    these only with such groups.
+    If bins are far apart, the tour length depends mainly on the number of visits to each bin, which a small table
+    counts only with such groups.
     """
     group = np.unique(bound.instance.home, return_inverse=True)[1]
     if bound.root >= upper - bound.instance.tie or rows_of(group) > max_rows:
@@ -136,10 +136,10 @@ def fit(
     step_sizes: tuple[float, float],
     deadline: Deadline,
 ) -> Bound | None:
-    """Fit multipliers by subgradient ascent with momentum (Held, Wolfe and Crowder 1974), starting from some (n,).
+    """Fit multipliers by subgradient ascent with momentum (Held, Wolfe and Crowder 1974).
 
-    `table` receives the best table. `step_sizes` are those of the first and the last step, as shares of the gap to
-    `upper`, the length of a known tour. Return None if the deadline passed before the end.
+    The ascent starts from `multipliers`, and `table` receives the best table. `step_sizes` are those of the first and
+    the last step, relative to the gap to `upper`, the length of a known tour. Return None if the deadline passes first.
     """
     n, first_size, last_size = len(instance.home), *step_sizes
     ascent = Ascent(
@@ -158,10 +158,10 @@ def fit(
 
 @kernel
 def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
-    """Continue an ascent in place until `rows` rows were filled. Return True if it is finished.
+    """Continue an ascent in place until `rows` rows are filled. Return True if it is finished.
 
-    The table then contains the best multipliers and is filled for them. Everything is in one kernel, because a thread
-    that returned to Python after each table would wait for the interpreter lock.
+    The table then contains the best multipliers and is filled for them. This is a single kernel because a thread that
+    returned to Python after each table would wait for the interpreter lock.
     """
     n, progress = inst.home.size, ascent.progress
     actions = np.empty(2 * n + 2, np.int64)
@@ -185,10 +185,7 @@ def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: in
 def _stepped(
     inst: Instance, table: CostTable, ascent: Ascent, upper: int, actions: NDArray[np.int64]
 ) -> bool:
-    """Take a step with a filled table, or return to the best multipliers at the end.
-
-    Return False if the table already contains the best ones. `actions`, (2 n + 2,), is scratch space.
-    """
+    """Take a step with a filled table, or restore the best multipliers. Return False if nothing has changed."""
     progress, k = ascent.progress, ascent.progress[STEP]
     total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
     value = total - table.multipliers.sum()
@@ -219,17 +216,14 @@ def step(
     direction: NDArray[np.float64],
     violation: NDArray[np.float64],
 ) -> bool:
-    """Raise the prices of objects that a relaxed tour picks too often. Return False if it picks each object once.
-
-    `gap` is the gap of the bound, units, and `step_size` a share of it. The other arrays are those of `Ascent`.
-    """
+    """Raise the prices of objects that a relaxed tour picks up too often. Return False if there are none."""
     n = current.size
     surplus = np.full(n, -1.0)
     for action in actions:
         if action >= 0:
             surplus[action] += 1.0
     norm = 0.0
-    for j in range(n):  # loops rather than slices: they compile much faster
+    for j in range(n):  # loops compile much faster than slices
         norm += surplus[j] * surplus[j]
         violation[j] = DECAY * violation[j] + abs(surplus[j])
     if norm == 0.0:

@@ -1,4 +1,4 @@
-"""The states of a layer of the search."""
+"""States of a search layer, with a hash index."""
 
 from typing import NamedTuple
 
@@ -13,20 +13,20 @@ FIRST_ROOM = 1 << 12  # capacity of a new layer, in states
 
 
 class Nodes(NamedTuple):
-    """States of a layer with a hash index. The arrays have spare entries at the end."""
+    """States of a layer. The arrays have spare entries at the end."""
 
-    size: NDArray[np.int64]  # number of states, (1,)
-    key: NDArray[np.int64]  # code of each state
+    size: NDArray[np.int64]  # number of states, shape (1,)
+    key: NDArray[np.int64]  # code of each state, as defined in `expand`
     cost: NDArray[np.int64]  # length of the shortest known path to it
-    total: NDArray[np.int64]  # cost plus bound of the cost-to-go
-    # 2 x index of the previous state + (1 if that is in the same layer), or `NO_PARENT`
+    total: NDArray[np.int64]  # cost plus lower bound of the cost-to-go
+    # 2 x index of the previous state, plus 1 if it is in the same layer, or `NO_PARENT`
     parent: NDArray[np.int64]
     slots: NDArray[np.int32]  # hash table of indices, -1 if empty; its length is a power of two
 
 
 @kernel
 def new_nodes(room: int) -> Nodes:
-    """Return an empty layer with space for a number of states, which is a power of two."""
+    """Return an empty layer with space for `room` states. `room` must be a power of two."""
     return Nodes(
         np.zeros(1, np.int64),
         np.empty(room, np.int64),
@@ -50,7 +50,6 @@ def slot_of(nodes: Nodes, key: int) -> int:
 
 @kernel
 def with_room(nodes: Nodes, more: int) -> Nodes:
-    """Return the layer with space for more states."""
     size = nodes.size[0]
     room = nodes.key.size
     if size + more <= room:
@@ -70,7 +69,7 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
 
 @inlined
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
-    """Add a state, or a shorter path to it. There must be space."""
+    """Add a state, or update it if this path is shorter. The layer must have space."""
     slot = slot_of(nodes, key)
     k = nodes.slots[slot]
     if k < 0:
@@ -87,7 +86,7 @@ def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
 
 @kernel
 def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
-    """Return the `count`-th smallest of the first `size` entries of `values`, (room,), by bisection."""
+    """Return the `count`-th smallest of the first `size` values, by bisection."""
     low, high = INFINITE, -INFINITE
     for k in range(size):
         low, high = min(low, values[k]), max(high, values[k])
@@ -105,7 +104,7 @@ def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
 
 @kernel
 def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
-    """Return the `width` most promising states, and the smallest total dropped (`INFINITE` if none was)."""
+    """Keep the `width` most promising states. Return them and the smallest total dropped, or `INFINITE`."""
     size = nodes.size[0]
     if size <= width:
         return nodes, INFINITE
@@ -130,7 +129,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 
 @kernel
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
-    """Make space for `more` states. If needed, drop states that can no longer be among the best `width`."""
+    """Make space for `more` states, if needed by dropping states that cannot be among the best `width`."""
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
         nodes, smallest = keep_best(nodes, 2 * width)

@@ -17,9 +17,9 @@ from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
 ANNEALING_MOVES = 10_000
-# A first plan from a warm start, in about 20 ms.
+# Search for the first plan from a warm start, which takes about 20 ms.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # in mean leg lengths
+WARM_TEMPERATURES = (0.1, 0.02)  # relative to the mean leg length
 
 
 def improving_tours(
@@ -30,20 +30,20 @@ def improving_tours(
     passes: tuple[tuple[int, int], ...],
     start: Start | None,
 ) -> Iterator[Solution]:
-    """Yield a first tour and bound, then those after each pass of the search.
+    """Yield a first tour and bound, then the best ones after each pass of the search.
 
-    `work` is the largest number of states to expand. The first tour is always found, but no pass begins after the
+    `work` is the maximum number of states to expand. The first tour is always found, but no pass begins after the
     deadline.
     """
     bound, upper, lower, actions = _first_tour(instance, seed, work, start)
     yield Solution(actions, min(lower, upper), _certificate(bound))
     done, rate, by_bin = 0, max(1, len(instance.home) // 2), False
     for rows, wanted in passes:
-        # An unfinished pass proves nothing, so the width is one that the remaining work allows, but above the last one.
+        # An unfinished pass proves nothing, so choose a width that the remaining work allows.
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS and not by_bin:  # once, at the first table of this size
+        if rows >= BIN_ROWS and not by_bin:  # only once, at the first table of this size
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
@@ -59,7 +59,7 @@ def improving_tours(
 def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None
 ) -> tuple[Bound, int, int, list[int]]:
-    """Return a bound, the length of a first tour, a lower bound of all tours, and the actions of the first tour."""
+    """Return a bound, the length of a first tour, a lower bound on all tours, and the actions of the first tour."""
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -87,19 +87,19 @@ def _certificate(bound: Bound) -> Certificate:
 
 
 class Pass(NamedTuple):
-    """Result of a pass: length of the best known tour, its actions if it is new, a lower bound, and expanded states."""
+    """Result of a pass."""
 
-    upper: int
-    actions: list[int] | None
-    lower: int
-    expanded: int
+    upper: int  # length of the best known tour
+    actions: list[int] | None  # actions of that tour if this pass found it
+    lower: int  # lower bound on all tours
+    expanded: int  # number of expanded states
 
 
 def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: Deadline) -> Pass:
-    """Search all layers once for tours shorter than `upper` by more than a tie, and keep `width` states of each layer.
+    """Search all layers once for tours shorter than `upper`, keeping `width` states of each layer.
 
-    The pass ends early if more than `max_states` were expanded or the deadline has passed. The lower bound is then that
-    of the root.
+    Tours must be shorter by more than a tie. If more than `max_states` states were expanded or the deadline has passed,
+    the pass ends early with the lower bound of the root.
     """
     n, prices = len(bound.instance.home), bound.prices
     limit = upper - bound.instance.tie + prices
@@ -130,7 +130,7 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
 def _actions(
     bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
 ) -> list[int]:
-    """Return the actions of a tour by following the parents back from its end."""
+    """Follow the parents back from the end of a tour, and return the tour's actions."""
     keys = []
     k = end
     while True:

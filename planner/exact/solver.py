@@ -1,4 +1,4 @@
-"""The exact planner for one or two hands and up to 40 objects. It passes other problems to OR-Tools."""
+"""The exact planner for a capacity of one or two and up to 40 objects. OR-Tools solves other problems."""
 
 import math
 import time
@@ -13,25 +13,25 @@ from planner.plan import Plan
 from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
 
-TABLE_RATE = 500e6  # approximate speed at which a full table is filled, bytes/s
-DEFAULT_WORK = 4_000_000  # states, about 4 s including tables; short because sessions plan often
+TABLE_RATE = 500e6  # approximate speed at which a full table is filled, in bytes per second
+DEFAULT_WORK = 4_000_000  # default number of states to expand, about 4 s including tables
 MAX_OBJECTS = 40
 
 
 @dataclass(frozen=True)
 class ExactSolver:
-    """Uses the full table, or annealing and a widening search, until the plan is proven or the budget is spent.
+    """Planner that uses a full table, or annealing and a search, until the plan is proven or the budget is spent.
 
-    A limit on work counts expanded states of the search. The full table is always finished.
+    `SolveLimit.work` counts the states that the search expands. A full table is always finished.
 
     Attributes:
         name: Name in run records.
-        table_bytes: Size of the largest full table. 0 always searches.
-        passes: Largest number of rows of the bound's table and of states kept per layer, for each pass.
+        table_bytes: Maximum size of a full table in bytes. 0 disables full tables.
+        passes: For each pass, the maximum number of table rows of the bound and of states kept per layer.
     """
 
     name: str = "exact"
-    table_bytes: int = 1 << 27  # 18 objects and 6 bins: 0.1 s
+    table_bytes: int = 1 << 27  # enough for 18 objects and 6 bins, filled in 0.1 s
     passes: tuple[tuple[int, int], ...] = (
         (600, 1_500),
         (2_500, 8_000),
@@ -44,9 +44,9 @@ class ExactSolver:
     )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Plan the rest of a task. The plan is OPTIMAL if proven, else FEASIBLE with the best bound so far.
+        """Solve a problem. The plan is OPTIMAL if proven, else FEASIBLE with the best known bound.
 
-        The default limit is 4 million states. A limit on states is not passed to OR-Tools, which counts other work.
+        The default limit is 4 million states. `limit.work` is not passed to OR-Tools, which counts other work.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
@@ -64,10 +64,10 @@ class ExactSolver:
         limit: SolveLimit | None = None,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Yield the annealed tour with a first bound, then each shorter tour or better bound.
+        """Yield the annealed tour with a first bound, then every shorter tour or better bound.
 
-        With a warm start, the first plan comes from a narrow search and is better. The last plan may differ from that
-        of `solve` if it is not proven, or is one of several optimal plans.
+        With a warm start, the first plan comes from a narrow search and is better. The last plan can differ from the
+        result of `solve` if it is not proven or if there are several optimal plans.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
@@ -82,11 +82,10 @@ class ExactSolver:
                 yield plan
 
     def applies(self, problem: RoutingProblem) -> bool:
-        """Return True if table and search apply. OR-Tools plans all other problems."""
         return not self.why_not(problem)
 
     def why_not(self, problem: RoutingProblem) -> str:
-        """Return the reason why table and search do not apply, or an empty text if they do."""
+        """Return the reason why the problem has to be solved by OR-Tools, or an empty text."""
         if problem.capacity > 2:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
@@ -105,7 +104,7 @@ class ExactSolver:
         table_at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Yield better and better plans, or only one if a table is filled at once."""
+        """Yield successively better plans, or only one if a table is filled at once."""
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
@@ -132,7 +131,7 @@ class ExactSolver:
         tabled: bool,
         start: Start | None,
     ) -> Iterator[Solution]:
-        """Yield better and better tours and bounds: annealed, then by the full table or the search."""
+        """Yield the annealed tour, then the result of the full table or those of the search."""
         from planner.exact.search import improving_tours  # imported late: kernels take 0.5 s to load
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)

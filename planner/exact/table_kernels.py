@@ -1,7 +1,7 @@
 """Compiled kernels that fill a table of `planner.exact.table` and follow a best tour in it.
 
-They compute eight sums and minima at a time. LLVM vectorizes long loops, but not loops over about six bins, with which
-filling a table takes 2.4 times as long. There are no bounds checks.
+They compute eight sums and minima at a time. Without this, filling a table takes 2.4 times as long, because LLVM does
+not vectorize loops over about six bins. Array bounds are not checked.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from planner.exact import table as tables
 from planner.exact.instance import FAR, Instance
 from planner.exact.table import CostTable
 
-LANES = 8  # numbers in a vector
+LANES = 8  # number of integers in a vector register
 
 Entries = NDArray[np.integer[Any]]
 
@@ -25,7 +25,7 @@ walk = kernel(tables.walk)
 
 
 def _min_plus(*, each: bool) -> Any:
-    """Generate `out[o + l] = min(out[o + l], a[i + l] + b[k])` for the lanes l, with `b[k + l]` if `each`."""
+    """Generate `out[o + l] = min(out[o + l], a[i + l] + b[k])` for all lanes l, with `b[k + l]` if `each`."""
 
     def typed(_: Any, out: Any, _o: Any, a: Any, _i: Any, b: Any, _k: Any) -> Any:
         size = out.dtype.bitwidth // 8
@@ -67,20 +67,20 @@ def fill(inst: Instance, table: CostTable) -> None:
 
 
 class Legs(NamedTuple):
-    """Distances of an instance for `fill_rows`, flat.
+    """Flat arrays of an instance's distances, used by `fill_rows`.
 
-    `lanes` is the number of bins rounded up to a multiple of eight.
+    Rows over bins are padded to `lanes` entries, a multiple of eight.
     """
 
-    to_bin: Entries  # from each object to bins, (n lanes,)
-    from_bin: Entries  # from bins to each object with its price, (n lanes,)
-    bins: Entries  # between bins, (m lanes,)
-    # from each object to its bin, then between objects with the price of the next pick, ((1 + n) places,)
+    to_bin: Entries  # from each object to all bins, shape (n lanes,)
+    from_bin: Entries  # from all bins to each object, plus its price, shape (n lanes,)
+    bins: Entries  # between bins, shape (m lanes,)
+    # from each object to its bin, then between objects plus the price of the next, shape ((1 + n) places,)
     between: Entries
-    # place of each object in a row of `between`; the objects of each bin start at a multiple of eight, (n,)
+    # index of each object in a row of `between`, where each bin starts at a multiple of eight, shape (n,)
     place: NDArray[np.int64]
-    bin_of: NDArray[np.int64]  # bin of each eight places, (places / 8,)
-    far: int  # longer than any tour
+    bin_of: NDArray[np.int64]  # bin of each eight entries in a row of `between`
+    far: int  # a length that exceeds all tours
 
 
 @inlined
@@ -90,7 +90,6 @@ def lanes_for(m: int) -> int:
 
 @kernel
 def legs_of(inst: Instance, table: CostTable) -> Legs:
-    """Return the distances in the type of the table's entries."""
     n, m = inst.to_bin.shape
     wide, dtype = lanes_for(m), table.entries.dtype
     far = (1 << 30) if table.entries.itemsize == 4 else FAR
@@ -122,7 +121,7 @@ def legs_of(inst: Instance, table: CostTable) -> Legs:
 
 @kernel
 def left_of(table: CostTable, row: int) -> NDArray[np.int64]:
-    """Return the number of objects of each group left in a row, (groups,)."""
+    """Return the number of remaining objects of each group in a row, shape (groups,)."""
     left = np.empty(table.size.size, np.int64)
     for g in range(left.size):
         left[g] = row % (table.size[g] + 1)
@@ -132,14 +131,14 @@ def left_of(table: CostTable, row: int) -> NDArray[np.int64]:
 
 @kernel
 def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
-    """Fill some rows. All rows before them must be filled.
+    """Fill the rows `first` to `last` - 1. All rows before them must be filled.
 
-    Bins and the objects of a bin are processed eight at a time. Lanes without a bin or an object are ignored.
+    Bins, and the objects of a bin, are processed eight at a time. Lanes without a bin or an object are ignored.
     """
     n, m = inst.to_bin.shape
     wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
     legs, left = legs_of(inst, table), left_of(table, first)
-    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # objects left; W without their prices
+    picked, second = (np.empty(n, np.int64), np.empty(n * wide, dtype))  # remaining objects; W without prices
     empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V
     holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y
     for row in range(first, last):
@@ -180,7 +179,6 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
 def _hold(
     legs: Legs, picked: NDArray[np.int64], count: int, second: Entries, empty: Entries, holding: Entries
 ) -> None:
-    """Compute Y of a row from W (`second`) and E (`empty`). `holding` is indexed like `legs.between`."""
     places, wide = holding.size, empty.size
     holding[:] = legs.far
     for eight in range(legs.bin_of.size):
@@ -192,7 +190,7 @@ def _hold(
 
 @inlined
 def count_on(table: CostTable, left: NDArray[np.int64]) -> None:
-    """Update the number of objects left of each group, (groups,), from a row to the next one."""
+    """Update the number of remaining objects of each group from a row to the next one."""
     for g in range(left.size):
         left[g] += 1
         if left[g] <= table.size[g]:

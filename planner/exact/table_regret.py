@@ -1,4 +1,4 @@
-"""Costs of the rest of a task after each possible next visit, from one full table or one exhaustive pass."""
+"""Costs of possible next visits, from one full table or one exhaustive pass."""
 
 from collections.abc import Sequence
 
@@ -14,17 +14,18 @@ from planner.exact.table import INFINITE, CostTable
 from planner.plan import Visit, VisitKind
 from planner.solvers import Deadline
 
-UNLIMITED = 1 << 40  # width of a pass that keeps all states
+UNLIMITED = 1 << 40  # pass width at which all states are kept
 
-Costs = dict[Visit, int]  # length of the rest of the task, units, by next visit
+Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 
 
 def costs_in(
     instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Return the costs of all next visits by a filled table. A relaxed table gives lower bounds, including prices.
+    """Return the costs of all next visits from a filled table. A relaxed table gives lower bounds, including prices.
 
-    `row` is the row of the objects left at the root. `names` and `carried` are those of the instance's objects.
+    `row` is the table row of the objects left at the root. `names` and `carried` are the names of the instance's
+    objects.
     """
     held, home = instance.carried.tolist(), instance.home
     costs = {}
@@ -47,11 +48,11 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Return the costs of all next visits, units. Costs up to `longest` are exact. Others are only known to exceed it.
+    """Return the costs of all next visits in units. Costs up to `longest` are exact, and larger ones are lower bounds.
 
-    Every state on a tour of at most that length is visited, layer by layer. A sweep back then finds the shortest rest
-    of the task from each. `visits` are the possible next ones: places of carried objects, then picks. The result is
-    None if there are more than `max_states` or the deadline has passed.
+    The pass visits every state on a tour of at most this length. A backward sweep then computes the shortest remaining
+    tour from each state. `visits` lists the possible next visits: places of carried objects, then picks. The result is
+    None if there are more than `max_states` states or the deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
@@ -77,16 +78,12 @@ def costs_by_pass(
         rest[k] = sweep(instance, layers[k], after, after_rest)
     first = (layers[1], rest[1]) if n else (beyond, nothing)
     found = root_costs(instance, layers[0], rest[0], *first)
-    # If a person with only one hand carries an object, `found` ends with picks that are not in `visits`.
+    # With a capacity of one, `found` may end with picks that are not in `visits`.
     return {visit: int(cost) for visit, cost in zip(visits, found, strict=False)}
 
 
 @kernel
 def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int:
-    """Look up the length of the rest from a state in `rest`, (states,).
-
-    `INFINITE` if the state is not a node.
-    """
     k = nodes.slots[slot_of(nodes, (left << PLACE_BITS) | place)]
     return int(rest[k]) if k >= 0 else INFINITE
 
@@ -95,10 +92,6 @@ def look_up(nodes: Nodes, rest: NDArray[np.int64], left: int, place: int) -> int
 def after_second(
     inst: Instance, after: Nodes, after_rest: NDArray[np.int64], left: int, j: int, d: int
 ) -> int:
-    """Return the length of the rest from object j, just picked, with an object for d in the other hand.
-
-    `left` does not contain j.
-    """
     m = inst.bins.shape[0]
     c = inst.home[j]
     first = inst.to_bin[j, d] + look_up(after, after_rest, left, d * m + c)
@@ -108,11 +101,11 @@ def after_second(
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the length of the rest from each state of a layer, (states,), given those of the next layer."""
+    """Return the length of the remaining tour from each state of a layer, given those of the next layer."""
     n, m = inst.to_bin.shape
     size = here.size[0]
     rest = np.full(size, INFINITE, np.int64)
-    for k in range(size):  # at a bin with empty hands
+    for k in range(size):  # states at a bin with empty hands
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         b, left = place // m, here.key[k] >> PLACE_BITS
         if place >= m * m or b != place % m:
@@ -122,7 +115,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
             if (left >> i) & 1:
                 best = min(best, inst.from_bin[b, i] + look_up(after, after_rest, left ^ (1 << i), m * m + i))
         rest[k] = best
-    for k in range(size):  # with an object in hand: leave it, or pick another
+    for k in range(size):  # states with an object in hand
         place = here.key[k] & ((1 << PLACE_BITS) - 1)
         i, b, d = place - m * m, place // m, place % m
         left = here.key[k] >> PLACE_BITS
@@ -144,7 +137,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
 def root_costs(
     inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the length of the task by next action, (actions,): places of carried objects, then picks."""
+    """Return the tour length for each possible next visit: places of carried objects, then picks."""
     n, m = inst.to_bin.shape
     count = inst.carried.size
     everything = (1 << n) - 1

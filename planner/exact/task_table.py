@@ -1,7 +1,7 @@
-"""A full table for the successive states of a task.
+"""A full table for successive states of a task.
 
-The table remains valid for every later state in which no object was moved, for any position of the person and any
-carried objects. It is filled once 18 objects are left.
+The table stays valid in all later states in which no object was moved, wherever the person is and whatever is carried.
+It is filled once 18 objects are left.
 """
 
 import time
@@ -22,18 +22,14 @@ if TYPE_CHECKING:
 
 
 class TableState(NamedTuple):
-    """A state of a task as a row of a full table. The instance has the present root.
-
-    `metric`, (k, k), contains the integer distances between the locations of the present problem, consistent with the
-    table, in `unit`, m.
-    """
+    """A state of a task as a row of a full table. The instance has the person's current position as its root."""
 
     instance: Instance
     table: CostTable
     row: int
     names: tuple[str, ...]
-    metric: NDArray[np.int64]
-    unit: float
+    metric: NDArray[np.int64]  # integer distances of the current problem, shape (k, k)
+    unit: float  # length of a unit in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +40,7 @@ class _Filled:
 
 
 class TaskTable:
-    """Fills a full table if the solver finds it small enough, and keeps it until an object was moved."""
+    """Fills a full table if it is small enough for the solver, and keeps it until an object is moved."""
 
     def __init__(self, solver: "ExactSolver") -> None:
         self._solver = solver
@@ -62,9 +58,9 @@ class TaskTable:
         return make_plan(problem, state.metric, visits, length, started, certificate)
 
     def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
-        """Return the length of the rest of the task by possible next visit, units, and the unit, m.
+        """Return the length of the remaining tour for each possible next visit in units, and the unit in metres.
 
-        None if the table would be too large or does not apply.
+        The result is None if the table would be too large or does not apply.
         """
         from planner.exact.table_regret import costs_in  # imported late, because it loads the kernels
 
@@ -75,7 +71,6 @@ class TaskTable:
         return costs_in(state.instance, state.table, state.row, state.names, carried), state.unit
 
     def _at(self, problem: RoutingProblem) -> TableState | None:
-        """Return the state of a problem in the present table, or in a new one."""
         state = _state(self._filled, problem) if self._filled is not None else None
         if state is not None:
             return state
@@ -89,14 +84,14 @@ class TaskTable:
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
-    """Return a problem's state in a table filled for another problem, or None if it is not one of its states."""
+    """Return a problem's state in a table filled for another problem, or None if that table does not contain it."""
     before, n = filled.problem, len(problem.shipments)
     same_kind = (problem.capacity, problem.resolution) == (before.capacity, before.resolution)
     if not same_kind or not set(problem.names) <= set(before.names):
         return None
     left = [before.number[name] for name in problem.names[:n]]
     if any(k >= len(before.shipments) for k in left):
-        return None  # an object that is now loose was carried when the table was filled
+        return None  # an object that is loose now was carried when the table was filled
     places = [problem.place(k) for k in range(len(problem.names))]
     visits = [*map(problem.pick, range(n)), *places]
     here, there = problem.stops(visits)[1:], before.stops(visits)[1:]
@@ -120,7 +115,6 @@ def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
 
 
 def _metric(filled: _Filled, problem: RoutingProblem, here: list[int], there: list[int]) -> NDArray[np.int64]:
-    """Return the table's metric between locations of the present problem, with the present start."""
     metric = np.zeros(problem.distances.shape, np.int64)
     metric[np.ix_(here, here)] = filled.problem.integers.metric[np.ix_(there, there)]
     if here and problem.start not in here:

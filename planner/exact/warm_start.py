@@ -1,7 +1,7 @@
-"""Warm starts: results of plans for similar problems.
+"""Warm starts: results of earlier plans for similar problems.
 
-Any multipliers give a lower bound, for any objects left at any places. So those of one state of a task serve all
-later ones, and only the table has to be filled again for the objects left.
+Multipliers give a valid lower bound for any remaining objects, so those from one state of a task apply to all later
+states. Only the table has to be filled again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,24 +16,24 @@ from planner.problem import RoutingProblem
 
 
 class Start(NamedTuple):
-    """A warm start with objects numbered as in an instance."""
+    """A warm start in terms of an instance's object indices."""
 
-    group: NDArray[np.int64]  # group of each object, numbered from 0, (n,)
-    multipliers: NDArray[np.int64]  # price of picking each object, units, (n,)
-    order: list[int]  # numbers of objects in the order of a good tour
-    missing: list[int]  # numbers of the objects that are not in the order
+    group: NDArray[np.int64]  # group of each object, numbered from 0, shape (n,)
+    multipliers: NDArray[np.int64]  # price of picking up each object in units, shape (n,)
+    order: list[int]  # indices of known objects, in the order in which a good tour picks them up
+    missing: list[int]  # indices of the objects that are not in `order`
 
 
 @dataclass(frozen=True)
 class WarmStart:
     """Results of earlier plans, by object name."""
 
-    multipliers: Mapping[str, float]  # price of picking an object in the relaxation, m
-    groups: tuple[tuple[str, ...], ...] = ()  # objects that the relaxation counts together
-    order: tuple[str, ...] = ()  # objects in the order in which a good tour may pick them
+    multipliers: Mapping[str, float]  # price of picking up each object in the relaxation, in metres
+    groups: tuple[tuple[str, ...], ...] = ()  # groups of objects that the relaxation counts together
+    order: tuple[str, ...] = ()  # objects in the order in which a good tour picks them up
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
-        """Return this warm start with the results of one more plan. Multipliers of other objects stay."""
+        """Return a warm start with the results of one more plan. Multipliers of other objects are kept."""
         order = tuple(name for kind, name in plan.visits if kind is VisitKind.PICK)
         certificate = plan.certificate
         if certificate is None or certificate.proof is not Proof.RELAXATION:
@@ -44,9 +44,10 @@ class WarmStart:
         return WarmStart({**self.multipliers, **new}, groups, order)
 
     def numbered(self, names: Sequence[str], unit: float) -> Start | None:
-        """Return the warm start for an instance with objects of these names, in its unit, m.
+        """Convert the warm start to object indices, for an instance with these names and a unit in metres.
 
-        None if no multiplier of these objects is known. A new object gets the mean price and joins the first group.
+        Return None if no multiplier of these objects is known. A new object gets the mean price and joins the first
+        group.
         """
         prices = {name: round(price / unit) for name, price in self.multipliers.items()}
         found = [prices[name] for name in names if name in prices]
