@@ -86,7 +86,6 @@ def run_with_progress(
 
 @contextmanager
 def _progress_bars() -> "Iterator[tuple[Progress, OnRead]]":
-    """Yield progress bars, and a callback that shows how many finished trials have been read."""
     from experiments.cli.terminal import counting_bars
 
     with counting_bars("{task.description}") as bars:

@@ -199,7 +199,6 @@ def _export(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _replaced(out: Path) -> Iterator[Path]:
-    """Yield a working folder that replaces `out` atomically when the block succeeds."""
     from mjsim.support.files import exchange, work_folder
 
     out.parent.mkdir(parents=True, exist_ok=True)

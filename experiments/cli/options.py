@@ -27,7 +27,7 @@ PERSON_VALUES = {  # the most common parameters of a person, each with its own o
     "field_of_view": "horizontal field of view of the picture and of the participant's perception",
     "reading_time": "how long the participant stands and reads before each visit",
 }
-PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings of the page of `mjsim play`
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings that only sessions in a browser use
 # Settings shared by run, batch and play
 TRIAL_OPTIONS = tuple(
     name

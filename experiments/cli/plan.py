@@ -158,7 +158,6 @@ class _PlanningThread(threading.Thread):
             self._over.set()
 
     def _plans(self) -> Iterator[Plan]:
-        """Yield successively better plans, within the time limit or a high limit on the exact planner's work."""
         seconds = self._seconds
         if seconds is not None:
             from planner.greedy_solver import first_plan  # imported late for a fast start
@@ -189,7 +188,6 @@ class _PlanningThread(threading.Thread):
         return self.best
 
     def end(self) -> None:
-        """Stop planning. The planner may take a moment to finish its current step."""
         self._stop_planning.set()
         self._over.wait(1.0)
 

@@ -59,7 +59,7 @@ def pack(run: Path, database: sqlite3.Connection) -> None:
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
-    """Rename finished archives to their final names. Return the number of archives still being written.
+    """Rename each finished archive to its final name. Return the number of archives that are still open for writing.
 
     A run that a killed writer did not commit is rolled back.
     """

@@ -138,7 +138,6 @@ def sync_folder(folder: Path) -> None:
 
 
 def _intact(content: bytes, path: Path) -> tuple[tuple[Header | JournalEntry, ...], int]:
-    """Return the entries before the first damaged one, and the offset at which they end."""
     if not MAGIC.startswith(content[: len(MAGIC)]):
         if content.startswith(MAGIC[:-2]):
             raise RecordError(f"{path} is a journal of {_OTHER_VERSION}")

@@ -155,7 +155,6 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
 
 
 def _person(events: Sequence[Event]) -> dict[str, Any]:
-    """Return the person's parameters, without the groups, as columns such as `person_walking_speed`."""
     logged: Mapping[str, Any] = next((e for e in events if e["event"] == PARTICIPANT), {"person": {}})
     body = {f"person_{name}": value for name, value in logged["person"].items() if name not in GROUPS}
     model = logged.get("behaviour") or {}
@@ -201,7 +200,6 @@ def _over_familiarisation(events: Sequence[Event], completion: float) -> float |
 
 
 def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dict[int, float]:
-    """Return the known regrets in metres by visit number. They are logged with the visit or in a later event."""
     found = {k: visit.get(name) for k, visit in enumerate(visits)}
     found |= {e["visit"]: e[name] for e in events if e["event"] == "regret" and name in e}
     return {k: float(regret) for k, regret in found.items() if regret is not None}

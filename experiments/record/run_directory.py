@@ -194,7 +194,6 @@ def _folder(folder: Path) -> Iterator[None]:
 
 
 def _place(path: Path) -> Path:
-    """Resolve the links of a path. Raises `RecordError` for a dangling link, `OSError` for an unusable path."""
     if path.is_symlink() and not path.exists():
         raise RecordError(f"{path} is a dangling symbolic link; remove it or choose another --out")
     place = Path(os.path.realpath(path))

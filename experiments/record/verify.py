@@ -167,7 +167,6 @@ def _settings(record: Record) -> Iterator[Mismatch]:
 def _derived(
     directory: Path, record: Record, name: str, fault: Callable[[Any], str | None]
 ) -> Iterator[Mismatch]:
-    """Compare a JSON file with its expected content. A missing file is reported by `checksum_mismatches`."""
     if not (directory / name).exists():
         return
     try:

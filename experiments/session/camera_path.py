@@ -49,8 +49,6 @@ class CameraPath:
 
 @dataclass(frozen=True, eq=False)
 class _Stop:
-    """A point on the floor from which the camera looks at a bin, or looks around if `bin` is None."""
-
     place: Point
     bin: str | None = None
 

@@ -246,10 +246,6 @@ class Session:
             self.show()
 
     def _step_limit(self) -> int:
-        """Return the maximum number of control steps for the next action.
-
-        The maximum is one if there is a viewer or a better plan may arrive.
-        """
         if self._viewer is not None or self.assistant.expecting:
             return 1
         left = int((self._time_limit - self._now.time) / self._world.control_timestep) - 1

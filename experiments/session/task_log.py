@@ -90,10 +90,6 @@ class TaskLog:
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
     def _distance_to(self, state: TaskState, made: Visit) -> float:
-        """Return the planner's distance in metres between the locations of the previous visit and this one.
-
-        A delivery is located in front of its bin.
-        """
         place = state.deliveries[made.object]
         if made.kind is VisitKind.PICK:
             place = state.loose.get(made.object, state.position)

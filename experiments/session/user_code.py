@@ -38,7 +38,7 @@ PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, R
 
 
 class _Overdue(BaseException):
-    """A call exceeded its time limit. It is not an `Exception`, so that user code does not catch it by accident."""
+    """A call exceeded its time limit. Not an `Exception`, so user code does not catch it by accident."""
 
 
 @contextmanager
@@ -72,7 +72,6 @@ def _call_limit() -> float:
 
 @contextmanager
 def _time_limit(limit: float) -> Iterator[None]:
-    """Interrupt the block after a time in seconds. 0 means no limit. Has no effect outside the main thread."""
     if not limit or threading.current_thread() is not threading.main_thread():
         yield
         return

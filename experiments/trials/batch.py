@@ -99,7 +99,7 @@ def run_batch(
     inputs = check_trials(trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     label = "" if shard is None else shard.label
-    adopt(out / TRIALS, label)  # recovers the archives of a killed batch
+    adopt(out / TRIALS, label)  # renames the archives that a killed batch has left
     own = None if shard is None else {trial_name(*trial) for trial in zip(trials, inputs, strict=True)}
     readers = workers or os.cpu_count() or 1
     reader = TrialReader(out, workers=readers, on_read=on_read, names=own, label=label)
@@ -222,10 +222,9 @@ _archive = functools.cache(new_archive)  # one per process, open until the proce
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
-    """Run a trial and read its result. Return an error as text, because not every exception can be pickled.
+    """Run a trial and read its result. Return an error as text, because some exceptions cannot be pickled.
 
-    The trial runs in the work folder of the batch. If `archives`, a prefix of archive names, is given, the trial is
-    packed.
+    `archives` is a prefix of archive names. If it is given, the trial is packed.
     """
     with nullcontext(out.parent) if archives is None else work_folder(folder) as parent:
         run = parent / out.name

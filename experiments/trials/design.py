@@ -90,8 +90,8 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     def each(self) -> list[dict[str, Any]]:
         """Return the seeds and the house of each trial. Shorter lists are repeated.
 
-        The trials of a person use houses, or house seeds, at even distances in these lists. A house that comes first
-        for one person therefore comes second for another.
+        The trials of one participant are spread evenly over the list of houses. The next participant starts at the next
+        house, so that the order of houses varies.
         """
         lists: dict[str, list[Any]] = {
             name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
@@ -179,7 +179,6 @@ def _located(message: str, cell: int | None) -> str:
 
 
 def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
-    """Return the trials of a cell. Relative paths start at `folder`."""
     if unknown := sorted(set(values) - _IN_A_CELL):
         raise ConfigError(f"unknown field `{unknown[0]}`; docs/batches.md lists the fields of a design")
     settings = {name: value for name, value in values.items() if name in SETTINGS}

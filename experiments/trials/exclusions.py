@@ -71,7 +71,7 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A participant excluded by ID, and the reason."""
 
-    id: Name | int  # value in one of the columns `IDS`
+    id: Name | int  # ID of the participant in one of the columns `IDS`
     reason: Reason
 
 

@@ -70,7 +70,7 @@ def merge_shards(
             raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     for folder in (out, *others):
-        adopt(folder / TRIALS)  # recovers the archives of killed shards
+        adopt(folder / TRIALS)  # renames the archives that killed shards have left
     reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
     chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
     added: dict[Path, dict[str, StoredTrial]] = {}
@@ -99,7 +99,6 @@ def _same(one: Path, other: Path) -> bool:
 
 
 def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: TrialReader) -> None:
-    """Add the trials of a part. Run directories are hard-linked if possible, packed trials are copied."""
     trials_folder = out / TRIALS
     put_aside(
         out, {path.name for path in run_paths(trials_folder)}.intersection(trials)
@@ -132,10 +131,6 @@ def _missing(trials: Sequence[TrialConfig], stored: Iterable[StoredTrial]) -> li
 def _shards(
     trials: Sequence[TrialConfig], missing: Iterable[TrialConfig], folders: Iterable[Path]
 ) -> dict[Shard, int]:
-    """Count the missing trials of each shard.
-
-    The number of shards is the most frequent one in the names of row files.
-    """
     files = Counter(
         int(match[1])
         for folder in folders

@@ -62,7 +62,6 @@ def ray_cluster(
 
 
 def _connect(ray: Any) -> None:
-    """Connect, without installing Ray's signal handlers or printing its messages."""
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
     # Ray has no option to silence the thread that prints the logs of lost machines.
     ray._private.worker.print_to_stdstream = lambda *_, **__: None
@@ -84,8 +83,6 @@ def _reach(address: str) -> None:
 
 
 class _Cluster:
-    """The machines of a Ray cluster. Each trial uses one core."""
-
     def __init__(self, ray: Any, workers: int | None, needed: tuple[Path, Versions]) -> None:
         self._ray, self._workers, self._needed = ray, workers, needed
         self._call = ray.remote(max_retries=0)(_checked)
@@ -99,7 +96,6 @@ class _Cluster:
         return self._workers if self._workers and self._workers < cores else cores * QUEUED_PER_CORE
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
-        """Start a call with Ray options, by default on any machine with a free core."""
         result: Future[Any] = Future()
         options = options or {"num_cpus": 1, "memory": TRIAL_BYTES}
         self._running[result] = reference = self._call.options(**options).remote(*self._needed, fn, *args)
@@ -206,7 +202,6 @@ def _checked(folder: Path, versions: Versions, fn: Callable[..., Any], *args: An
 
 
 def _translated(error: BaseException) -> BaseException:
-    """Return the error that a process pool would raise."""
     from ray import exceptions
 
     if isinstance(error, exceptions.NodeDiedError | exceptions.TaskUnschedulableError):

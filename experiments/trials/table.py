@@ -92,7 +92,6 @@ def _types(schema: pa.Schema) -> dict[str, str]:
 
 
 def _check_columns(schema: pa.Schema) -> None:
-    """Raise a `ValueError` if a column was renamed or converted. Columns may be added or removed."""
     found = _types(schema)
     written = json.loads((schema.metadata or {}).get(_WRITTEN, "{}"))
     renamed = sorted(found.keys() - written) if written.keys() - found else []

@@ -136,10 +136,6 @@ class _SessionResult:
     film: "TrialFilm | None"
 
     def save(self, folder: Path, out: Path, wall: float) -> dict[str, Any]:
-        """Write the run directory, which is moved to `out`.
-
-        Raises the session's error if there is no record to keep.
-        """
         if self.error is not None and not self.record.steps:
             raise self.error
         if self.film is None:
@@ -184,7 +180,6 @@ def _make_film(scene: Scene, house: House, config: FilmConfig, folder: Path) -> 
 def _before_the_task(
     config: TrialConfig, house: House, person: PersonParameters, folder: Path, on_progress: OnProgress
 ) -> Familiarisation:
-    """Run the phases before the task. The training has its own run directory inside that of the task."""
     known = familiarise(config.phase_names, config.story, house, person)
     if TRAINING not in config.phase_names:
         return known

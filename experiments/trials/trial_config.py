@@ -26,10 +26,6 @@ MAX_SEED = 2**63 - 1  # largest integer in tables
 
 
 def _about(description: str, **extra: Any) -> msgspec.Meta:
-    """Describe a setting.
-
-    `extra` contains the `metavar` and `choices` of its option, and `path` if the setting is a path.
-    """
     return msgspec.Meta(description=description, extra=extra)
 
 

@@ -32,8 +32,6 @@ OnRead = Callable[[int, int], None]  # called with the number of trials read so 
 
 
 class _CachedRow(msgspec.Struct, array_like=True, frozen=True, gc=False):
-    """A line of the cache: a `StoredTrial` with the name of its folder."""
-
     name: str
     stamp: Stamp
     settings: dict[str, Any]
@@ -156,7 +154,6 @@ def _load(file: Path) -> Iterable[_CachedRow]:
 
 
 def _read(path: Path) -> StoredTrial | str:
-    """Read a trial. Return an error message if it cannot be used."""
     listed = path.parent.with_name(path.name) if path.parent.suffix == PACKED else path
     stamp = stamp_of(path)
     try:

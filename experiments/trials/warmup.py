@@ -78,7 +78,6 @@ def play(house: House) -> None:
 
 
 def _before_a_receptacle(house: House) -> Scene:
-    """Compose a person who faces a receptacle, with an object for the receptacle half a metre behind the person."""
     key, receptacle = next(iter(house.receptacles.items()))
     x, y = receptacle.approach.tolist()
     heading = math.atan2(receptacle.center[1] - y, receptacle.center[0] - x)
@@ -105,8 +104,6 @@ NOT_KEPT = (
 
 
 class _Notice(Listener):  # type: ignore[misc]  # numba has no types
-    """Prints a notice when the first kernel is compiled rather than loaded from disk."""
-
     def __init__(self, may_print: Callable[[], bool]) -> None:
         self._may_print = may_print
         self._seen = False

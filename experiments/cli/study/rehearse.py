@@ -118,7 +118,7 @@ async def _run(
 
 
 def _analyse(study: "Study", out: Path) -> None:
-    """Analyse the rehearsal like a study. Too few participants for an analysis are not an error of the study."""
+    """Analyse the rehearsal like a study. Too few participants for an analysis do not count as an error."""
     from experiments.cli.study import analyze
     from experiments.errors import RecordError
     from experiments.study.rehearsal.report import TABLE
