@@ -83,7 +83,7 @@ def describe(error: BaseException) -> str:
 
 
 def shown(value: object) -> str:
-    """Return the representation of a value, shortened for a message."""
+    """Return a value's representation, shortened for an error message."""
     try:
         return _cut(" ".join(repr(value).encode(errors="backslashreplace").decode().split()))
     except Exception:  # custom classes may fail to format
@@ -106,7 +106,7 @@ def user_code_location(error: BaseException | None) -> str:
 
 
 def _is_user_file(file: str) -> bool:
-    if not Path(file).is_absolute() or file.startswith(LIBRARIES):  # compiled libraries use relative names
+    if not Path(file).is_absolute() or file.startswith(LIBRARIES):  # compiled libraries have relative paths
         return False
     return not any(Path(file).is_relative_to(ROOT / package) for package in PACKAGES)
 

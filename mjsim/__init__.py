@@ -1,8 +1,8 @@
-"""Physics side of the rearrangement simulator: houses, episodes, world, observation and rendering.
+"""Physics of the rearrangement simulator: houses, episodes, world, observations and rendering.
 
-Semantic versioning covers the names below, what their docstrings and `docs/` say of them, the command line, and the
-files that it writes. Each is loaded at its first use; `import mjsim` loads none of the
-simulator. The Gymnasium environment is `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")`.
+Semantic versioning applies to the names below, as documented in their docstrings and in `docs/`, to the command line,
+and to its output files. Names are loaded at their first use, so that `import mjsim` is fast.
+The Gymnasium environment is `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")`.
 
     catalogue = mjsim.Catalogue.load("apartment")
     episode = mjsim.sample_episode(catalogue, objects=12, seed=3)

@@ -37,7 +37,7 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
-HUGE = 1e12  # limit of valid metrics, far above any realistic value
+HUGE = 1e12  # largest valid metric, far above realistic values
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None

@@ -16,7 +16,7 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # fraction of the maximum speed
-Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # radians
+Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # angle in radians
 Press = Literal["act", "left hand", "right hand"]
 MAX_PITCH = 1.2  # maximum pitch that can be set with the mouse, in radians
 MAX_PRESSES = 8  # maximum number of queued key presses
@@ -104,7 +104,7 @@ def _attempt(press: Press, seen: Observation, answer: Answer) -> Action:
 
 
 def act(answer: Answer) -> Pick | Place:
-    """Return a place if possible, otherwise a pick."""
+    """Return a place action if an object can be placed, otherwise a pick action."""
     place = answer(Place())
     at_another_receptacle = place.refusal is Refusal.NOT_THE_RECEPTACLE
     if place.applied or (at_another_receptacle and not answer(Pick()).applied):
@@ -122,7 +122,7 @@ def _move(
         return max((float(getattr(new, name)) for new in asked), key=abs, default=0.0)
 
     forward, left = fastest("forward"), fastest("left")
-    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # diagonal walking is not faster
+    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # diagonal speed is limited, too
     turn, look = fastest("turn") * person.turning_speed, fastest("look") * person.looking_speed
     if controls.heading is not None and not turn:
         turn = _rate(_gap(controls.heading, seen.heading) / duration, person.turning_speed)

@@ -40,7 +40,7 @@ Codec = Literal["jpeg", "h264", "none"]
 Drawer = Literal["browser", "server"]  # program that draws the view
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
-Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # pixels
+Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # length in pixels
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Angle = Annotated[float, msgspec.Meta(gt=0.0, lt=3.0)]  # horizontal field of view, in radians
 Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]

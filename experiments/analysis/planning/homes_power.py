@@ -115,11 +115,13 @@ def power_of_design(
     count, each = len(means), people * trials
     used = min(homes, each)
     left = variances["residual"]
-    of_people = left + trials * variances["person"]  # expected mean square of participants
+    # Expected mean squares of participants and of homes
+    of_people = left + trials * variances["person"]
     of_homes = left + each / used * variances[SLOPE]
     freedom = count * (people - 1), (count - 1) * (used - 1)
-    rest = max(count * each - sum(freedom) - used, freedom[0])  # residual; at least the minimum
-    variance = (of_people + of_homes - left) / each  # without effects that all conditions share
+    # Residual degrees of freedom, which are fewest if no home is shared
+    rest = max(count * each - sum(freedom) - used, freedom[0])
+    variance = (of_people + of_homes - left) / each  # variance of each condition's mean
     parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
     df2 = variance**2 * each**2 / float(parts.sum())
     effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance

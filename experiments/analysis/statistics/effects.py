@@ -66,7 +66,7 @@ class FTest:
         return found[0] / (found[0] + self.people), found[1] / (found[1] + self.people)
 
     def p_of_equivalence(self, bound: float) -> float:
-        """Return the p-value of an equivalence test of the hypothesis that partial eta squared is below `bound`.
+        """Return the p-value of an equivalence test. A value below .05 shows that partial eta squared is below `bound`.
 
         It is the probability of an F at most this large if partial eta squared equals the bound. Source: Campbell and
         Lakens 2021, doi:10.1111/bmsp.12201.

@@ -43,7 +43,7 @@ class VarianceComponents:
         ends = np.cumsum(self.sizes[order]).tolist()
         self.slices = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
         self.levels = ends[-1]
-        self.start = ends[len(self.nested) - 1]  # first level that is not nested
+        self.start = ends[len(self.nested) - 1]  # index of the first level that is not nested
         ones, rows = np.ones(len(values)), np.arange(len(values))
         parts = [csr_array((ones, (rows, members[k]))) for k in order]
         columns = hstack([*parts, csr_array(np.column_stack([design, values]))], "csr")

@@ -104,7 +104,7 @@ def _change(key: Key, one: Test | None, other: Test | None) -> Change:
 
 @dataclass(frozen=True)
 class Selection:
-    """Exclusions of a study, and its departures from the preregistration with this SHA-256."""
+    """Exclusions of a study, and departures from its preregistration, which is identified by its SHA-256."""
 
     rules: Sequence[LeaveOneOut]
     preregistration: str | None = None

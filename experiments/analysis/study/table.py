@@ -29,7 +29,7 @@ from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
-ANALYSIS = "analysis"  # default output folder
+ANALYSIS = "analysis"  # default name of the output folder
 REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
 FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # output files of an analysis
 REQUIRED = ("assistance", "objects", "user")

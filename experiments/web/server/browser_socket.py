@@ -51,7 +51,7 @@ class BrowserSocket:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
             session.detach(self)
             self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # let the last message be sent
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # until the last message is sent
         finally:
             session.detach(self)
             for task in (sending, receiving, beating):

@@ -123,6 +123,6 @@ async def _started_worker() -> WorkerProcess:
 
 
 def _run_worker(connection: socket.socket) -> None:
-    from experiments.web.worker.main import Worker  # the server must not load this module
+    from experiments.web.worker.main import Worker  # imported late, because the server does not need it
 
     Worker(connection).run()

@@ -19,7 +19,7 @@ from mjsim.values.errors import MjsimError, RenderError
 
 HOMES, SHEET = "homes", "sheet_{}.png"
 COLUMNS, ROWS = 2, 5
-GAP, CAPTION = 24, 44  # pixels
+GAP, CAPTION = 24, 44  # space between cards and height of a caption, in pixels
 WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of a home's card in pixels
 INK, QUIET, PAPER = (22, 33, 43), (74, 85, 96), 255
 Image = NDArray[np.uint8]

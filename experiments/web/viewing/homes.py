@@ -26,7 +26,7 @@ from mjsim.render import Renderer
 from mjsim.support.files import exchange, source_digest, work_folder
 from mjsim.values.person_parameters import PersonParameters
 
-PLAN, VIEW = (480, 400), (300, 200)  # sizes in pixels
+PLAN, VIEW = (480, 400), (300, 200)  # width and height of pictures, in pixels
 PAGE, ABOUT = "index.html", "home.json"
 _WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
 INTERVAL = 0.2  # time between two poses of the tour, in seconds; the page interpolates between them

@@ -97,7 +97,7 @@ class Clock:
         return self._schedule.wait(time.monotonic(), promised=True) <= 0.0
 
     def _note_lateness(self, promise: Promise) -> None:
-        """Log a control step that this machine delayed, and the first one that lacks its promised inputs."""
+        """Log each control step delayed by this machine, and the first of a series without promised inputs."""
         due, now = self._schedule.due, time.monotonic()
         late = now - (due if promise.came is None else max(due, promise.came))
         if promise.missing:

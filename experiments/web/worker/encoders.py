@@ -78,7 +78,7 @@ RETRY = 30.0  # time until a size that was too large is tried again, in seconds
 
 
 class FrameSize:
-    """Adapts the size of frames. `index` selects it from `SIZES`. Slow drawing or a slow connection decreases it."""
+    """Adapts the size of frames to the speed of drawing and of the connection. `index` is the position in `SIZES`."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self.index, self._largest = FIRST_SIZE, len(SIZES) - 1

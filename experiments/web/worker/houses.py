@@ -15,7 +15,7 @@ from mjsim.formats.gltf.cache import cached_floor, cached_scene
 from mjsim.formats.gltf.store import scenes_folder
 from mjsim.render import render_house_map, render_pictures
 
-DRAWING_TIMEOUT = 60.0  # timeout in seconds
+DRAWING_TIMEOUT = 60.0  # timeout for drawing the pictures, in seconds
 _pictures: dict[str, dict[str, Image]] = {}
 
 

@@ -80,7 +80,7 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        if not isinstance(message, Open | Pause):  # messages that the server sends on its own
+        if not isinstance(message, Open | Pause):  # these messages can come from the server itself
             self._control.hear()
         match message:
             case Open():

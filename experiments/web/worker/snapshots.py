@@ -57,8 +57,8 @@ class SnapshotStream:
         self._potential_visibility = PotentialVisibility(live.scene, HORIZON, field_of_view(live, view))
         self._until: dict[str, int] = {}  # control step until which each object is sent
         self._models = {item.name: item.model for item in live.scene.episode.objects}
-        self._looked = -LOOK_EVERY  # control step of the last update of this set
-        self._hands: tuple[str | None, str | None] = (None, None)  # objects in the hands at that update
+        self._looked = -LOOK_EVERY  # control step of the last update of sent objects
+        self._hands: tuple[str | None, str | None] = (None, None)  # held objects at the last update
         self._poses = np.full((len(self._models), 7), np.nan)
         self._sent: dict[str, list[float]] = {}
 
