@@ -109,7 +109,6 @@ def _dress_window(space: Space, window: Window, use: str, look: Appearance, rng:
 
 
 def _hang_lamps(space: Space, look: Appearance, rng: np.random.Generator) -> None:
-    """Hang one ceiling lamp, or two in a long room, away from lamps over tables."""
     floor = space.room.floor
     hanging = [
         moved((0.0, 0.3, 0.0, 0.3), x, y, yaw)[:2]

@@ -49,8 +49,8 @@ def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping
     """Return the files of a house, including its recipe, by path. Every process generates the same bytes.
 
     Args:
-        recipe: The house.
-        furnishing: Its furniture.
+        recipe: Recipe of the house.
+        furnishing: Furniture and bins of the house.
         models: Folder of the models that come with the package.
     """
     plan = recipe.plan
@@ -100,7 +100,7 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
 def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
     """Return the MJCF of the materials that a world uses, with their textures.
 
-    Materials of the apartment are used only for names that neither `own` nor `brought` define.
+    A material of the apartment is used only if neither `own` nor `brought` defines one of the same name.
     """
     elements = [ET.fromstring(text) for text in own]
     for asset in brought:

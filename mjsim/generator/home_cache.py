@@ -26,7 +26,7 @@ def load_catalogue(house: str = "apartment") -> Catalogue:
             house (`generated:7`, `generated:7?rooms=5`), or path of its recipe.
 
     Raises:
-        AssetError: As by `Catalogue.read`.
+        AssetError: The catalogue or a file it names is missing or invalid.
         HouseError: The house cannot be generated.
 
     Example:

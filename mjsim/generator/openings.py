@@ -158,7 +158,6 @@ def _before(room: Room, door: Door, depth: float) -> Rectangle:
 
 
 def _windows(plan: HomePlan, room: Room, rng: np.random.Generator) -> list[Window]:
-    """Place windows in a room's outer walls. If the room needs daylight, try to make the windows large enough."""
     needs_light = NEEDS[room.key].daylight
     outer = [
         (side, low + WALL / 2, high - WALL / 2)
@@ -213,7 +212,6 @@ def _free(plan: HomePlan, room: Room, side: Side, low: float, high: float) -> It
 
 
 def _with_leaves(plan: HomePlan, rng: np.random.Generator) -> Iterator[Door]:
-    """Yield the doors. A door gets a leaf if the open leaf fits against a wall without covering a door or window."""
     taken: list[Rectangle] = []
     for door in plan.doors:
         if door.is_front or door.height == WIDE_TOP:
@@ -230,7 +228,6 @@ def _with_leaves(plan: HomePlan, rng: np.random.Generator) -> Iterator[Door]:
 
 
 def _leaves(room: Room, door: Door) -> Iterator[Leaf]:
-    """Yield the possible leaves of a door: on both sides of the door, and along the adjacent wall at a corner."""
     floor, side, half = room.floor, door.side_in(room.key), door.width / 2
     low, high = floor.wall(side)
     left, right = door.center - half, door.center + half

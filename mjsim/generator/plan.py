@@ -1,6 +1,6 @@
 """Floor plans computed by a constraint solver: rectangular rooms that fill a rectangular or L-shaped outline.
 
-There is no objective: any layout close to the target areas is accepted, and variety comes from the programme. Solving
+The solver has no objective: any layout close to the target areas is accepted. Variety comes from the programme. Solving
 time is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
 """
 

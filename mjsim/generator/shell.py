@@ -129,7 +129,6 @@ class _RoomShell:
         self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
         material: str, holes: list[_Hole],
     ) -> Iterator[str]:  # fmt: skip
-        """Yield the parts of a slab around holes."""
         at, end = along
         for hole in holes:
             if hole.end < at or hole.start > end or hole.bottom >= up[1] or hole.top <= up[0]:
@@ -146,7 +145,6 @@ class _RoomShell:
             yield self._slab(side, (at, end), up, out, material)
 
     def _foot(self, side: Side, holes: list[_Hole]) -> Iterator[str]:
-        """Yield the skirting board and the soft shadow at the bottom of the wall."""
         at, last = self._room.floor.wall(side)
         for hole in [*(hole for hole in holes if hole.bottom == 0), _Hole(last, last, 0, 0)]:
             start = at + 0.05 if at > self._room.floor.wall(side)[0] else at
@@ -179,7 +177,6 @@ class _RoomShell:
         yield self._slab(side, *board, (-0.04, 0.15), "frame", "trim")
 
     def _frame(self, door: Door) -> Iterator[str]:
-        """Yield the half of the door frame that belongs to this room."""
         side, half = door.side_in(self._room.key), door.width / 2
         left, right, top, out = door.center - half, door.center + half, door.height, (-0.018, HALF)
         yield self._slab(side, (left - 0.06, left + 0.012), (0.0, top + 0.06), out, "frame", "trim")
@@ -210,7 +207,6 @@ class _RoomShell:
 
 
 def _outside(plan: HomePlan) -> Iterator[str]:
-    """Yield four panels with the view outside, which meet at the corners."""
     x0, x1 = min(r.floor.x0 for r in plan.rooms), max(r.floor.x1 for r in plan.rooms)
     y0, y1 = min(r.floor.y0 for r in plan.rooms), max(r.floor.y1 for r in plan.rooms)
     (x, y), w, d = ((x0 + x1) / 2, (y0 + y1) / 2), (x1 - x0) / 2 + 3, (y1 - y0) / 2 + 3

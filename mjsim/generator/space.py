@@ -200,7 +200,6 @@ class Space:
         return ok
 
     def _scores(self, boxes: Floats, free: bool) -> Floats:
-        """Score poses. Snug or wide gaps score high, and so does the middle of the room for free-standing pieces."""
         floor = self.room.floor
         score = 1.2 * self.rng.random(len(boxes))
         if len(boxes) == 0:
@@ -222,9 +221,9 @@ class Space:
         """Return True if a person can get from every door to all pieces and to all free floor.
 
         Args:
-            spots: Rectangles of an additional piece.
-            zones: Its places of use.
-            near: Those of its rectangles that a person must be able to approach.
+            spots: Obstacles of an additional piece.
+            zones: Floor needed to use that piece.
+            near: Obstacles of that piece that a person must be able to approach.
         """
         floor, spots = self.room.floor, [*self.hit, *spots]
         _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
@@ -250,7 +249,6 @@ class Space:
         return True
 
     def _distance(self, spots: Iterable[Spot], cell: float) -> Any:
-        """Return the distance in metres from each cell to the nearest wall or rectangle of `spots`."""
         floor = self.room.floor
         nx, ny = math.ceil(floor.width / cell), math.ceil(floor.depth / cell)
         free = np.zeros((nx + 2, ny + 2), np.uint8)

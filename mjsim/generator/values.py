@@ -162,8 +162,8 @@ class HomePlan:
 class Asset:
     """A material or texture of a piece of furniture.
 
-    Those of `models/houses/apartment/materials.xml` need no asset. Assets of the same name must have the same content,
-    so names should begin with the kind's name, such as `rug_stripes_3f2a`.
+    Materials of `models/houses/apartment/materials.xml` need no asset. Assets of the same name must be equal,
+    so names should begin with the furniture type, as in `rug_stripes_3f2a`.
 
     Attributes:
         xml: One `<material .../>` or `<texture .../>`. A texture names a file of the package, or has an `image`.

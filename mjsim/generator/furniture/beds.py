@@ -28,7 +28,6 @@ def _headboard(b: Builder, w: float) -> float:
 
 
 def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: int) -> None:
-    """Add a mattress, a quilt, pillows and sometimes a throw on top of a frame of height `z`."""
     quilt = b.pick(*b.look.quilts)
     b.box("linen", w - 0.04, (y[0] + 0.02, y[1] - 0.02), (z, z + 0.18))
     start = y[0] + b.pick(0.45, 0.55, 0.62)

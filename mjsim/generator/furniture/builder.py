@@ -31,8 +31,8 @@ def _extent(w: float, y: Span, z: Span, x: float) -> str:
 class Builder:
     """Collects the geoms of a piece in its own frame.
 
-    In all methods `w` is a full width along x and `x` is its middle; `y` and `z` are intervals. All are in metres.
-    Geoms with `seen` are drawn and do not collide. Those of `guard` collide and are not drawn.
+    In all methods, `w` is a full width along x, `x` is its middle, and `y` and `z` are intervals, all in metres.
+    Geoms with `seen` are drawn but do not collide. Those of `guard` collide but are not drawn.
     """
 
     def __init__(
@@ -238,7 +238,7 @@ class Builder:
             size: Width along the wall, depth into the room, and height, in metres.
             use: Depth, in metres, of the free floor needed in front of it, or that floor's rectangles (x0, y0, x1, y1).
             parts: Obstacles (x0, y0, x1, y1, height), in metres; one of the whole size by default.
-            stem: Half the width, in metres, of a pot or stand below wider parts. People bump into nothing else.
+            stem: Half width, in metres, of the pot or stand below wider parts. Only the pot or stand is an obstacle.
             more: Other fields of `Piece`.
         """
         w, d, h = (float(v) for v in size)
@@ -273,7 +273,7 @@ class Kind:
         Args:
             rng: Draws size, materials and form.
             look: Materials of the home.
-            smaller: 0 for a piece as large as drawn; 1, 2, ... for smaller and smaller ones.
-            fit: Width, lower and upper end, in metres, of a window or the like that it has to fit, if any.
+            smaller: 0 for the full size, or 1, 2, ... for smaller and smaller versions.
+            fit: Width, lower end and upper end, in metres, of a window or gap that the piece has to fit, if any.
         """
         return self.draw(Builder(self.name, rng, look, smaller, fit))

@@ -1,6 +1,7 @@
 """Pieces of furniture, and groups of pieces.
 
-The origin of a piece is on the floor in the middle of its back edge; +y points into the room, +z up. Units are metres.
+The origin of a piece is on the floor in the middle of its back edge. +y points into the room and
++z up. Lengths are in metres.
 """
 
 import math

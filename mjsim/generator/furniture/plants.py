@@ -9,7 +9,6 @@ _GREENS = ("leaves", "leaves_dark", "leaves_pale")
 
 
 def _pot(b: Builder, r: float, h: float, y: float) -> str:
-    """Add a pot centred at depth `y`, sometimes on legs. Return the material of the leaves."""
     b.shadow(2 * r, (y - r, y + r), round_one=True)
     paint, form = b.pick("pot_a", "pot_b", "wicker"), b.pick("round", "round", "square", "raised")
     if form == "square":

@@ -7,7 +7,6 @@ from mjsim.generator.furniture.piece import Piece
 
 
 def _arms(b: Builder, w: float, d: float, form: str, cloth: str) -> float:
-    """Add two armrests, and return the width of each."""
     wide = {"box": 0.17, "round": 0.2, "thin": 0.1, "none": 0.0}[form]
     for side in (-1, 1) if wide else ():
         x = side * (w - wide) / 2

@@ -156,7 +156,6 @@ def console(b: Builder) -> Piece:
 
 
 def _screen(b: Builder, x: float) -> None:
-    """Add a monitor or laptop with a keyboard to a desk 0.75 m high, for a person who sits at +y."""
     if b.chance(0.65):
         b.box("black", 0.22, (0.1, 0.25), (0.75, 0.762), x, seen=True)
         b.box("black", 0.05, (0.13, 0.16), (0.762, 0.88), x, seen=True)
@@ -170,7 +169,6 @@ def _screen(b: Builder, x: float) -> None:
 
 
 def _desk(b: Builder) -> Piece:
-    """Draw a desk with space for the office supplies box to the right of the person sitting at it."""
     w, d, h = (b.pick(1.4, 1.5, 1.6), b.pick(1.2, 1.3), 1.0)[min(b.smaller, 2)], b.pick(0.6, 0.66), 0.75
     form, side = b.pick("panels", "pedestal", "legs"), -1
     b.shadow(w, (0, d))
