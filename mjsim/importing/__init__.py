@@ -1,6 +1,6 @@
 """Importers for objects in mesh files, houses from other simulators, and episodes (docs/import.md).
 
-Needs the extra `import`.
+The extra `import` must be installed.
 """
 
 from importlib.util import find_spec

@@ -1,6 +1,6 @@
 """Reader for rearrangement episodes of other benchmarks: misplaced objects and their distances from their goals.
 
-RoomR (AI2-THOR rearrangement) has poses at the start and at the goal. Housekeep has each object's receptacle and the
+RoomR (AI2-THOR rearrangement) gives start and goal poses. Housekeep gives the receptacle of each object and the
 receptacles where it belongs.
 """
 
@@ -79,7 +79,7 @@ class _HousekeepFile(msgspec.Struct):
 class _NoClass(pickle._Unpickler):
     """Unpickler that accepts only plain containers, numbers and strings.
 
-    It is the Python one, because the C one allocates memory for as many values as the file claims to have.
+    It extends Python's slow unpickler, because the C one allocates memory for as many values as a file claims to have.
     """
 
     def find_class(self, module: str, name: str) -> NoReturn:

@@ -41,8 +41,6 @@ Span = tuple[int, int]  # first cell, and end cell (exclusive)
 
 @dataclass(frozen=True)
 class _Size:
-    """Size and position of a receptacle in its own frame, in metres."""
-
     width: float
     depth: float
     middle: tuple[float, float]  # middle of the base
@@ -151,7 +149,6 @@ def _at(spans: Sequence[Span], place: Sequence[int]) -> tuple[slice, slice]:
 
 
 def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> FloorGrid | None:
-    """Return the grid with a bin added, or None if the bin would block a way."""
     blocked = grid.blocked.copy()
     blocked[choice.cells] = True
     after = replace(grid, blocked=blocked)
@@ -173,7 +170,6 @@ def _parts(grid: FloorGrid, radius: float) -> int:
 
 
 def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float, float]:
-    """Return the pose of the receptacle's frame: x and y in metres, and yaw in radians."""
     low = grid.origin + CELL * np.array([choice.cells[0].start, choice.cells[1].start])
     high = grid.origin + CELL * np.array([choice.cells[0].stop, choice.cells[1].stop])
     back = np.array(choice.back, float)

@@ -80,9 +80,9 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
     """Make the floor grid of a house.
 
     Args:
-        solids: Everything that collides.
-        doors: Open doors, which are not among the solids.
-        floor: Triangles at floor height, m, (n, 3, 2).
+        solids: All solids of the scene except open doors.
+        doors: Open doors.
+        floor: Triangles at floor height in metres, shape (n, 3, 2).
 
     Raises:
         AssetError: The scene has neither walls nor a floor, is too large, or leaves no room for a person.
@@ -178,7 +178,6 @@ def _box(shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid]) -> Mas
 def _at_heights(
     shape: tuple[int, ...], origin: Floats, solids: Sequence[Solid], band: tuple[float, float]
 ) -> Mask:
-    """Return the cells with a solid in a range of heights, in metres."""
     low, high = band
     return _raster(shape, origin, [s.outline for s in solids if s.low[2] < high and s.high[2] > low])
 

@@ -102,7 +102,6 @@ def _without(scene: SourceScene) -> str:
 
 
 def _refusal(found: Sequence[Finding]) -> str:
-    """Format the first error of an imported house, without file names."""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     subject = "" if found[0].subject == "house" else f"{found[0].subject} "
     return f"the house made of it cannot be used: {subject}{found[0].message}{more}; correct the source"
@@ -220,7 +219,6 @@ def _check_span(pieces: Sequence[ScenePiece]) -> None:
 
 
 def _is_door(piece: ScenePiece) -> bool:
-    """Return True if a piece has the name and the shape of a door leaf."""
     if not {"door", "doors"} & set(words_of(piece.name)):
         return False
     x, y, height = np.ptp(piece.surface.corners.reshape(-1, 3), axis=0)
@@ -229,7 +227,6 @@ def _is_door(piece: ScenePiece) -> bool:
 
 
 def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
-    """Return True if both sides of a door are indoors."""
     low, high = outline.min(axis=0), outline.max(axis=0)
     middle, across = (low + high) / 2, int(np.argmin(high - low))
     offset = np.zeros(2)
@@ -238,7 +235,6 @@ def _between_rooms(grid: FloorGrid, outline: Floats) -> bool:
 
 
 def _floor(pieces: Sequence[ScenePiece]) -> Floats:
-    """Return the triangles at floor height, as horizontal corners (n, 3, 2) in metres."""
     found = [
         p.surface.corners[np.abs(p.surface.corners[:, :, 2]).max(axis=1) < LOW] for p in pieces if p.seen
     ]

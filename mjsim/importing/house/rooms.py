@@ -19,7 +19,7 @@ from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
-# Half widths, in metres, of passages that separate rooms. Only large floors are divided at all except the first.
+# Half widths, in metres, of passages that separate rooms. All except the first are only for large floors.
 _NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)
 _HALL = 45.0  # floor area in square metres above which a room is divided at wider passages
 _HALL_PART = 5.0  # a room is divided only if at least two parts are larger than this, in square metres
@@ -179,7 +179,6 @@ def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
 
 
 def _within_walls(labels: Labels) -> Labels:
-    """Extend each room by two cells so that it reaches into its walls."""
     for _ in range(2):
         labels = np.where(labels == 0, _spread(labels, cv2.MORPH_RECT), labels)
     return labels
@@ -188,7 +187,6 @@ def _within_walls(labels: Labels) -> Labels:
 def _names(
     labels: Labels, count: int, grid: FloorGrid, pieces: Sequence[ScenePiece]
 ) -> list[tuple[str, str]]:
-    """Choose keys and labels of rooms by the furniture in them."""
     words: list[set[str]] = [set() for _ in range(count + 1)]
     for piece in pieces:
         points = piece.surface.corners.reshape(-1, 3)
@@ -206,6 +204,5 @@ def _names(
 
 
 def _spread(labels: Labels, shape: int) -> Labels:
-    """Return the largest label among each cell and its neighbours."""
     kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV cannot dilate integers
     return np.asarray(cv2.dilate(labels.astype(np.float32), kernel), np.int32)

@@ -88,7 +88,6 @@ def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
 
 
 def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
-    """Yield the connected parts of a piece that a person can bump into."""
     mesh = piece.surface.mesh()
     count = mesh.body_count
     whole = count == 1 or count > _MAX_PARTS or (_compact(mesh.extents) and not mesh.is_watertight)
@@ -107,7 +106,6 @@ def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
 
 
 def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
-    """Return a box or a hull if the mesh is small or has nearly that shape, otherwise None."""
     low, high = mesh.bounds
     extents = high - low
     if (extents > _ROOM).all():
@@ -156,7 +154,6 @@ def _compact(extents: Floats) -> bool:
 
 
 def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
-    """Return boxes of voxels. Furniture that would need too many boxes gets larger voxels."""
     boxes: list[Solid] = []
     for side in (p for p in _PITCHES if p >= pitch):
         boxes = list(_voxels(name, mesh, side))
@@ -189,7 +186,6 @@ def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
 
 
 def _samples(corners: Floats, step: float) -> Floats:
-    """Return points (k, 3) on triangles (n, 3, 3) that are at most about `step` metres apart."""
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first, count = lengths.argmax(axis=1), np.arange(len(corners))
     a, b, c = (corners[count, (first + k) % 3] for k in range(3))

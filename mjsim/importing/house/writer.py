@@ -79,7 +79,6 @@ def set_points(catalogue: Path, points: int) -> None:
 
 
 def _assets(house: ImportedHouse, folder: Path) -> Iterator[str]:
-    """Yield meshes, textures and materials, and write their files."""
     known: set[str] = set()
     for number, mesh in enumerate(house.looks):
         look, name = mesh.visual, f"look_{number}"
@@ -119,7 +118,6 @@ def _lights() -> Iterator[str]:
 
 
 def _structure(house: ImportedHouse) -> Iterator[str]:
-    """Yield the floor, and the boxes that close off the house."""
     corners = np.array([edge for _, *edges in house.rooms.rectangles(house.grid) for edge in edges])
     low, high = corners.min(axis=0) - 0.2, corners.max(axis=0) + 0.2
     (x, y), (a, b) = (low + high) / 2, (high - low) / 2
@@ -162,7 +160,6 @@ def _box(name: str, low: Floats, high: Floats) -> str:
 
 
 def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
-    """Yield the lines of catalogue.toml, with the entries of the other catalogue that belong to the bins."""
     bins = {place.key: place for place in house.bins}
     categories = [c for c in catalogue.categories.values() if c.receptacle in bins]
     objects = [key for category in categories for key in category.objects]
@@ -188,7 +185,6 @@ def _catalogue(house: ImportedHouse, catalogue: Catalogue) -> Iterator[str]:
 
 
 def _relative(path: Path) -> str:
-    """Return the path of a model as written in a catalogue. It is relative for models of the package."""
     root = models_root().resolve()
     resolved = path.resolve()
     return str(resolved.relative_to(root)) if resolved.is_relative_to(root) else str(resolved)

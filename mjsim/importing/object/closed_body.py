@@ -60,7 +60,6 @@ def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
 
 def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """Return a copy of the mesh with outward normals if it is closed, otherwise None."""
     if not (mesh.is_watertight and mesh.is_winding_consistent):
         return None
     whole = mesh.copy()
@@ -73,7 +72,6 @@ def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
 
 
 def _is_hollow(shells: list[trimesh.Trimesh]) -> bool:
-    """Return True if all shells except one are cavities inside it."""
     outer = [s for s in shells if s.volume > 0]
     cavities = [s for s in shells if s.volume < 0]
     if len(outer) != 1:
@@ -101,7 +99,6 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
 
 
 def _closed_piece(piece: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """Return a connected piece with consistent normals and filled holes, or None if it cannot be closed."""
     body = piece.copy()
     if not body.is_watertight:
         trimesh.repair.fill_holes(body, use_fan=True)

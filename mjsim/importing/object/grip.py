@@ -38,7 +38,6 @@ def find_grip(mesh: trimesh.Trimesh, centre: Floats) -> Grip:
 
 
 def _upper(points: Floats, depth: float) -> Floats:
-    """Return the points (n, 3) that are at most `depth` metres below the highest one."""
     return np.asarray(points[points[:, 2] > points[:, 2].max() - depth])
 
 
@@ -47,5 +46,4 @@ def _horizontal_distances(points: Floats, centre: Floats) -> Floats:
 
 
 def _nearest(points: Floats, centre: Floats) -> Floats:
-    """Return the point of (n, 3) that is horizontally nearest to `centre` (3,)."""
     return np.asarray(points[_horizontal_distances(points, centre).argmin()])

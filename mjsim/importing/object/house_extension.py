@@ -99,7 +99,7 @@ class HouseExtension:
     def fit(self, entry: CatalogueEntry, size: Floats) -> ImportDecision:
         """Report how an object with extents (3,), in metres, fits into the bin of its category.
 
-        Raise `AssetError` if so few of them fit that a clean-up could be impossible.
+        Raise `AssetError` if the bin holds so few of them that a clean-up could be impossible.
         """
         receptacle = self.catalogue.receptacles[self.catalogue.categories[entry.category].receptacle]
         room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
@@ -116,7 +116,7 @@ class HouseExtension:
     def add(self, entry: CatalogueEntry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
         """Add an object whose files `write` puts into a folder, or replace it with `force`. A failure changes nothing.
 
-        Raise `AssetError` as `check` does.
+        Raise `AssetError` if the category is unknown or the key is in use.
         """
         self.check(entry, force=force)
         created = not self.folder.exists()
@@ -152,7 +152,6 @@ class HouseExtension:
         return catalogue
 
     def _with(self, entry: CatalogueEntry) -> str:
-        """Return the catalogue's text with an entry added, or replaced if the key exists."""
         values = {"label": entry.label, "category": entry.category, "model": f"{entry.key}/{MODEL}"}
         encoded = {key: json.dumps(value, ensure_ascii=False) for key, value in values.items()}
         block = _ENTRY.format(key=entry.key, **encoded)

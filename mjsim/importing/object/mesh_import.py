@@ -46,7 +46,6 @@ def write_preview(model: Path, out: Path) -> None:
 
 
 def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
-    """Show the grips and either the visual mesh or the parts, each part in its own colour."""
     body = spec.body("object")
     parts = [geom for geom in body.geoms if geom.contype]
     for geom in body.geoms:
@@ -58,7 +57,6 @@ def _prepare(spec: mujoco.MjSpec, shown: int) -> None:
 
 
 def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
-    """Add a rod along the x axis of a site."""
     turn = np.zeros(4)
     if site.alt.type == mujoco.mjtOrientation.mjORIENTATION_EULER:
         turn[:] = np.cos(site.alt.euler[2] / 2), 0.0, 0.0, np.sin(site.alt.euler[2] / 2)
@@ -79,7 +77,6 @@ def _add_arrow(body: Any, site: Any, colour: tuple[float, ...]) -> None:
 
 
 def _on_white(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Blend an RGBA image (h, w, 4) with white. Return RGB (h, w, 3)."""
     alpha = rgba[..., 3:].astype(np.float64) / 255
     return np.asarray(np.round(rgba[..., :3] * alpha + 255 * (1 - alpha)), dtype=np.uint8)
 
@@ -130,7 +127,6 @@ def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
 
 
 def _keep_picture(folder: Path, target: Path) -> str:
-    """Move the preview to another path. Return a hint with that path, or an empty string if there is no preview."""
     if not (folder / PREVIEW).exists():
         return ""
     (folder / PREVIEW).replace(target)

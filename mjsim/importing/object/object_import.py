@@ -116,7 +116,6 @@ def _extent(surface: Surface) -> tuple[float, Floats]:
 
 
 def _into_place(rotation: Floats, points: Floats) -> Floats:
-    """Return a transform (4, 4) that rotates points (n, 3) and moves the middle of their footprint to the origin."""
     low, high = points.min(axis=0), points.max(axis=0)
     transform = np.eye(4)
     transform[:3, :3] = rotation

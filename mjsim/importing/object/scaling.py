@@ -62,7 +62,6 @@ def _axis(suffix: str) -> tuple[str, str]:
 
 
 def _advice(longest: float, unit: str, reason: str) -> str:
-    """Format a message with the size of an object, and with units or a scale that would fit."""
     limits = f"a hand carries {MIN_SIDE:g} to {MAX_SIDE:g} m"
     as_unit = "in any unit" if reason == "no unit fits" else f"in {unit} ({reason})"
     size = f"its longest side is {longest:.4g}, which {as_unit} is too {{}}: {limits}"

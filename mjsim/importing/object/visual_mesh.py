@@ -90,7 +90,6 @@ def _flattened(corners: Floats) -> Floats:
 
 
 def _drawn(flat: Floats, scale: float) -> Floats:
-    """Scale flat triangles (n, 3, 2) from metres to pixels, and widen slivers."""
     size = np.ptp(flat, axis=1, keepdims=True)
     return np.asarray(flat * np.maximum(scale, _MIN_SIDE / np.maximum(size, 1e-12)))
 
@@ -152,7 +151,6 @@ def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
 def _painted(
     surface: Surface, corners: Floats
 ) -> tuple[tuple[float, float, float], Floats | None, NDArray[np.uint8] | None]:
-    """Return the colour, texture coordinates and image of triangles with these corners (m, 3, 3)."""
     triangles, weights = _sampled(surface)
     colours = surface.colours_at(triangles, weights)
     red, green, blue = np.clip(colours.mean(axis=0), 0.0, 1.0).round(4).tolist()
@@ -181,7 +179,6 @@ def _sampled(surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
-    """Return positions and scaled normals of points on a surface, shape (k, 6)."""
     points = np.einsum("kc,kcd->kd", weights, surface.corners[triangles])
     return np.concatenate((points, _FACING * _normals(surface.corners)[triangles]), axis=1)
 
