@@ -72,7 +72,6 @@ def _save_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def _save_model(folder: Path, name: str, source: Path, kind: str, about: Mapping[str, Any]) -> None:
-    """Write the visual and collision meshes of a model, and the template that refers to them."""
     pieces = read_mjcf(source, HouseOptions()).pieces
     assets = {"render_asset": f"{name}.glb", "collision_asset": f"{name}_collision.glb"}
     folder.mkdir(exist_ok=True)
@@ -83,7 +82,6 @@ def _save_model(folder: Path, name: str, source: Path, kind: str, about: Mapping
 
 
 def _seen(pieces: Iterable[ScenePiece]) -> bytes:
-    """Return a GLB file of the visual geoms, with one mesh for each name and material."""
     materials: dict[tuple[int, tuple[float, ...]], PBRMaterial] = {}
     groups: dict[tuple[str, int, tuple[float, ...]], list[ScenePiece]] = {}
     for piece in pieces:
@@ -113,7 +111,6 @@ def _material(images: Sequence[Floats], colour: Sequence[float]) -> PBRMaterial:
 
 
 def _solid(pieces: Iterable[ScenePiece]) -> bytes:
-    """Return a GLB file of the collision geoms, with one convex mesh each."""
     scene = trimesh.Scene()
     for number, piece in enumerate(piece for piece in pieces if piece.solid):
         name = f"{piece.name} {number}"
@@ -134,7 +131,6 @@ def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _pose(position: Floats, rotation: Floats) -> Floats:
-    """Convert a pose of mjsim to a transform (4, 4) of Habitat."""
     own = np.eye(4)
     own[:3, :3], own[:3, 3] = rotation, position
     return np.asarray(_UPRIGHT @ own @ Y_TO_Z)
@@ -147,7 +143,6 @@ def _turned(quaternion: Sequence[float]) -> Floats:
 
 
 def _mount(house: CompiledHouse, key: str) -> tuple[Floats, Floats]:
-    """Return the position (3,) in metres and the rotation (3, 3) of a receptacle's frame."""
     site = house.model.site(f"mount:{key}").id
     return house.data.site_xpos[site].copy(), house.data.site_xmat[site].reshape(3, 3).copy()
 
@@ -220,7 +215,6 @@ def _dataset() -> dict[str, Any]:
 
 
 def _navmesh() -> dict[str, Any]:
-    """Return settings that make Habitat's navmesh similar to mjsim's walkable floor."""
     return {
         "cellSize": 0.05,
         "cellHeight": 0.05,
@@ -232,7 +226,6 @@ def _navmesh() -> dict[str, Any]:
 
 
 def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) -> dict[str, Any]:
-    """Return a `RearrangeEpisode` with poses at the start, and goals in the middle of receptacles."""
     counts: dict[str, int] = {}
     objects, targets, goals = [], {}, []
     for placed in episode.objects:

@@ -149,7 +149,6 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
 
 
 def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
-    """Return True if a visual geom covers a collision geom, which is then not drawn."""
     low, high = _extent(model, data, geom)
     for look in looks[model.geom_bodyid[looks] == model.geom_bodyid[geom]].tolist():
         first, last = _extent(model, data, look)
@@ -159,7 +158,6 @@ def _covered(model: Any, data: Any, geom: int, looks: NDArray[np.intp]) -> bool:
 
 
 def _extent(model: Any, data: Any, geom: int) -> tuple[Floats, Floats]:
-    """Return the lower and upper corner of a geom's bounding box, in metres."""
     rotation = data.geom_xmat[geom].reshape(3, 3)
     centre = data.geom_xpos[geom] + rotation @ model.geom_aabb[geom, :3]
     reach = np.abs(rotation) @ model.geom_aabb[geom, 3:]

@@ -41,7 +41,6 @@ def export_house(scene: Scene, path: Path) -> None:
 
 
 def _copy_asset(source: Path, folder: Path) -> str:
-    """Copy an asset file into a folder. Return its path relative to the folder of the XML file."""
     try:
         content = source.read_bytes()
     except OSError as error:
@@ -71,7 +70,6 @@ def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
 
 
 def _top_level_bodies(parent: ET.Element) -> list[ET.Element]:
-    """Return the bodies directly below the world, including those in frames without a pose."""
     bodies = parent.findall("body")
     for frame in parent.findall("frame"):
         if not set(frame.attrib) & {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"}:

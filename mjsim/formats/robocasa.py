@@ -125,7 +125,6 @@ class _LayoutReader:
 
 
 def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Return the width, depth and height of a fixture in metres."""
     size = list(_SIZES[kind])
     if kind == "housing_cabinet":
         inner, padding = known[fixture["interior_obj"]][1], fixture.get("padding") or [None] * 3

@@ -51,8 +51,6 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Pose of a link, and the model that it belongs to."""
-
     name: str  # name of the outermost model
     frame: Floats  # transform from the link to the world, shape (4, 4)
     folder: Path
@@ -186,7 +184,6 @@ def _root(path: Path) -> ET.Element:
 
 
 def _model_file(folder: Path) -> Path:
-    """Return the SDF file that is named in the model.config of a model's folder."""
     config = folder / "model.config"
     if config.is_file():
         try:
@@ -206,10 +203,10 @@ def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, dept
     """Return the transform (4, 4) from an element to its model or link, given by <pose>: x y z roll pitch yaw.
 
     Args:
-        element: A model, link, joint, ....
-        path: The file, for errors.
+        element: A model, link, joint or other element.
+        path: File named in error messages.
         model: The element in which the target of `relative_to` is looked up.
-        depth: Number of `relative_to` followed so far.
+        depth: Number of `relative_to` references followed so far.
     """
     pose = element.find("pose")
     attributes = {} if pose is None else pose.attrib
@@ -233,8 +230,6 @@ def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, dept
 
 
 def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
-    """Return a box, cylinder or other primitive around the origin, or None for an unknown shape."""
-
     def number(name: str, count: int = 1) -> Floats:
         return numbers((shape.findtext(name) or "").split(), count, path)
 
@@ -254,7 +249,6 @@ def _primitive(shape: ET.Element, path: Path) -> trimesh.Trimesh | None:
 
 
 def _colour(element: ET.Element) -> Floats:
-    """Return the plain colour (3,) of a <visual>, RGB from 0 to 1."""
     for name in ("diffuse", "ambient"):
         words = (element.findtext(f"material/{name}") or "").split()
         if len(words) >= 3:

@@ -35,7 +35,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
     Compressible files are stored only as `NAME.gz`. If another process is writing the same files, wait for it.
 
     Raises:
-        AssetError: As by `export_scene`.
+        AssetError: The house cannot be exported.
         OSError: The files cannot be written.
     """
     target = folder / scene_hash(catalogue)
@@ -82,7 +82,6 @@ def _compressed(content: bytes) -> bytes:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Ensure that only one process at a time writes scenes into a folder."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)

@@ -89,7 +89,6 @@ def _triangles(a: Floats, b: Floats, c: Floats) -> Floats:
 
 
 def _faces_of(corners: Floats) -> Indices:
-    """Return the cube face of each triangle, shape (t,)."""
     middle = corners[..., 6:].mean(axis=1)
     axis = np.abs(middle).argmax(axis=1)
     is_negative = np.take_along_axis(middle, axis[:, None], axis=1)[:, 0] < 0.0
@@ -97,7 +96,6 @@ def _faces_of(corners: Floats) -> Indices:
 
 
 def _coordinates(directions: Floats, face: Indices) -> Floats:
-    """Return columns and rows (t, 3, 2) on each triangle's cube face, from 0 to 1."""
     axes = np.array([(column[0], row[0]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     signs = np.array([(column[1], row[1]) for column, row in zip(_COLUMNS, _ROWS, strict=True)])[face]
     depth = np.abs(np.take_along_axis(directions, (face // 2)[:, None, None], axis=2))

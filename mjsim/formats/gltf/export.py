@@ -59,7 +59,6 @@ def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
 
 
 def _one_of_each(catalogue: Catalogue) -> Scene:
-    """Compose a scene with one object of each model, far below the house."""
     placed = tuple(
         PlacedObject(f"object_{i}", model.category, key, (0.0, 0.0), (0.0, 0.0, _AWAY), (1.0, 0.0, 0.0, 0.0))
         for i, (key, model) in enumerate(catalogue.objects.items())
@@ -86,7 +85,6 @@ class _Export:
 
     @cached_property
     def _by_body(self) -> dict[int, list[GeomSurface]]:
-        """Visible geoms by the id of the body that they are fixed to, which is 0 for static geoms."""
         found: dict[int, list[GeomSurface]] = {}
         carried = self._model.body_weldid[self._model.geom_bodyid]
         for surface in surfaces(self._model, self._data, self._drawn):
@@ -191,7 +189,6 @@ class _Export:
         return data.xpos[body].copy(), data.xmat[body].reshape(3, 3).copy(), data.xquat[body].copy()
 
     def _about(self, placed: PlacedObject) -> dict[str, Any]:
-        """Describe an object model: label, bounding box and collision boxes in metres, in the body's frame."""
         position, rotation, _ = self._frame(self._scene.index.body(placed.name))
         points = np.concatenate([s.positions for s in self._carried(placed, position, rotation)])
         boxes = []
@@ -235,7 +232,6 @@ class _Export:
 
 
 def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
-    """Return the label and the corners of each room, counter-clockwise, in metres."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return [
         {"label": rooms.label(key), "polygon": [rounded(xy) for xy in centre + (corners * half) @ axes.T]}

@@ -47,7 +47,7 @@ class MaterialKey(NamedTuple):
 class Glb:
     """A GLB file under construction.
 
-    `image` returns the name and WebP file of a texture by its id, with or without alpha.
+    `image` returns the name and the WebP file of a texture, given its id and whether its alpha channel is used.
     """
 
     def __init__(self, image: Callable[[int, bool], tuple[str, bytes]]) -> None:

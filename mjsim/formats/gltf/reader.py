@@ -83,7 +83,6 @@ def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _stage_up(path: Path) -> str | None:
-    """Return the vertical axis given by the Habitat stage_config.json next to a mesh, or None without such a file."""
     config = path.with_suffix(".stage_config.json")
     if not config.is_file():
         return None
@@ -169,7 +168,6 @@ class _HabitatReader:
                 yield ScenePiece(part if kind == "stage" else name, surface, seen, solid, loose)
 
     def _mesh(self, config: Path | None, asset: str) -> Path | None:
-        """Return an asset's mesh file, next to its template or elsewhere in the dataset, or None if it is missing."""
         mesh = (config or self._path).parent / asset
         found = mesh if mesh.is_file() else self._files.get(Path(asset).name)
         return found if found and found.name.endswith(SCENE_SUFFIXES) else None

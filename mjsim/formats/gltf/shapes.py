@@ -62,7 +62,6 @@ def _joined(*parts: Shape) -> Shape:
 
 
 def _grid(rows: int, columns: int) -> Indices:
-    """Return two triangles for each cell of a grid of (rows + 1) x (columns + 1) vertices, which are ordered by row."""
     i, j = (index.ravel() for index in np.mgrid[:rows, :columns])
     low = i * (columns + 1) + j
     high = low + columns + 1
@@ -70,7 +69,6 @@ def _grid(rows: int, columns: int) -> Indices:
 
 
 def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
-    """Return the part of the unit sphere between the heights `low` and `high`, each -1, 0 or 1."""
     halves = max(stacks // 2, 1)
     heights = np.arange(low * halves, high * halves + 1) / halves
     around, up = np.meshgrid(np.arange(slices + 1) / slices, heights)
@@ -92,7 +90,6 @@ def _circle(slices: int) -> Floats:
 
 
 def _tube(slices: int) -> Shape:
-    """Return the lateral surface of the unit cylinder."""
     around = np.column_stack((_circle(slices), np.zeros(slices + 1)))
     up = np.array([0.0, 0.0, 1.0])
     points = np.concatenate((around - up, around + up))
@@ -102,7 +99,6 @@ def _tube(slices: int) -> Shape:
 
 
 def _disc(slices: int, height: float) -> Shape:
-    """Return the end of the unit cylinder at height 1 or -1."""
     flat = np.concatenate((np.zeros((1, 2)), _circle(slices)[:-1]))
     number = np.arange(slices)
     triangles = np.column_stack((np.zeros(slices, np.int64), 1 + number, 1 + (number + 1) % slices))
@@ -174,7 +170,6 @@ def _flattened(corners: Floats, normals: Floats) -> Floats:
 
 
 def _without_copies(faces: Any, vertices: Floats, normals: Floats, uv: Floats | None) -> Shape:
-    """Merge duplicate vertices of a mesh."""
     parts = [vertices[faces].reshape(-1, 3), normals.reshape(-1, 3)]
     if uv is not None:
         parts.append(uv.reshape(-1, 2))

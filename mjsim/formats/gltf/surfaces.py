@@ -28,13 +28,13 @@ class GeomSurface:
 
     Attributes:
         geom: Id of the geom.
-        positions: Vertices, m, (n, 3).
-        normals: Unit vectors, (n, 3).
-        triangles: Rows of vertices, counter-clockwise seen from outside, (t, 3).
-        uv: Texture coordinates, v downwards, (n, 2); None without a texture.
-        texture: Id of the texture, -1 for none.
-        rgba: Colour as displayed, 0 to 1, (4,).
-        shine: Specular, shininess and emission, 0 to 1, (3,).
+        positions: Vertices in metres, shape (n, 3).
+        normals: Unit normals, shape (n, 3).
+        triangles: Vertex indices, counter-clockwise seen from outside, shape (t, 3).
+        uv: Texture coordinates with v downwards, shape (n, 2), or None without a texture.
+        texture: Texture id, or -1 for none.
+        rgba: Displayed colour from 0 to 1, shape (4,).
+        shine: Specular, shininess and emission from 0 to 1, shape (3,).
         is_decal: True for a translucent plane (a drawn shadow). MuJoCo draws decals before other translucent geoms.
         is_ceiling: True if top-down views omit the geom.
     """
@@ -66,7 +66,7 @@ def drawn_scene(model: Any, data: Any) -> Any:
 
 
 def surfaces(model: Any, data: Any, scene: Any) -> Iterator[GeomSurface]:
-    """Yield the visible geoms of an abstract scene, in their order there.
+    """Yield the visible geoms of an abstract scene, in the order of the scene.
 
     Raises:
         AssetError: A geom is of a type that cannot be exported.
@@ -105,7 +105,6 @@ def _surface(model: Any, data: Any, geom: Any) -> GeomSurface:
 
 
 def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
-    """Return the shape with MuJoCo's texture coordinates, and its texture id or -1."""
     texture = int(model.mat_texid[geom.matid, _RGB]) if geom.matid >= 0 else -1
     if texture < 0:
         return shape, -1
@@ -128,8 +127,8 @@ def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
 def lights_of(scene: Any) -> dict[str, Any]:
     """Describe the lights of an `MjvScene` in the house's frame, and the headlight, which shines along the view.
 
-    Positions are in m, cutoffs in degrees. Lights of type `point` and `image` are left out, because MuJoCo does not
-    draw them.
+    Positions are in metres and cutoffs in degrees. Lights of type `point` and `image` are left out, because MuJoCo does
+    not draw them.
     """
     drawn = scene.lights[: min(scene.nlight, _MAX_LIGHTS)]
     headlight = next((_colours(light) for light in drawn if light.headlight), None)

@@ -145,7 +145,7 @@ def in_our_style(world: str, assets: Iterable[str]) -> str:
 
 
 class FurnitureLibrary:
-    """Furniture for some types of things. Pieces are written to one MJCF file and read back as surfaces."""
+    """Furniture that replaces objects of some types. Pieces are written to one MJCF file and read back as surfaces."""
 
     def __init__(self, types: Iterable[str], folder: Path) -> None:
         self.file = folder / "furniture.xml"
@@ -177,13 +177,13 @@ class FurnitureLibrary:
             self._pieces.setdefault(name.partition(":")[0], []).append(found)
 
     def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[ScenePiece], str]:
-        """Return the most similar piece or a box in a thing's place, and the piece's type, which is empty for a box.
+        """Replace a thing by the most similar piece or a box. Return also the piece's type, which is empty for a box.
 
         Args:
-            thing: The thing.
+            thing: Object to replace.
             name: Its type, a key of `_TYPES` or "".
-            size: Its width, depth and height, m, (3,).
-            frame: Transform from its centre to the house (4, 4).
+            size: Its width, depth and height in metres, shape (3,).
+            frame: Transform (4, 4) from its centre to the house.
         """
         choices: list[tuple[float, str, list[ScenePiece], Floats, Floats]] = []
         for kind in _TYPES[name][0] if name else ():

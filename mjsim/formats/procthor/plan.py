@@ -1,8 +1,7 @@
 """Rooms, walls, openings and objects of ProcTHOR's house JSON.
 
-Its axes are x, y up and z, left-handed; seen from above, (x, z) are mjsim's (x, y). Its walls, which have no
-thickness, are the centre lines of mjsim's. An object's position is the centre of its box. At a rotation of 0, its front
-faces z.
+The JSON is left-handed with y up. Seen from above, its (x, z) are (x, y) in mjsim. Its walls have no thickness and are
+the centre lines of mjsim's walls. An object's position is the centre of its box, and its front faces z at rotation 0.
 """
 
 import math

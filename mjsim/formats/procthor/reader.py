@@ -86,7 +86,6 @@ def _frame(thing: Thing) -> Floats:
 
 
 def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
-    """Write MJCF of floors, walls and ceilings, and of panels that close windows and front doors."""
     rooms = []
     for room in plan.rooms:
         low, high = np.min(room.boxes, axis=0), np.max(room.boxes, axis=0)
@@ -122,7 +121,6 @@ def _write_shell(plan: ProcthorPlan, path: Path) -> Path:
 
 
 def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
-    """Return the key of the room nearest to the middle of a wall."""
     x, y = np.add(wall.start, wall.end) / 2
 
     def distance(room: NamedRoom) -> float:

@@ -1,6 +1,6 @@
 """Export of a plan as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
 
-ProcTHOR's walls have no thickness: they are the centre lines of mjsim's walls. Doors and windows become the
+ProcTHOR's walls have no thickness and are the centre lines of mjsim's walls. Doors and windows become the
 ProcTHOR assets of the nearest size.
 """
 
@@ -62,7 +62,6 @@ def _room(room: Room, name: str) -> dict[str, Any]:
 
 
 def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """Yield the walls of a room, and their outer sides."""
     for side in SIDES:
         for start, end, is_outside in wall_stretches(room, side, plan.rooms):
             name = _wall_name(ids[room.key], room, side, start, end)
@@ -76,7 +75,6 @@ def _walls(plan: HomePlan, room: Room, ids: dict[str, str]) -> Iterator[dict[str
 
 
 def _ordered(side: Side, start: float, end: float) -> tuple[float, float]:
-    """Return the ends of a wall in clockwise order around the floor, as seen from above."""
     return (start, end) if side in ("west", "north") else (end, start)
 
 
@@ -93,7 +91,6 @@ def _wall_name(room: str, at: Room, side: Side, start: float, end: float) -> str
 def _hole(
     plan: HomePlan, room: str, side: Side, opening: Door | Window, ids: dict[str, str]
 ) -> tuple[str, dict[str, Any]]:
-    """Return the id of the room's wall that has an opening, and the fields that describe the opening."""
     of = plan.room(room)
     start, end, _ = min(
         wall_stretches(of, side, plan.rooms),

@@ -1,6 +1,6 @@
 """Readers for mesh files, based on trimesh. Every node of the scene graph is read in its pose and with its colours.
 
-Parts of a scene are in metres and z up if the file format defines unit and axis.
+Parts of a scene are in metres with z up if the file format defines unit and axis.
 """
 
 import io
@@ -111,7 +111,6 @@ def _what_it_has(geometries: list[Any]) -> str:
 
 
 def _named(path: Path, keyword: str) -> list[str]:
-    """Return the last word of each line that starts with a keyword in an OBJ or MTL file. Empty without the file."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -123,9 +122,9 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
     """Return the surface of one mesh of a file.
 
     Args:
-        mesh: The mesh.
-        linear: True if its plain colours are linear, as in glTF.
-        side: Longest side in pixels to which its image is reduced; None to leave it as it is.
+        mesh: A mesh of the file.
+        linear: True if plain colours are linear, which glTF requires.
+        side: Maximum side, in pixels, to which its image is reduced, or None to keep the image unchanged.
     """
     count = len(mesh.faces)
     corners = np.asarray(mesh.triangles, np.float64)
@@ -191,7 +190,7 @@ class _Nearby(Beside):
 def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
     """Return the parts of a mesh file, moved by a transform (4, 4), with the names of their nodes.
 
-    glTF and COLLADA are returned in metres and z up, other formats unchanged.
+    Parts of glTF and COLLADA files are in metres with z up. Other formats are returned unchanged.
 
     Raises:
         AssetError: The file is missing or damaged, or has no triangles.

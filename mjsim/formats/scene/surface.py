@@ -84,14 +84,12 @@ def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
 
 
 def _welded(corners: Floats) -> tuple[Floats, Ints]:
-    """Return the distinct vertices (k, 3), and the vertex index of each corner (n, 3)."""
     points = np.round(corners.reshape(-1, 3), WELD_DIGITS) + 0.0
     vertices, faces = np.unique(points, axis=0, return_inverse=True)
     return vertices, faces.reshape(-1, 3)
 
 
 def _sample(image: Floats, places: Floats) -> Floats:
-    """Interpolate the colours (k, 3) of a repeating image (h, w, 3) at texture coordinates (k, 2)."""
     height, width = image.shape[:2]
     x, y = places[:, 0] * width - 0.5, (1.0 - places[:, 1]) * height - 0.5
     left, top = np.floor(x).astype(int), np.floor(y).astype(int)
