@@ -50,7 +50,7 @@ def check_path(name: str, house: str | None = None, load: Load = Catalogue.load)
 
     Args:
         name: Name or path to check.
-        house: Name of a house to check an episode with, instead of its own.
+        house: Name of a house to check an episode against, instead of the episode's own house.
         load: Loader of houses. `mjsim.load_catalogue` also generates them.
     """
     path = Path(name)

@@ -41,7 +41,7 @@ class StepResult:
 
     Attributes:
         observation: State after the last control step.
-        result: Answer to a pick or place, None for other actions.
+        result: Answer to a pick or place, or None for other actions.
         events: Physical events during the last control step. Any event stops the action.
         stopped: Reason why the action stopped.
         steps: Executed control steps, and the states between them.
@@ -163,7 +163,7 @@ class World:
         """Return the complete state, which `restore` accepts.
 
         Raises:
-            StateError: A pick or place is under way.
+            StateError: A pick or place is in progress.
         """
         if self.busy:
             raise StateError(
@@ -178,7 +178,7 @@ class World:
         restored (see `mjsim.world.state`).
 
         Raises:
-            StateError: The state belongs to another scene or another fidelity.
+            StateError: The state belongs to another scene or to another fidelity.
         """
         try:
             self._tier.restore(state)
@@ -191,11 +191,11 @@ class World:
 
         Args:
             action: Action of the person.
-            limit: Largest number of control steps, 1 or more.
+            limit: Maximum number of control steps, at least 1.
 
         Raises:
             ActionError: `action` is not an action.
-            PhysicsError: MuJoCo warned, or the state is not finite. Call `reset` before the next step.
+            PhysicsError: MuJoCo reported a warning, or the state is not finite. Call `reset` before the next step.
         """
         if isinstance(action, FollowPath):
             return self._follow(action, limit)

@@ -53,11 +53,11 @@ class Category:
 class Catalogue:
     """The contents of a house's catalogue. Mappings preserve the order of the file.
 
-    Two catalogues are equal if the contents of all their files are equal.
+    Two catalogues are equal if all their files have equal contents.
 
     Attributes:
         ref: Reference by which the house was loaded.
-        label: Name of the house shown to the person.
+        label: Name of the house, as shown to participants.
         house_path: MJCF file of the house.
         rooms: Room key -> label.
         categories: Category key -> category.
@@ -65,7 +65,7 @@ class Catalogue:
         objects: Object model key -> object model.
         content: Hash of the catalogue and of all model, mesh and texture files that it refers to.
         folder: Folder of the catalogue.
-        points: Number of points for objects that the house is designed for, or None if not given.
+        points: Number of object positions that the house is designed for, or None if not specified.
     """
 
     ref: HouseRef
@@ -93,7 +93,7 @@ class Catalogue:
         """Return a copy with translated labels and locations. Text without a translation stays in English.
 
         Raises:
-            AssetError: A file of labels cannot be read.
+            AssetError: A label file cannot be read.
         """
         labels = read_labels(language, (models_root(), self.folder))
 
@@ -121,7 +121,7 @@ class Catalogue:
                 houses, use `mjsim.load_catalogue`.
 
         Raises:
-            AssetError: As by `read`.
+            AssetError: The catalogue is missing or invalid.
 
         Example:
             >>> catalogue = Catalogue.load("apartment")

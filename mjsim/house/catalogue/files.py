@@ -31,7 +31,7 @@ def catalogue_file(house: HouseRef) -> Path:
     """Return the absolute path of a house's catalogue file.
 
     Raises:
-        AssetError: There is no such catalogue, or the home has not been generated yet.
+        AssetError: The catalogue does not exist, or the home has not been generated yet.
     """
     if house.file is None:
         raise AssetError(
@@ -49,7 +49,7 @@ def catalogue_file(house: HouseRef) -> Path:
 def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
     """Return a catalogue's tables and text, merged with those of the catalogues that it extends.
 
-    An entry replaces the entry of the same key in an extended catalogue.
+    An entry replaces the entry with the same key in an extended catalogue.
     """
     path = catalogue_file(house)
     try:
@@ -89,7 +89,7 @@ def read_labels(language: str, folders: Iterable[Path]) -> Mapping[str, str]:
     Later folders take precedence. A folder may have no such file.
 
     Raises:
-        AssetError: A file cannot be read, or has values that are not labels.
+        AssetError: A label file cannot be read, or contains invalid labels.
     """
     found: dict[str, str] = {}
     for path in (folder / f"labels.{language}.toml" for folder in folders):

@@ -30,8 +30,8 @@ def parse_house(house: str, folder: Path = Path()) -> HouseRef:
 
     Args:
         house: Name of a folder under `models/houses`, seed of a generated home (`generated:7`), or path of a
-            `catalogue.toml`, of the folder that contains one, or of a recipe.
-        folder: Base of relative paths.
+            `catalogue.toml`, of a folder that contains one, or of a recipe.
+        folder: Folder to which relative paths refer.
 
     Raises:
         HouseError: The name of a generated home is malformed, or belongs to another version of the generator.
@@ -52,7 +52,7 @@ def parse_house(house: str, folder: Path = Path()) -> HouseRef:
 def models_root() -> Path:
     """Return the folder that contains `houses/`, `receptacles/` and `objects/`. Raise an AssetError if it is missing.
 
-    An installed wheel contains it inside the package, a checkout next to the package.
+    The folder is inside an installed package, or next to the package in a checkout.
     """
     package = Path(__file__).resolve().parents[2]
     candidates = (package / "models", package.parent / "models")

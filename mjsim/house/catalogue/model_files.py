@@ -48,7 +48,7 @@ def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
     """Read an MJCF file as an editable model that can be attached to another, with absolute paths of asset files.
 
     Raises:
-        AssetError: The file is invalid, or has no top-level body of the name `body`.
+        AssetError: The file is invalid, or has no top-level body named `body`.
     """
     try:
         spec = mujoco.MjSpec.from_file(str(path))
@@ -89,7 +89,7 @@ def elements(path: Path) -> Iterator[ET.Element]:
 def content_hash(text: str, models: Iterable[Path]) -> str:
     """Return a hash, 64 hex digits, of a text and of MJCF files with all files that they include or refer to.
 
-    Files that are missing or cannot be parsed raise no error, because reading the model reports them.
+    Missing or malformed files raise no error here, because reading the model reports them.
     """
     files: dict[str, bytes] = {}
     for model in models:

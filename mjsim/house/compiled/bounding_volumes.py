@@ -1,6 +1,6 @@
 """Tighter bounding volume hierarchies, which halve the box tests of collision detection and ray casts in houses.
 
-MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house this groups table legs with
+MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house, this groups table legs with
 walls and floors, so boxes overlap. This module rebuilds the tree over the same leaves with the surface area heuristic
 (MacDonald and Booth, 1990). Contacts and ray hits stay the same.
 """

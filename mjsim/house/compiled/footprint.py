@@ -40,8 +40,8 @@ class Footprint:
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
     """Project onto the floor the static colliding geoms that overlap the heights from `low` to `high`, in metres.
 
-    Floors and rugs end below the default band, while lintels, lamps and wall cupboards begin above it. A geom in the
-    band counts with its whole outline. Objects and the person are left out because they move.
+    Floors and rugs end below the default range, while lintels, lamps and wall cupboards begin above it. A geom that
+    overlaps the range counts with its whole outline. Objects and the person are left out because they move.
 
     Raises:
         AssetError: The house has no rooms, or a static geom is a height field or has no area.

@@ -77,7 +77,7 @@ def installed_builder() -> NavigableBuilder:
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Remove visual geoms, materials, textures and unused meshes from a model in place.
 
-    Bodies stay, so that a state fits the models with and without visuals.
+    Bodies are kept, so that models with and without visual geoms accept the same states.
     """
     spec.compiler.discardvisual = True
     spec.compile()

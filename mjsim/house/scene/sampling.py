@@ -52,15 +52,15 @@ def sample_episode(
     """Sample a disorganized house.
 
     The seed alone determines points and their categories, so each level contains the easier ones. Object models are
-    drawn again for each level. None repeats before all models of its category were used.
+    drawn again for each level. No model repeats before all models of its category are used.
 
     Args:
         catalogue: Catalogue of the house.
         navigable: Walkable floor of the same house. By default, the installed planner computes it.
-        objects: Number of objects: the level, 1 to `points`. Categories are equally frequent if it is a multiple of
-            their number.
+        objects: Number of objects, 1 to `points`, also called the level. Categories are equally frequent if it is a
+            multiple of their number.
         seed: Seed, 0 or larger.
-        points: Number of points that the levels draw from. At most that of the house.
+        points: Number of points from which all levels are drawn, at most the number that the house is designed for.
         disorder: Observed disorder. Each object takes a point of the pool whose distance from its receptacle is close
             to an observed one. By default, objects take the first points.
 
@@ -70,7 +70,7 @@ def sample_episode(
     Raises:
         SamplingError: An argument is out of range, or the points, the objects or the start do not fit into the house.
         AssetError: A model of the catalogue is invalid.
-        PhysicsError: MuJoCo warned while the objects settled.
+        PhysicsError: MuJoCo reported a warning while the objects settled.
 
     Example:
         >>> episode = sample_episode(Catalogue.load("apartment"), objects=2, seed=3)

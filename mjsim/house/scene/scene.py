@@ -81,9 +81,9 @@ class Scene:
     """A compiled episode.
 
     Attributes:
-        model: The compiled model. Its `qpos0` has the poses of the episode.
+        model: The compiled model. Its `qpos0` contains the poses of the episode.
         index: Addresses of the objects in the state.
-        spec: Editable description, for export.
+        spec: Editable model, for export.
         visuals: True if the model has geoms that are only drawn.
     """
 

@@ -32,7 +32,7 @@ def settle(episode: Episode, catalogue: Catalogue) -> Settled:
     the house.
 
     Raises:
-        PhysicsError: MuJoCo warned.
+        PhysicsError: MuJoCo reported a warning.
     """
     scene = compose(episode, catalogue, avatar=False, visuals=False)
     data = mujoco.MjData(scene.model)

@@ -45,8 +45,10 @@ class _VisibilityGrid(NamedTuple):
 class PotentialVisibility:
     """Predictor of the objects that may come into view soon.
 
-    Args: scene: The composed episode. horizon: How far to look ahead, in seconds. field_of_view: Horizontal field of
-    view in radians. By default, that of the scene's person.
+    Args:
+        scene: The composed episode.
+        horizon: How far to look ahead, in seconds.
+        field_of_view: Horizontal field of view in radians. By default, that of the scene's person.
     """
 
     def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:

@@ -72,7 +72,7 @@ def visible_receptacles(
 
     A receptacle is in view if one of seven rays, to the centre of its volume and to points around it, is inside the
     field of view and hits nothing before the receptacle. The model can be any that contains the house. `own` (ngeom,)
-    is a mask of geoms that hide nothing, such as those of the person. Other arguments are as for `visible_objects`.
+    is a mask of geoms that hide nothing, such as those of the person. See `visible_objects` for other arguments.
     """
     origin = np.array(eye, dtype=np.float64)
 
@@ -103,11 +103,12 @@ def visible_objects(
     """Return the names of the objects in view, in the episode's order.
 
     An object is in view if one of seven rays, to the centre of its bounding box and to points around it, is inside the
-    field of view and hits the object first. Walls, furniture and other objects block rays, the person's body does not.
+    field of view and hits the object first. Walls, furniture and other objects block rays. The person's body
+    does not.
 
     `data` needs current poses of geoms. `eye` (3,) is in metres. `heading`, counter-clockwise from +x, and `pitch`,
-    positive upwards, are in radians. `field` defaults to that of the scene's person. `among` limits the search to some
-    names.
+    positive upwards, are in radians. `field` defaults to that of the scene's person. `among` are the names to
+    look for.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     return tuple(scene.index.names[i] for i in sorted(set(_object_hits(scene, data, gaze, among, once=True))))
@@ -125,7 +126,7 @@ def visible_shares(
 ) -> dict[str, float]:
     """Return, for each object in view, the fraction of the seven rays that hit it: above 0, at most 1.
 
-    The arguments are as for `visible_objects`.
+    See `visible_objects` for the arguments.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     hits = list(_object_hits(scene, data, gaze, among, once=False))

@@ -140,7 +140,7 @@ class HealthMonitor:
         """Process the latest control step. Return ejections and tunnelling, each with the index of its object.
 
         Raises:
-            PhysicsError: MuJoCo warned, or a position or velocity is not finite.
+            PhysicsError: MuJoCo reported a warning, or a position or velocity is not finite.
         """
         data = self._rig.data
         suspect = self._scan(data, held)

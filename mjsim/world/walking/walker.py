@@ -25,9 +25,9 @@ BACK_OFF_TIME = 0.6  # how long a blocked person steps back, in seconds
 class Walker:
     """Executes `FollowPath` actions, one after the other.
 
-    A walk to another pick or place starts again. A walk without one continues the previous walk. `walls` (e, 4) are the
-    edges (x, y, x, y), in metres, of the floor on which the person may walk around objects. Without edges, the whole
-    floor is available.
+    A path to another pick or place starts a new walk. A path without a pick or place continues the previous walk.
+    `walls` (e, 4) are the edges (x, y, x, y), in metres, of the floor on which the person may walk around objects.
+    Without edges, the whole floor is available.
     """
 
     def __init__(self, person: PersonParameters, walls: NDArray[np.float64]) -> None:
