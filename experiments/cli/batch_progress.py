@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from experiments.trials.trial_reader import OnRead
 
-MAX_SHARDS_SHOWN = 100  # maximum number of shards that are listed for a rerun
+MAX_SHARDS_SHOWN = 100  # maximum number of shards that a message lists for a rerun
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

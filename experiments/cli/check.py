@@ -12,7 +12,7 @@ from experiments.cli.options import add_command, add_force
 if TYPE_CHECKING:
     from mjsim.house.check import CheckReport
 
-UNUSABLE = 2  # exit code
+UNUSABLE = 2  # exit code for an unusable input
 
 DESCRIPTION = """\
 Check a house, an object, a receptacle or an episode against all conventions of docs/models.md, and list what to change.

@@ -22,7 +22,7 @@ EXTRAS = {
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "doctor",
-        help=None,  # even None makes the completion script include the command
+        help=None,  # without this argument, the completion script would omit the command
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -23,7 +23,7 @@ _SECRET = re.compile(r"(--?[\w-]*(?:token|password|secret|key)[\w-]*)(=|\x00)[^\
 
 
 def end_with(error: Exception, words: Sequence[str]) -> int:
-    """Print an error to standard error in one line, and return the exit code.
+    """Print an error in one line to standard error, and return the exit code.
 
     A report includes the command line `words`.
     """

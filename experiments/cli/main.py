@@ -117,11 +117,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is None and not sys.warnoptions:
         warnings.simplefilter("ignore")  # library warnings are not meant for users
     postpone_gl()
-    if sys.stderr is None:  # closed; `print` would write messages to standard output
+    if sys.stderr is None:  # if the stream is closed, `print` would write to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
     if argv is None:
-        faulthandler.enable(all_threads=False)  # reports file and line if the process crashes
-    if sys.stdout is None:  # closed; make writes fail instead of losing output silently
+        faulthandler.enable(all_threads=False)  # prints file and line if the process crashes
+    if sys.stdout is None:  # if the stream is closed, writing must fail
         os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
@@ -148,10 +148,10 @@ def _run(words: list[str]) -> int:
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
-        sys.path.append(here)  # lets users name custom participants, conditions and planners
+        sys.path.append(here)  # makes custom modules in the current folder importable
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
-        commands.error(f"{bad} has no value")  # argparse would parse it as an empty list
+        commands.error(f"{bad} has no value")  # argparse would parse the missing value as an empty list
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

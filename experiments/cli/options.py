@@ -135,7 +135,7 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     parser.add_argument(option, **{**arguments, **changes})
 
 
-NAMES: dict[str, Callable[[], str]] = {  # functions that list the possible values of a setting for the help
+NAMES: dict[str, Callable[[], str]] = {  # for each setting, lists its possible values for the help
     "user": lambda: (
         f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
         "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"

@@ -172,7 +172,7 @@ class _PlanningThread(threading.Thread):
             yield self._planner.solve(self._problem, limit=limit)
 
     def wait(self) -> Plan:
-        """Return the best plan once the search has ended or timed out. Raises the planner's error if it failed."""
+        """Return the best plan when the search has ended or timed out. Raises the error of a failed planner."""
         self.start()
         ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE_S
         report = self._since + REPORT_PERIOD_S

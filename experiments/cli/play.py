@@ -131,7 +131,7 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
-    if task.planner not in SOLVERS:  # the workers load built-in planners
+    if task.planner not in SOLVERS:  # a built-in planner is loaded only in the workers
         solver(task.planner)
     return task
 
@@ -143,7 +143,7 @@ def _serve(
 
     prepare_process()
     pool = WorkerPool(task.house)
-    pool.warm_up()  # in parallel with the imports below
+    pool.warm_up()  # workers start while the modules below are imported
     asyncio.run(_serve_visits(arguments, task, questions, pool, listener))
 
 

@@ -19,7 +19,7 @@ from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
 from experiments.visit.texts.items import Item
 
-NAME = "play"  # name of the study in the database
+NAME = "play"  # name of the study in the database of `mjsim play`
 MINUTES = 15.0
 DAY_S = 86400.0
 MAX_VISITS = 1_000_000

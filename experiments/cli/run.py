@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
             **trial_options(arguments),
         },
     )
-    film = film_config(arguments)  # checks the profile even if nothing is filmed
+    film = film_config(arguments)  # an invalid profile is an error even if nothing is filmed
     console = error_console()
     warnings: list[str] = []
     columns = (

@@ -45,7 +45,7 @@ def add_server_options(group: Any) -> None:
 
 def prepare_process() -> None:
     """Make new files private to the current user, and raise the limit on open files."""
-    os.umask(0o077)  # participants' data are confidential
+    os.umask(0o077)  # participants' data must not be readable by other users
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(most, MAX_FILES) if most > 0 else MAX_FILES, most))
 

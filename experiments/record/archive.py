@@ -25,7 +25,7 @@ from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 WAIT_S = 60.0  # how long to wait for another process that is writing to the archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
 _DAMAGED = "if it is damaged, move it away: its trials are run again"
-_OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # 0 is the character after the slash
+_OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # in ASCII, 0 is the character after the slash
 
 
 def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:

@@ -15,17 +15,17 @@ from mjsim.values.errors import ActionError
 from mjsim.values.observation import ObjectStatus, StepStates
 from mjsim.world.state import WorldState
 
-OBJECTS = -1  # stands for the number of objects in the shapes below
+OBJECTS = -1  # placeholder for the number of objects in the shapes below
 
 # Type and shape of each column in a row. Row t contains the state before action t.
 TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
-    "time": ("f8", ()),  # in seconds
-    "position": ("f8", (2,)),  # in metres
-    "heading": ("f8", ()),  # in radians
-    "pitch": ("f8", ()),  # in radians
+    "time": ("f8", ()),  # simulated time in seconds
+    "position": ("f8", (2,)),  # position of the person in metres
+    "heading": ("f8", ()),  # heading of the person in radians
+    "pitch": ("f8", ()),  # elevation of the gaze in radians
     "hands": ("i2", (2,)),  # index of the object in each hand, or -1
-    "object_position": ("f8", (OBJECTS, 3)),  # in metres
-    "object_quaternion": ("f8", (OBJECTS, 4)),  # in the order w, x, y, z
+    "object_position": ("f8", (OBJECTS, 3)),  # positions of the objects in metres
+    "object_quaternion": ("f8", (OBJECTS, 4)),  # quaternions in the order w, x, y, z
     "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
     # Type of action (0 move, 1 pick, 2 place), object index or -1, speeds forward and to the left (m/s), and angular
     # speeds of turning and looking (rad/s). With n objects, index n + i refers to entry i of `unknown_objects`, which

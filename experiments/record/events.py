@@ -114,7 +114,7 @@ TYPES = tuple(LoggedEvent.__subclasses__())  # excludes `OutcomeEvent`, defined 
 
 
 class OutcomeEvent(LoggedEvent, frozen=True):
-    """An event in the world.
+    """An event in the simulated world.
 
     Attributes:
         object: The object.

@@ -18,9 +18,9 @@ import msgspec
 
 from experiments.errors import RecordError
 
-JOURNAL = "journal.bin"  # file in the folder of a session
+JOURNAL = "journal.bin"  # name of the journal in the folder of a session
 MAGIC = b"mjsim journal 2\n"
-MAX_ENTRY = 64 * 1024 * 1024  # in bytes
+MAX_ENTRY = 64 * 1024 * 1024  # maximum size of an entry in bytes
 LOCK_TIMEOUT_S = 10.0  # how long to wait for another process to close the journal
 _OTHER_VERSION = "another version of mjsim; use that version to continue the session"
 _HEAD = struct.Struct("<II")  # length in bytes and CRC-32 of the next entry

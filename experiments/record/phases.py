@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from experiments.errors import ConfigError
 
 STORY, FLYTHROUGH, TRAINING, TASK = PHASES = ("story", "flythrough", "training", "task")
-HUMAN = "human"  # participant name of a human
-REHEARSAL = "rehearsal"  # participant name in `mjsim study rehearse`
+HUMAN = "human"  # name that stands for any human participant
+REHEARSAL = "rehearsal"  # name of the simulated participants in `mjsim study rehearse`
 REHEARSED = "Rehearsed, with answers drawn at random"
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
@@ -42,7 +42,7 @@ ALL_DELIVERED = "all delivered"
 TIME_LIMIT = "time limit"
 INTERRUPTED = "interrupted"
 PHYSICS_ERROR = "physics error"
-ERROR = "error"  # any other error, such as an error in a custom participant
+ERROR = "error"  # any other error, for example in a custom participant
 
 COMPLETE = (ALL_DELIVERED, TIME_LIMIT)
 BROKEN_OFF = (INTERRUPTED, ERROR)  # the last recorded control step may be incomplete

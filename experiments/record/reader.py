@@ -58,7 +58,7 @@ class Record:
 
     @cached_property
     def steps_of_events(self) -> list[int]:
-        """The control step at which each event was logged."""
+        """Control step at which each event was logged."""
         steps = np.searchsorted(self.recording["log_size"][:-1], self._offsets, side="right") - 1
         return [int(step) for step in np.maximum(0, steps)]
 

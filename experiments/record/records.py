@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.support.files import read_text
 
-# Version 2 added state hashes, 3 the health of the physics, 4 typed checkpoints, 5 distances between places, ties and
-# gaps of suggestions, 6 the participant, and 7 groups of person parameters.
+# Log format 2 added state hashes, 3 the health of the physics, 4 typed checkpoints, 5 distances between visits, ties
+# and suggestion gaps, 6 the participant, and 7 groups of person parameters.
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",

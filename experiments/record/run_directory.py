@@ -17,7 +17,7 @@ SHOWN_NAMES = 3  # maximum number of existing files named in an error
 SAMPLE = 100
 TRIALS = "trials"  # subfolder of a batch that contains its runs
 PACKED = ".sqlar"  # suffix of an archive of runs
-VISIT = "visit.json"  # file in the folder of each visit of `mjsim play`
+VISIT = "visit.json"  # name of a file in the folder of each visit to `mjsim play`
 JOURNALS = "journals"  # subfolder of a visit that contains its journals
 
 
@@ -40,7 +40,7 @@ def is_batch(directory: Path) -> bool:
 
 
 def visit_folders(directory: Path) -> list[Path]:
-    """List the visits in one or several folders of `mjsim play`, by name."""
+    """List the visits in a folder of `mjsim play`, or in several such folders, by name."""
     found = (path for depth in ("*", "*/*") for path in directory.glob(f"{depth}/{VISIT}"))
     return sorted(path.parent for path in found)
 
@@ -210,7 +210,7 @@ def _existing(folder: Path) -> Path:
 
 def _check_writable(folder: Path) -> None:
     try:
-        with tempfile.TemporaryFile(dir=folder):  # unnamed, so that it cannot be left behind
+        with tempfile.TemporaryFile(dir=folder):  # a temporary file without a name cannot be left behind
             pass
     except OSError as error:
         raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error

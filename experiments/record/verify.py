@@ -21,7 +21,7 @@ from mjsim.world.state import checkpoint_hash
 
 @dataclass(frozen=True)
 class Mismatch:
-    """A difference between a record and its verification.
+    """A difference that the verification of a record has found.
 
     Attributes:
         step: First control step concerned.

@@ -31,7 +31,7 @@ VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLAC
 
 
 class Assistant:
-    """Passes the state of the task to the planner, and the plan to the assistance condition.
+    """Passes the state of the task to the planner, and its plans to the assistance condition.
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.

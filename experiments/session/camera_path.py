@@ -14,11 +14,11 @@ from mjsim.house.compiled.house import compiled_house
 from mjsim.house.sight.sight import FieldOfView, visible_receptacles
 from mjsim.values.person_parameters import PersonParameters
 
-# Of the default person, so that all participants see the same film
+# Eye height of the default person, so that all participants see the same film
 EYE_HEIGHT = PersonParameters().eye_height
 STEP = 0.04  # time between two camera poses, in seconds
-SPEED = 1.3  # in m/s
-TURNING = math.radians(75.0)  # in rad/s
+SPEED = 1.3  # walking speed in m/s
+TURNING = math.radians(75.0)  # turning speed in rad/s
 LOOK_AHEAD = 0.8  # how far ahead on its path the moving camera looks, in metres
 BIN_TIME = 2.0  # how long the camera looks at each bin, in seconds
 # Distances in metres from the end of the path to a bin, tried until the bin is visible
@@ -29,9 +29,9 @@ _FIELD = FieldOfView.of(PersonParameters())
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """Camera poses at intervals of `STEP` seconds, with the bin that the camera looks at."""
+    """Camera poses at intervals of `STEP` seconds, with the bin that the camera looks at in each of them."""
 
-    positions: NDArray[np.float64]  # in metres, shape (n, 3)
+    positions: NDArray[np.float64]  # camera positions in metres, shape (n, 3)
     headings: NDArray[np.float64]  # yaw of the gaze in radians, 0 along +x, counter-clockwise, shape (n,)
     pitches: NDArray[np.float64]  # elevation of the gaze in radians, shape (n,)
     bins: tuple[str | None, ...]  # key of the bin that the camera looks at, or None, for each pose

@@ -32,7 +32,7 @@ class Familiarisation:
         return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
 
     def log(self, log: EventLog) -> None:
-        """Log the phases. The task clock has not started then."""
+        """Log the phases, which precede the start of the task clock."""
         for end in self.ended:
             log.append(0.0, PHASE_BEGUN, phase=end["phase"])
             log.append(0.0, PHASE_ENDED, **end)

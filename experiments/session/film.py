@@ -18,7 +18,7 @@ from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PICTURE_ASPECT, PersonParameters
 
 FPS = 25
-MIN_DURATION = 1.0  # in seconds
+MIN_DURATION = 1.0  # minimum length of a film in seconds
 
 OnFrames = Callable[[int, int], None]
 

@@ -14,7 +14,7 @@ from mjsim.render import CameraPose, Renderer, render_house_map
 from mjsim.support.files import replacing
 from mjsim.values.person_parameters import PersonParameters
 
-SIZE = (960, 640)  # in pixels
+SIZE = (960, 640)  # size of a picture in pixels
 # Vertical field of view in radians, wider than a person's so that a corner view shows most of a room
 FIELD = math.radians(62.0)
 SCALE, MARGIN = 70.0, 0.4  # scale of the plan in pixels per metre, and the margin around it in metres

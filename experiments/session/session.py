@@ -166,7 +166,7 @@ class Session:
         """Let the participant act once. Walking and waiting can take many control steps, other actions take one."""
         self._observe()
         if self.assistant.is_custom:
-            self._hud_state()  # a faulty condition then ends the session even without a viewer
+            self._hud_state()  # detects a faulty condition even if there is no viewer
         world = self._world
         percept = SessionPercept(
             self._now, self._answer, world, self.assistant, self._hud_state, blocked=world.blocked

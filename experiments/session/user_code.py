@@ -33,7 +33,7 @@ from mjsim.values.actions import Action
 from mjsim.values.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
-MAX_CALL_LIMIT = 1e6  # in seconds
+MAX_CALL_LIMIT = 1e6  # maximum value of the time limit in seconds
 PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, RenderError)
 
 
@@ -84,9 +84,7 @@ def _time_limit(limit: float) -> Iterator[None]:
     try:
         yield
     finally:
-        if (
-            signal.getsignal(signal.SIGALRM) is interrupt
-        ):  # otherwise a signal has arrived, and its timer is running
+        if signal.getsignal(signal.SIGALRM) is interrupt:
             signal.setitimer(signal.ITIMER_REAL, *before)
             signal.signal(signal.SIGALRM, handler)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 
 Image = NDArray[np.uint8]
-QUEUE_LENGTH = 8  # in frames
+QUEUE_LENGTH = 8  # maximum number of frames that wait to be encoded
 
 
 class VideoWriter:

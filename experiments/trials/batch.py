@@ -154,7 +154,7 @@ def _results(
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
-    # The work folder is removed at the end, with the leftovers of killed processes.
+    # The work folder is removed at the end, including files that killed processes left there.
     with work_folder(by_house[0][0].parent) as folder, executor(folder) as pools:
         run = functools.partial(_run, folder=folder, archives=archives)
         while left:
@@ -236,7 +236,7 @@ def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> 
             finally:
                 if archives is not None and is_run(run):
                     pack(run, _archive(out.parent, archives))
-                    if is_run(out):  # an earlier, incomplete run
+                    if is_run(out):  # left by an earlier, incomplete run
                         shutil.rmtree(out)
         except Exception as error:  # an error in one trial must not stop the others
             return _failure(error).replace(str(run), str(out))

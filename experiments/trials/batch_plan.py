@@ -115,7 +115,7 @@ def check_names(trials: Sequence[TrialConfig]) -> None:
 
 
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check in advance, as far as possible, that trials can be run. Return the inputs of each trial."""
+    """Check, as far as possible before running them, that trials can be run. Return the inputs of each trial."""
     check_names(trials)
     catalogue = functools.cache(load_catalogue)
     house = functools.lru_cache(MAX_HOUSES)(House.load)

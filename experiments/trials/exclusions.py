@@ -69,7 +69,7 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
 class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A participant excluded by ID, and the reason."""
+    """A participant excluded by ID, with the reason."""
 
     id: Name | int  # ID of the participant in one of the columns `IDS`
     reason: Reason
@@ -96,7 +96,7 @@ class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """An excluded participant, with the rules that apply and the reasons."""
+    """An excluded participant, with the reason for each rule that excludes them."""
 
     person: str
     assistance: str
@@ -141,7 +141,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 
 def person_name(row: Row, number: int) -> str:
-    """Return the ID of a participant. A participant without an ID is named after the row number."""
+    """Return the ID of a participant, or their row number if they have none."""
     return str(next((row[name] for name in IDS if row.get(name) is not None), f"row {number}"))
 
 

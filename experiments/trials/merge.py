@@ -102,7 +102,7 @@ def _add(part: Path, trials: Mapping[str, StoredTrial], out: Path, reader: Trial
     trials_folder = out / TRIALS
     put_aside(
         out, {path.name for path in run_paths(trials_folder)}.intersection(trials)
-    )  # incomplete or damaged
+    )  # incomplete or damaged runs
     for name in (name for name in trials if is_run(part / TRIALS / name)):
         with work_folder(trials_folder) as work:
             shutil.copytree(part / TRIALS / name, work / name, copy_function=link_or_copy)

@@ -30,7 +30,7 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 def check_person(described: Distributions) -> None:
     """Check distributions with the median person. Raises a `ConfigError` if a distribution is invalid."""
-    if described:  # otherwise the person is the default one
+    if described:
         _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 

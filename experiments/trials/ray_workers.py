@@ -104,7 +104,7 @@ class _Cluster:
 
     def _finish(self, result: Future[Any], done: Future[Any]) -> None:
         self._running.pop(result, None)
-        with suppress(InvalidStateError):  # the cluster has been lost
+        with suppress(InvalidStateError):  # the call has already failed because the cluster was lost
             if error := done.exception():
                 result.set_exception(_translated(error))
             else:

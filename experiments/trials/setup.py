@@ -89,7 +89,7 @@ def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
 
 
 def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
-    """Return the planner of a trial, already planning. The caller must close it.
+    """Start planning for a trial, and return its planner. The caller must close the planner.
 
     The exact planner works in a thread, because its kernels release the GIL. For a live trial, the first plan is proved
     before the clock starts.

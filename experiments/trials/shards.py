@@ -37,7 +37,7 @@ class Shard:
 
     @property
     def label(self) -> str:
-        """Suffix for the names of files that only this shard uses."""
+        """Part of the names of files that only this shard uses."""
         return f"{self.number}-of-{self.count}."
 
     def of(self, design: Design) -> Design:

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from experiments.record.phases import TASK, TRAINING
 from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
-TRAINING_LIMIT_S = 3600.0  # time limit for simulated participants
+TRAINING_LIMIT_S = 3600.0  # time limit of the training for simulated participants
 HUMAN_TRAINING_LIMIT_S = 24 * 3600.0
 _TRAINING_SEED = 7  # distinguishes the house seed of the training from that of the task
 

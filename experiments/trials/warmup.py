@@ -1,4 +1,4 @@
-"""Compiles all kernels before their first use, so that later processes load them from disk.
+"""Compiles all kernels in advance. Later processes load them from disk.
 
 Run this once after installing: `python -m experiments.trials.warmup`. It takes a minute, or a few seconds if all
 kernels are compiled already.

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from experiments.session.signals import SIGNALS, signals_postponed
 from experiments.trials.ray_workers import ray_cluster
 
-QUEUED_PER_WORKER = 2  # few, so that Ctrl-C takes effect soon
+QUEUED_PER_WORKER = 2  # a small number, so that Ctrl-C takes effect soon
 
 
 class _Pool(ProcessPoolExecutor):

@@ -31,7 +31,7 @@ participants is marked as such: it is not evidence about people."""
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "study",
-        help=None,  # even None makes the completion script include the command
+        help=None,  # without this argument, the completion script would omit the command
         description=DESCRIPTION,
         formatter_class=HelpFormatter,
     )

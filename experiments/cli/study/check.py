@@ -85,7 +85,7 @@ def _recruiter(study: "Study") -> "Recruiter":
 
     try:
         return recruiter(study.settings.recruitment)
-    except ConfigError:  # the check lists it as a problem of the study file
+    except ConfigError:  # the check reports the error as a problem of the study file
         return OpenLink()
 
 

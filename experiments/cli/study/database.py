@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 DATABASE = "study.db"
-URL = "MJSIM_STUDY_DATABASE"  # environment variable
+URL = "MJSIM_STUDY_DATABASE"  # environment variable with the URL of the database
 
 
 def add_study_file(parser: argparse.ArgumentParser, **settings: Any) -> None:

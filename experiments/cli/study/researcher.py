@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from experiments.visit.store import Store
 
 ROLES = ("owner", "assistant", "viewer")
-MIN_PASSWORD = 12  # minimum length in characters
+MIN_PASSWORD = 12  # minimum length of a password in characters
 DESCRIPTION = f"""\
 Manage the accounts for the researcher's page (`mjsim study serve --researcher-port`). `add` creates an account,
 `change` changes its role or password and ends its logins, `disable` and `enable` switch it off and on, and `list` lists

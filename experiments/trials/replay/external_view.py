@@ -23,7 +23,7 @@ Bounds = tuple[float, float, float, float]
 
 _TOP_DOWN_FOV = math.radians(20.0)
 _FREE_FOV = math.radians(50.0)
-# Factor on the camera distance, because the tops of walls are nearer to the camera than the floor
+# Extra camera distance, so that the tops of the walls fit into the picture
 _MARGIN = 1.12
 _ORBIT_PERIOD_S = 90.0
 _ELEVATION = math.radians(52.0)

@@ -151,7 +151,7 @@ def mismatch_error(
     differences: tuple[str, ...] = (),
     verdicts: tuple[object, ...] = (),
 ) -> ReplayError:
-    """Return a one-line error that names the first mismatch and its possible causes."""
+    """Return an error that names the control step of a mismatch and its possible causes in one line."""
     timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
     where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
     reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
@@ -184,11 +184,11 @@ class LogSource(PlanSource):
         self._plans = list(plans)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """The remaining visits, or None if a plan was logged at the current time."""
+        """Return the remaining visits, or None if a plan was logged at the current time."""
         return None if self._is_due else tuple(v for v in route.visits if _is_open(v, state))
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:  # noqa: ARG002 - both are logged
-        """The plan logged at the current time. Every run logs a plan at the start."""
+        """Return the plan logged at the current time. Every run logs a plan at the start."""
         if not self._is_due:
             raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
         return _route(self._plans.pop(0), state)
@@ -199,7 +199,7 @@ class LogSource(PlanSource):
         return self._is_due and bool(self._plans[0].get("improved", False))
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """The better plan logged at the current time, or None."""
+        """Return the better plan logged at the current time, or None."""
         return self.plan(state, route, shown=True) if self.pending else None
 
     @property
