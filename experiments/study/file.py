@@ -45,9 +45,7 @@ class Pay(_Table, frozen=True):
     reward: Money = 0.0  # pay for completing the study
     screen_out: Money = 0.0  # pay for screened-out participants
     bonus_for_all: Money = 0.0  # bonus for putting all objects away
-    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = (
-        None  # platform fee, as a fraction of the pay
-    )
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee, as a share of pay
     wage: Money = 0.0  # hourly wage below which `mjsim study check` reports the pay as too low
     partial: bool = False  # if True, participants who leave during or after the task get part of the reward
 

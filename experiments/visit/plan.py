@@ -40,7 +40,7 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     attempts: Count = 3  # number of attempts allowed at the comprehension check
     # number of wrong answers allowed in the survey's attention checks; if None, they do not screen out anyone
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # number of days after the last activity when identifying data is deleted
+    keep_days: Count | None = None  # days from the last activity to the deletion of identifying data
 
     def __post_init__(self) -> None:
         if self.timed_out_after < self.abandoned_after:

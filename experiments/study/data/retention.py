@@ -21,7 +21,7 @@ DAY = 86400.0  # one day, in seconds
 
 @dataclass(frozen=True)
 class Retained:
-    """Names of all participants who have been inactive for long enough.
+    """Names of the participants whose retention period is over.
 
     Attributes:
         forgotten: Participants whose identifying data was deleted.
@@ -51,7 +51,7 @@ async def forget_old(
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
     played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
-    # Leave participants whose runs are on another host to that host.
+    # Skip participants whose runs are on another host, since that host deletes their data.
     places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
     kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
@@ -73,7 +73,7 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
             found = await forget_old(store, visits, keep_days)
             if found.forgotten or found.erased:
                 LOG.info("%d people forgotten, %d erased", len(found.forgotten), len(found.erased))
-        except (StoreError, OSError) as error:  # the next try is tomorrow
+        except (StoreError, OSError) as error:  # will be tried again tomorrow
             LOG.warning("%s", error)
         await asyncio.sleep(DAY)
 

@@ -29,7 +29,7 @@ class Due:
 def due(
     study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """Return the payments that are due by the study file's rules, in the participants' order of arrival.
+    """Return the payments that are due under the study file's rules, in the participants' order of arrival.
 
     No payments are due to active or rejected participants.
     """

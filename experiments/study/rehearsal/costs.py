@@ -105,7 +105,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """Maximum cost without payments to screened-out participants."""
+        """Maximum cost, excluding payments to screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 

@@ -63,9 +63,7 @@ class Surroundings:
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
     house: House
-    parameters: Mapping[
-        str, str
-    ]  # query parameters of links; empty values are replaced by the participant's id
+    parameters: Mapping[str, str]  # query parameters of links, with ids left empty
     minimum: Mapping[str, float]  # minimum durations enforced by the server, in seconds, by phase
     attempts: int  # number of attempts allowed at the comprehension check
     factor: float  # factor by which waiting times are divided
@@ -268,7 +266,7 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
-    """Return a form that the phase must refuse, or None if it accepts any.
+    """Return a form that the phase must refuse, or None if it accepts every form.
 
     If a question has a right answer, the form has a wrong one. Otherwise, all answers are missing.
     """

@@ -58,9 +58,7 @@ class Camera:
             clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
-        await self._ask(
-            "Page.navigate", url="about:blank"
-        )  # leave the page, so that the server ends a trial's session
+        await self._ask("Page.navigate", url="about:blank")  # leaving the page ends a trial's session
 
     async def _settle(self) -> None:
         loop = asyncio.get_running_loop()

@@ -30,9 +30,7 @@ class SimulatedPlayer:
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._models: dict[str, str] = {}
-        self._places: dict[
-            str, tuple[float, float]
-        ] = {}  # last known positions of objects that are not put away
+        self._places: dict[str, tuple[float, float]] = {}  # last known positions of objects to put away
         self._held: tuple[str | None, str | None] = (None, None)
         self._goal: tuple[float, float] | None = None
         self._reach: Any = None

@@ -16,11 +16,7 @@ COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
 ATTEMPTS = 10, 300.0  # maximum number of login attempts per address and per name, and its period in seconds
 CHECKS = 2  # maximum number of concurrent password checks, each of which needs 64 MiB
-ORDER: tuple[Role, ...] = (
-    "viewer",
-    "assistant",
-    "owner",
-)  # each role includes the permissions of those before it
+ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # by increasing permissions
 
 
 def may(who: Researcher, role: Role) -> bool:

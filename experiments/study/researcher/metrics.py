@@ -14,17 +14,7 @@ from experiments.visit.store import Counts
 from experiments.web.server.player import Meter
 from experiments.web.server.sessions import Sessions
 
-LATENCIES = (
-    0.01,
-    0.025,
-    0.05,
-    0.1,
-    0.25,
-    0.5,
-    1.0,
-    3.0,
-    10.0,
-)  # upper limits of histogram buckets, in seconds
+LATENCIES = (0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 3.0, 10.0)  # histogram buckets, in seconds
 KEPT = 50  # number of recent warnings and errors to keep
 
 

@@ -162,9 +162,7 @@ class VisitServer:
             raise HTTPException(404)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
-            self.sessions.limit.release(
-                person.token_hash
-            )  # a visit can have a slot before its session starts
+            self.sessions.limit.release(person.token_hash)  # the slot may have no session yet
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -188,9 +186,7 @@ class VisitServer:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         if person is not None and self._host is not None and not await self._host.has(person):
-            await socket.send_denial_response(
-                Response(status_code=404)
-            )  # causes the proxy to try the next host
+            await socket.send_denial_response(Response(status_code=404))  # a proxy tries the next host
             return
         if person is None:
             await socket.close(1008)
@@ -210,9 +206,7 @@ class VisitServer:
 
     async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person
-        begun = self._procedure.folders.find(
-            person.token_hash
-        )  # reading a small file is faster without a thread
+        begun = self._procedure.folders.find(person.token_hash)  # a small file, so no thread is needed
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))

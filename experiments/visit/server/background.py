@@ -70,10 +70,8 @@ async def end_absent(procedure: Procedure) -> None:
             continue
         try:
             before = utc_now() - datetime.timedelta(seconds=away)
-            await procedure.recover(
-                before
-            )  # trials of absent participants may have ended without being recorded
+            await procedure.recover(before)  # record trials that have ended
             if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
-        except StoreError as error:  # the next sweep tries again
+        except StoreError as error:  # will be tried again at the next sweep
             LOG.warning("%s", error)

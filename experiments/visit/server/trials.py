@@ -63,9 +63,7 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(pool, self._limit, self._plan.limits.idle, meter, capacity)
-        self._default_wait = (
-            60.0 * self._plan.minutes
-        )  # estimated wait until the first trials have ended, in seconds
+        self._default_wait = 60.0 * self._plan.minutes  # used until trials have ended, in seconds
         self._sockets: Counter[str] = Counter()  # number of open WebSockets, by participant and by address
 
     def queued(self, visit: str) -> Queued | None:
@@ -127,6 +125,6 @@ class Trials:
         while True:
             try:
                 await self._store.beat(person.id)
-            except StoreError as error:  # the activity is recorded the next time
+            except StoreError as error:  # will be tried again after the period
                 LOG.warning("%s", error)
             await asyncio.sleep(BEAT_PERIOD)

@@ -171,12 +171,12 @@ class Database:
         return result
 
     async def _write_waiting(self) -> None:
-        """Run all waiting work, in groups that share a transaction and so the wait for the disk."""
+        """Run all waiting writes in groups. Each group shares a transaction, and so a single wait for the disk."""
         while self._waiting:
             group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
             if len(group) > 1 and await self._write_group(group, alone=False):
                 continue
-            for one in group:  # the group has one member, or none of it was written
+            for one in group:  # single writes, or a group that failed as a whole
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:

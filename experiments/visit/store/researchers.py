@@ -37,7 +37,7 @@ class Researchers:
 
     @cached_property
     def _hasher(self) -> "PasswordHasher":
-        from argon2 import PasswordHasher  # `mjsim play` works without the extra `people`
+        from argon2 import PasswordHasher  # `mjsim play` must work without this optional dependency
 
         return PasswordHasher(memory_cost=self._memory_kib)
 
