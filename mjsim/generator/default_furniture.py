@@ -2,7 +2,7 @@
 
 Options = tuple[str, ...]
 
-REQUIRED: dict[str, tuple[Options, ...]] = {  # a room gets one piece from each tuple
+REQUIRED: dict[str, tuple[Options, ...]] = {  # one piece from each tuple is added to a room
     "bedroom": (("double_bed", "double_bed"),),
     "child": (("single_bed", "bunk_bed"),),
     "studio": (("double_bed", "single_bed"),),

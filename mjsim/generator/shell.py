@@ -63,7 +63,7 @@ class _RoomShell:
         for side in SIDES:
             holes = sorted(self._holes(side), key=lambda hole: hole.start)
             low, high = self._room.floor.wall(side)
-            for up, material in self._bands(holes):  # inner half of the wall
+            for up, material in self._bands(holes):
                 yield from self._wall(side, (low - HALF, high + HALF), up, (0.0, HALF), material, holes)
             for start, end, is_outside in wall_stretches(self._room, side, self._plan.rooms):
                 if is_outside:

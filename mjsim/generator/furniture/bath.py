@@ -30,7 +30,7 @@ def toilet(b: Builder) -> Piece:
     top = 1.1 if hung else 0.82
     parts = [(-wide / 2, 0.0, wide / 2, d, top)]
     if b.smaller == 0:
-        parts.append((-w / 2 - 0.17, 0.0, -wide / 2, 0.14, top))  # toilet paper
+        parts.append((-w / 2 - 0.17, 0.0, -wide / 2, 0.14, top))
     if b.smaller == 0:
         wide = max(wide, w + 0.34)
     return b.piece((wide, d, top), use=((-aside, d, aside, d + 0.55),), parts=parts)
@@ -124,7 +124,7 @@ def bathtub(b: Builder) -> Piece:
 
 def shower(b: Builder) -> Piece:
     w = d = b.pick(0.8, 0.9) if b.smaller else b.pick(0.9, 1.0)
-    side = b.pick(-1, 1)  # side with the wall
+    side = b.pick(-1, 1)
     b.shadow(w, (0, d))
     b.guard(w, (0, d), (0, 1.95))
     b.box("ceramic", w, (0, d), (0, 0.05), seen=True)
@@ -148,7 +148,7 @@ def shower(b: Builder) -> Piece:
 def wash_corner(b: Builder) -> Piece:
     row = [draw(Builder(name, b.rng, b.look, 1)) for name, draw in (("shower", shower), ("toilet", toilet))]
     row.append(washbasin(Builder("washbasin", b.rng, b.look, 1)))
-    side = 1 if row[0].stands == "left" else -1  # away from the corner of the room
+    side = 1 if row[0].stands == "left" else -1
     members: list[Member] = []
     at = 0.0
     for piece in row:

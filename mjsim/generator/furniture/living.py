@@ -36,9 +36,10 @@ def lounge(b: Builder) -> Piece:
         table = tables.coffee_table(Builder("coffee_table", b.rng, b.look, b.smaller))
         y = front - 0.64 - table.size[1] if not corner else front - 0.66 - table.size[1]
         x = 0.0
-        if corner:  # next to the long seat
+        if corner:
             long = sofa.parts[1].spot
-            side = 1 if long[0] + long[2] < 0 else -1  # the sofa is rotated, which swaps left and right
+            # The sofa's shape is rotated, which swaps left and right.
+            side = 1 if long[0] + long[2] < 0 else -1
             x = -side * 0.46
         if y - deep > 0.7:
             members.append((table, x, y, 0.0))
@@ -75,7 +76,7 @@ def stove(b: Builder) -> Piece:
     y = 0.1 + d
     b.box("black", w - 0.1, (y, y + 0.012), (0.42, 0.85), seen=True)
     b.box("orange", w - 0.2, (y + 0.004, y + 0.014), (0.46, 0.6), seen=True)
-    for x, tall in ((-0.06, 0.05), (0.0, 0.075), (0.06, 0.045)):  # flames
+    for x, tall in ((-0.06, 0.05), (0.0, 0.075), (0.06, 0.045)):
         b.soft("shade", (x, y + 0.012, 0.47 + tall), (0.025, 0.008, tall))
     b.box("chrome", 0.012, (y + 0.01, y + 0.04), (0.55, 0.72), w / 2 - 0.07, seen=True)
     b.post("black", 0, 0.2, (h, 2.6), 0.07)
@@ -117,7 +118,7 @@ def coat_rack(b: Builder) -> Piece:
         if b.chance(0.65):
             cloth, long = b.pick(*b.look.cloths, *b.look.accents), b.pick(0.4, 0.55)
             b.rod(cloth, (x, 0.13, 1.5), (x, 0.13, 1.6 - 2 * long), 0.07, shape="capsule")
-            for u in (-0.07, 0.07):  # sleeves
+            for u in (-0.07, 0.07):
                 b.rod(cloth, (x + u, 0.14, 1.46), (x + u, 0.14, 1.0), 0.03, shape="capsule")
     b.box("wicker", 0.3, (0.04, 0.22), (1.775, 1.9), -0.2 * w, seen=True)
     b.box(b.wood, w, (0.02, 0.24), (0.18, 0.2), seen=True)

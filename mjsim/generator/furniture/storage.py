@@ -15,7 +15,7 @@ def _wardrobe(b: Builder, mirrored: bool) -> Piece:
         b.handle = b.pick("bar", "bar", "knob")
         b.fronts(b.pick(carcass, b.front), w, (0.07, h - 0.02), d - 0.035, doors, 1, doors=True)
         return b.piece((w, d, h), use=0.7)
-    doors = 2 if w < 1.5 else 3  # sliding doors
+    doors = 2 if w < 1.5 else 3
     for i in range(doors):
         wide, x = w / doors, w * ((i + 0.5) / doors - 0.5)
         y = d - 0.022 + 0.014 * (i % 2)

@@ -74,7 +74,7 @@ def pendant_lamp(b: Builder) -> Piece:
 
 
 def dining(b: Builder) -> Piece:
-    against = b.smaller >= 1  # a long side is at the wall
+    against = b.smaller >= 1
     name = "table" if against or b.chance(0.7) else "round_table"
     made = Builder(name, b.rng, b.look, b.smaller)
     base = table(made) if name == "table" else round_table(made)
@@ -173,7 +173,7 @@ def _desk(b: Builder) -> Piece:
     form, side = b.pick("panels", "pedestal", "legs"), -1
     b.shadow(w, (0, d))
     b.box(b.wood, w, (0, d), (h - 0.03, h))
-    x = side * (w / 2 - 0.26)  # x coordinate of the box
+    x = side * (w / 2 - 0.26)
     if form == "pedestal":
         b.box(b.front, 0.4, (0.03, d - 0.05), (0.04, h - 0.03), x)
         b.fronts(b.front, 0.4, (0.05, h - 0.05), d - 0.05, 1, 3, x)
@@ -202,7 +202,7 @@ def desk(b: Builder) -> Piece:
     x = 0.22 if w > 1.1 else 0.25
     turn = math.pi + float(b.rng.uniform(-0.35, 0.35))
     away = d - 0.06 + 0.56
-    use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)  # floor in front of the box
+    use = ((-w / 2, d, -w / 2 + 0.5, d + 0.72),)
     return group(b.kind, [(base, 0, 0, 0), (chair, x + 0.28 * math.sin(turn), away, turn)], use=use)
 
 
