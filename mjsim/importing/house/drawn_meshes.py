@@ -26,7 +26,7 @@ _SAME = 8  # colours that differ by less are merged, on a scale from 0 to 255
 class DrawnMesh:
     """A mesh with a single material."""
 
-    name: str  # name of the scene piece
+    name: str
     visual: VisualMesh
     high: bool  # True if the mesh is above `CEILING` and over a room, so that top-down views omit it
 

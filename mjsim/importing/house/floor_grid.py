@@ -16,7 +16,7 @@ from mjsim.values.errors import AssetError
 
 CELL = 0.05  # cell size in metres
 BODY = 0.27  # radius of a person's body with a safety margin, in metres
-_MAX_AREA = 1500.0  # maximum walkable area, in square metres
+_MAX_AREA = 1500.0
 _BAND = (0.05, 1.8)  # range of heights in metres at which a person bumps into things
 # A wall is solid in each of these ranges of height, in metres.
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))
@@ -34,11 +34,11 @@ class FloorGrid:
     """Grids of the floor. The first axis is x, and all masks have shape (nx, ny)."""
 
     origin: Floats  # lower corner of cell (0, 0) in metres, shape (2,)
-    blocked: Mask  # cells covered by obstacles
-    walls: Mask  # walls, including open doors
+    blocked: Mask  # cells with obstacles
+    walls: Mask  # cells with walls, including open doors
     doors: Mask
     indoors: Mask  # area enclosed by the outer walls, including the walls
-    floor: Mask  # floor drawn by the source
+    floor: Mask  # cells where the source draws a floor
     enclosed: bool  # False if no outer walls enclose a floor; `indoors` is then a rectangle
 
     @cached_property

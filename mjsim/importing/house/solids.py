@@ -36,7 +36,7 @@ _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 class Solid:
     """A convex part that collides."""
 
-    name: str  # name of the scene piece
+    name: str
     low: Floats  # lower corner in metres, shape (3,)
     high: Floats  # upper corner in metres, shape (3,)
     hull: Floats | None = None  # vertices (k, 3) in metres, or None for a box
@@ -57,7 +57,7 @@ class Solids:
     solids: tuple[Solid, ...]
     boxes: int
     hulls: int
-    voxels: int  # number of boxes of merged voxels
+    voxels: int  # number of boxes made of merged voxels
     pitch: float  # side of a voxel, in metres
 
 
@@ -110,7 +110,7 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
     extents = high - low
     if (extents > _ROOM).all():
         return None
-    if extents.min() < _THIN:  # a flat sheet
+    if extents.min() < _THIN:
         flat = np.sort(extents)
         filled = mesh.area / 2 / max(flat[1] * flat[2], 1e-9) if not mesh.is_watertight else 1.0
         return _box(name, low, high) if filled > _CONVEX / 2 + 0.05 or flat[2] < _SMALL else None

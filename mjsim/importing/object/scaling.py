@@ -17,7 +17,7 @@ _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0
 class Scaling:
     """Conversion of a file's coordinates to metres with z up."""
 
-    unit: str  # key of `UNITS`
+    unit: str  # unit of length, a key of `UNITS`
     up: str  # vertical axis, `y` or `z`
     factor: float  # metres per unit of the file, including `--scale`
     unit_reason: str
