@@ -191,7 +191,7 @@ def _model_file(folder: Path) -> Path:
         except (OSError, UnicodeDecodeError, ET.ParseError):
             named = []
         named.sort(key=lambda sdf: [int(n) for n in re.findall(r"\d+", sdf.get("version", ""))], reverse=True)
-        for sdf in named:  # newest version first
+        for sdf in named:  # the newest version comes first
             if (file := folder / (sdf.text or "").strip()).is_file():
                 return file
     if (folder / "model.sdf").is_file():

@@ -85,7 +85,7 @@ _TYPES: Mapping[str, _Entry] = {
 class AssetDatabase:
     """Types and sizes of ProcTHOR's assets, from its database if available, otherwise guessed from their names."""
 
-    types: Mapping[str, str]  # asset -> type
+    types: Mapping[str, str]  # asset name -> object type
     sizes: Mapping[str, Floats]  # asset -> width, depth and height in metres
     source: str  # origin of the sizes, for the report
 

@@ -25,7 +25,7 @@ _STEP = 0.1  # width of the rectangles that approximate slanted outlines, in met
 class ImportOptions:
     """Options of an object import. Values of None are determined automatically."""
 
-    units: str | None = None  # key of `UNITS`
+    units: str | None = None  # unit of length, a key of `UNITS`
     up: str | None = None  # vertical axis, one of `AXES`
     scale: float = 1.0  # factor applied in addition to the unit
     mass: float | None = None  # mass in kg
@@ -45,7 +45,7 @@ class ImportDecision:
 class ScenePiece:
     """An object or part of a scene, in the frame of the scene: z up, in metres."""
 
-    name: str  # name in the source
+    name: str  # name of the piece in the source
     surface: Surface
     seen: bool = True  # True if the piece is drawn
     solid: bool = True  # True if the piece collides
@@ -66,7 +66,7 @@ class Bin:
     """A receptacle placed in a house."""
 
     key: str
-    room: str  # room key
+    room: str
     x: float  # x coordinate of the middle of the base, in metres
     y: float
     yaw: float  # yaw in radians
@@ -89,7 +89,7 @@ class SourceScene:
 class HouseOptions:
     """Options of a house import. Values of None are determined automatically."""
 
-    units: str | None = None  # key of `UNITS`
+    units: str | None = None  # unit of length, a key of `UNITS`
     up: str | None = None  # vertical axis, one of `AXES`
     scale: float = 1.0  # factor applied in addition to the unit
     floor: float | None = None  # height of the floor in the source, in metres
