@@ -1,4 +1,4 @@
-"""Visit plans, which determine the phases through which a server takes participants."""
+"""Visit plans, which list the phases through which a server leads its participants."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

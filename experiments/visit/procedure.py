@@ -33,7 +33,7 @@ class PhaseState:
     """The current state of a visit.
 
     Attributes:
-        phase: Current phase, or None if the participation has ended.
+        phase: Current phase, or None if the visit has ended.
         number: Number of the current phase, counted from 1.
         wait: Time until the participant may end the phase, in seconds.
     """
@@ -46,7 +46,7 @@ class PhaseState:
 
 
 class Procedure:
-    """Takes participants through the phases of a plan."""
+    """Leads participants through the phases of a plan."""
 
     def __init__(
         self, plan: VisitPlan, store: Store, folders: VisitFolders, rng: np.random.Generator
@@ -154,9 +154,9 @@ class Procedure:
         return person
 
     async def recover(self, before: datetime.datetime | None = None) -> None:
-        """Record trials that have ended but are missing in the database, skipping damaged folders.
+        """Add ended trials that the database lacks, for all participants or those inactive since `before`.
 
-        This is done for the participants inactive since `before`, or for all of them.
+        Damaged folders are logged and skipped.
         """
         for person in await self.store.people():
             if before is None or person.seen < before:

@@ -71,7 +71,7 @@ class Recruiter(Protocol):
         ...
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """Return how a participant with the final status `how` gets back to the platform."""
+        """Return how the last page sends a participant with the final status `how` back to the platform."""
         ...
 
 

@@ -22,7 +22,7 @@ from experiments.visit.store.values import (
     utc_now,
 )
 
-SEEDS = 2**53  # limit of seeds; JavaScript represents all smaller integers exactly
+SEEDS = 2**53  # seeds are smaller than this, so that JavaScript represents them exactly
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
