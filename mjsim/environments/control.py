@@ -1,7 +1,7 @@
-"""Controls: continuous velocities with a trigger, or a few discrete actions.
+"""Controls, which translate an agent's actions into actions of the world.
 
-A control turns an action of the agent into one action of the world per control step. It is a generator that receives
-the result of each control step, so that an action can last until it is done.
+The translation is a generator that receives the result of each control step. An action of the agent can therefore last
+for many control steps.
 """
 
 import math
@@ -21,17 +21,17 @@ Steps = Generator[Action, StepResult, None]
 
 
 class Control(Protocol):
-    """Turns actions of the agent into actions of the world."""
+    """Translates actions of the agent into actions of the world."""
 
     def spec(self) -> specs.BoundedArray: ...
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
-        """Yield the actions of the world for one action of the agent, at least one.
+        """Yield one or more actions of the world for an action of the agent.
 
         Args:
-            action: Conforms to `spec`.
+            action: Action of the agent. It conforms to `spec`.
             observation: State before the action.
-            world: World of the actions, which must not be changed.
+            world: Current world. It must not be changed.
 
         Raises:
             ActionError: The action does not conform to `spec`.
@@ -41,10 +41,10 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class Continuous:
-    """Velocities and a trigger: (forward, left, turn, trigger), each clipped to [-1, 1].
+    """Continuous actions (forward, left, turn, trigger), each clipped to [-1, 1].
 
-    Velocities are shares of the person's limits. A trigger above 0.5 picks the nearest object in reach, below -0.5
-    places a carried object. The first control step of a pick or place does not walk.
+    Velocities are relative to the person's limits. A trigger above 0.5 picks the nearest object in reach, and a trigger
+    below -0.5 places a carried object. The person does not walk in the first control step of a pick or place.
 
     Attributes:
         repeat: Number of control steps per action.
@@ -85,11 +85,11 @@ MOVES = ("forward", "turn_left", "turn_right", "pick", "place")
 
 @dataclass(frozen=True)
 class Discrete:
-    """Five actions, numbered as in `MOVES`. Each lasts until it is done or blocked.
+    """Five discrete actions, numbered as in `MOVES`. Each lasts until it is completed or blocked.
 
     Attributes:
-        stride: Distance of `forward`, m.
-        angle: Angle of a turn, rad.
+        stride: Distance of `forward` in metres.
+        angle: Angle of a turn, in radians.
 
     Raises:
         EnvironmentConfigError: A value is not positive.
@@ -119,18 +119,17 @@ class Discrete:
         return _pick_or_place(Pick() if move == "pick" else Place())
 
 
-_GAIN = 8.0  # gain of the controller at the end of a walk or a turn, 1/s
+_GAIN = 8.0  # gain of the controller at the end of a walk or a turn, in 1/s
 _BRAKING = 2 / 3  # planned deceleration, as a share of the limit
-_DISTANCE_TOLERANCE = 0.002  # m
+_DISTANCE_TOLERANCE = 0.002  # in metres
 _ANGLE_TOLERANCE = math.radians(0.1)
-_STANDING = 0.01  # m/s
-_MIN_PROGRESS = 0.0005  # m per control step
+_STANDING = 0.01  # speed below which the person counts as standing, in m/s
+_MIN_PROGRESS = 0.0005  # in metres per control step
 _MAX_BLOCKED_STEPS = 4  # number of control steps without progress after which a walk ends
-_MAX_EXTRA_TIME = 2.0  # additional time for a walk that slides along an obstacle, s
+_MAX_EXTRA_TIME = 2.0  # additional time for a walk that slides along an obstacle, in seconds
 
 
 def _walk(observation: Observation, stride: float, world: World) -> Steps:
-    """Walk straight ahead until the distance is covered or the way is blocked, then stand still."""
     start, heading = observation.position, observation.heading
     direction = np.array([math.cos(heading), math.sin(heading)])
     walked, blocked = 0.0, 0
@@ -140,7 +139,7 @@ def _walk(observation: Observation, stride: float, world: World) -> Steps:
         if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        delay = braking * timestep / 2  # compensates for the discrete steps, in which braking starts late
+        delay = braking * timestep / 2  # compensates for late braking due to discrete steps
         speed = min(fastest, math.sqrt(2 * braking * left + delay**2) - delay, _GAIN * left)
         step = yield Move(forward=speed)
         now = float((step.observation.position - start) @ direction)
@@ -164,7 +163,6 @@ def _turn(observation: Observation, angle: float, world: World) -> Steps:
 
 
 def _pick_or_place(action: Pick | Place) -> Steps:
-    """Pick or place, and stand until the hands are done."""
     step = yield action
     while step.observation.busy:
         step = yield IDLE

@@ -1,4 +1,4 @@
-"""The task: reset, step and observe. The dm_env and the Gymnasium environment are thin adapters of it."""
+"""The rearrangement task. The dm_env and Gymnasium environments are thin adapters of it."""
 
 import contextlib
 import math
@@ -29,9 +29,11 @@ from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]
-"""Sensor name -> array."""
+"""Observation arrays by sensor name."""
 MAX_SEED = 2**31 - 1
-MAX_DRAWS = 10  # number of seeds that `reset_random` tries if the house has no room for the objects
+MAX_DRAWS = (
+    10  # maximum number of seeds that `reset_random` tries to find one whose objects fit into the house
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +44,19 @@ class Transition:
     reward: float
     terminated: bool  # True if all objects are delivered
     truncated: bool  # True if the time limit or a physics error ended the episode
-    info: dict[str, Any]  # for logging and statistics; not part of the task
+    info: dict[str, Any]  # values for logging and statistics
     steps: tuple[StepResult, ...]  # result of each control step
 
 
 class Rearrangement:
     """The rearrangement task.
 
-    `episodes` compiles an episode by seed, `sensors` make the arrays of an observation, and `control` turns actions of
-    the agent into those of the world. A physics error is raised, or truncates the episode with
-    `truncate_on_physics_error`. `on_control_step`, if set, is called with the world after every control step.
+    `episodes` compiles the episode of a seed, `sensors` compute the arrays of an observation, and `control` translates
+    the agent's actions. A physics error is raised, or truncates the episode if `truncate_on_physics_error` is True.
+    `on_control_step`, if set, is called with the world after every control step.
 
-    A copy or an unpickled core is made by `rebuild` and repeats the actions of the episode, because compiled models and
-    current motions cannot be pickled. Equal seeds and actions lead to equal states.
+    Compiled models and current motions cannot be pickled. Copying and unpickling therefore call `rebuild`, and repeat
+    the actions of the episode so far. Equal seeds and actions lead to equal states.
     """
 
     def __init__(
@@ -110,7 +112,7 @@ class Rearrangement:
 
     @property
     def world(self) -> World:
-        """The simulation, which must not be changed. Raises an EnvironmentStateError before the first reset."""
+        """The simulated world, which must not be changed. Raises an EnvironmentStateError before the first reset."""
         return self.episode.world
 
     @property
@@ -119,7 +121,7 @@ class Rearrangement:
         return self.world.observation()
 
     def prepare(self, seed: int) -> None:
-        """Compile the episode of a seed without resetting it. Raise errors like `reset`."""
+        """Compile the episode of a seed without starting it."""
         self._episode, self._is_over = self._episodes.get(seed), True
         self._seed, self._actions = seed, []
 
@@ -137,7 +139,7 @@ class Rearrangement:
         return self._observe(inputs), self._info(inputs, ())
 
     def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
-        """Start the episode of a random seed. Raise a SamplingError if `MAX_DRAWS` seeds have no room for objects."""
+        """Start the episode of a random seed. Raise a SamplingError if no episode is found for `MAX_DRAWS` seeds."""
         for _ in range(MAX_DRAWS - 1):
             try:
                 return self.reset(int(rng.integers(MAX_SEED)))
@@ -146,12 +148,12 @@ class Rearrangement:
         return self.reset(int(rng.integers(MAX_SEED)))
 
     def step(self, action: Any) -> Transition:
-        """Execute one action: as many control steps as it takes, or until the episode ends.
+        """Execute an action for as many control steps as it needs, or until the episode ends.
 
         Raises:
             EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned, and such errors do not truncate. The episode is over.
+            PhysicsError: MuJoCo issued a warning, and `truncate_on_physics_error` is False. The episode is over.
         """
         world = self.world
         if self._is_over:
@@ -190,7 +192,6 @@ class Rearrangement:
     def _run(
         self, world: World, action: Any, before: Observation
     ) -> tuple[tuple[StepResult, ...], PhysicsError | None]:
-        """Execute the control steps of an action, until it or the episode ends, or the physics fails."""
         commands = self.control.steps(action, before, world)
         results: list[StepResult] = []
         command = next(commands)
@@ -213,7 +214,7 @@ class Rearrangement:
                 return tuple(results), None
 
     def _end(self, observation: Observation) -> tuple[bool, bool]:
-        """Return whether the episode terminates, and whether it is truncated by the time limit."""
+        """Return whether the task is complete, and whether the time limit has been reached before."""
         done = all(s is ObjectStatus.DELIVERED for s in observation.object_status)
         return done, not done and observation.time >= self.layout.time_limit - 1e-9
 
@@ -286,7 +287,6 @@ def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[An
 
 
 def _place(code: object) -> str:
-    """Return file and line of a user's function, or an empty text for other objects."""
     found = getattr(code, "__code__", None)
     return f" ({found.co_filename}, line {found.co_firstlineno})" if found is not None else ""
 

@@ -1,4 +1,4 @@
-"""The dm_env interface, and `mjsim.make`."""
+"""Environment with the dm_env interface."""
 
 from typing import Any
 
@@ -11,10 +11,10 @@ from mjsim.environments.options import build, parse_options
 
 
 def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment":
-    """Make an environment with the dm_env interface.
+    """Create an environment with the dm_env interface.
 
     Args:
-        seed: Seed of the first episode, and of the generator of all later seeds. By default a random one.
+        seed: Seed of the first episode and of the generator of later seeds. By default, it is random.
         **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
@@ -46,9 +46,9 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
     @property
     def physics(self) -> Any:
-        """The current state as a `dm_control.mujoco.Physics`. Before the first reset, the start of the first episode.
+        """The current state as a `dm_control.mujoco.Physics`, which `dm_control.viewer.launch(env)` requires.
 
-        It is needed for `dm_control.viewer.launch(env)`.
+        Before the first reset, this is the start of the first episode.
         """
         if not self.core.has_episode:
             if self._next_seed is None:
@@ -67,11 +67,11 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
         Raises:
             ActionError: The action does not conform to its spec.
-            PhysicsError: MuJoCo warned. The episode is over.
+            PhysicsError: MuJoCo issued a warning. The episode is over.
         """
         if not self._is_running:
             return self.reset()
-        self._is_running = False  # also if the physics fails
+        self._is_running = False  # stays False if the physics fails
         taken = self.core.step(action)
         if taken.terminated:
             return dm_env.termination(taken.reward, taken.observation)

@@ -1,4 +1,4 @@
-"""Episodes of an environment: sampled or given, compiled once, and cached."""
+"""Sampling, compilation and caching of an environment's episodes."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -30,7 +30,7 @@ class CompiledEpisode:
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
-        """Return the renderer for a size, pixels, and a profile. It is created at first use."""
+        """Return the renderer for a size in pixels and a profile. It is created at first use."""
         key = width, height, profile
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.world.model, width=width, height=height, profile=profile)
@@ -42,7 +42,7 @@ class CompiledEpisode:
 
     @cached_property
     def physics(self) -> Any:
-        """The same state as a `dm_control.mujoco.Physics`, for dm_control's tools."""
+        """The world's state as a `dm_control.mujoco.Physics`."""
         return dm_control_physics(self.world)
 
     def close(self) -> None:
@@ -67,7 +67,7 @@ def dm_control_physics(world: World) -> Any:
 
 
 def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int, int], seed: int) -> Episode:
-    """Sample the episode of a seed, with a random number of objects from a range that includes both ends."""
+    """Sample the episode of a seed. `objects` are the smallest and largest number of objects."""
     low, high = objects
     count = int(np.random.default_rng([seed, _COUNT_STREAM]).integers(low, high + 1))
     return sample_episode(catalogue, navigable, objects=count, seed=seed)
@@ -76,7 +76,7 @@ def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int,
 class EpisodeCache:
     """Cache of compiled episodes by seed. Equal seeds have equal episodes, in any order of requests.
 
-    With a `count`, seeds are taken modulo `count`. At most `size` compiled episodes are kept, about 20 MB each.
+    If `count` is given, seeds are taken modulo `count`. The cache holds at most `size` episodes, about 20 MB each.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class EpisodeCache:
         self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
     def get(self, seed: int) -> CompiledEpisode:
-        """Return the compiled episode of a seed, before its reset. Raise errors like `Rearrangement.reset`."""
+        """Return the compiled episode of a seed. Its world has to be reset before use."""
         key = seed if self._count is None else seed % self._count
         if key not in self._compiled:
             while len(self._compiled) >= self._size:

@@ -1,4 +1,4 @@
-"""The Gymnasium interface."""
+"""Environment with the Gymnasium interface."""
 
 from typing import Any, cast
 
@@ -14,13 +14,13 @@ from mjsim.environments.options import build, parse_options
 from mjsim.environments.viewer import InteractiveViewer, can_open_window
 from mjsim.values.errors import EnvironmentConfigError
 
-RENDER_SIZE = (640, 480)  # width and height, pixels
+RENDER_SIZE = (640, 480)  # width and height in pixels
 
 
 class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
     """The task with Gymnasium's interface: `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`.
 
-    `reset(seed=s)` starts the episode of seed s, the house that `mjsim house --seed s` writes, and seeds the generator
+    `reset(seed=s)` starts the episode of seed s, which `mjsim house --seed s` writes to a file, and seeds the generator
     of later episodes.
 
     Args:
@@ -44,7 +44,9 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         self.render_mode = render_mode
         repeat = self.core.control.repeat if isinstance(self.core.control, Continuous) else 1
         fps = max(1, round(1 / (parsed.world.control_timestep * repeat)))
-        shown = [mode for mode in modes if mode != "human" or can_open_window()]  # checkers try all modes
+        shown = [
+            mode for mode in modes if mode != "human" or can_open_window()
+        ]  # environment checkers try all listed modes
         self.metadata = {**self.metadata, "render_modes": shown, "render_fps": fps}
         arrays = {name: to_space(spec) for name, spec in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
@@ -59,7 +61,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """Start an episode.
 
         Args:
-            seed: Seed of the episode and of the generator of later ones. By default a random one.
+            seed: Seed of the episode and of the generator of later episodes. By default, it is random.
             options: Must be empty.
 
         Raises:
@@ -80,13 +82,13 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         Raises:
             EnvironmentStateError: The episode is over, or there is none.
             ActionError: The action does not conform to its space.
-            PhysicsError: MuJoCo warned. The episode is over.
+            PhysicsError: MuJoCo issued a warning. The episode is over.
         """
         taken = self.core.step(action)
         return taken.observation, taken.reward, taken.terminated, taken.truncated, taken.info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the first-person view, uint8 (480, 640, 3), or in mode `human` show it in the window and return None.
+        """Return the first-person view, shape (480, 640, 3). In mode `human`, update the window and return None.
 
         Raises:
             RenderError: No OpenGL context can be created.

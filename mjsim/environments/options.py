@@ -1,4 +1,4 @@
-"""Options of environments, and building of the core from them."""
+"""Options of environments."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +23,8 @@ from mjsim.values.person_parameters import PersonParameters
 T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
-DEFAULT_CACHE_SIZE = 8  # episodes kept compiled
-MAX_SLOTS = 1000  # largest number of object rows in an observation, more than any house has objects
+DEFAULT_CACHE_SIZE = 8  # number of compiled episodes
+MAX_SLOTS = 1000  # maximum number of object rows in an observation
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +37,17 @@ class EnvironmentOptions:
         observations: Names of sensors or bundles, or custom `Sensor` values (docs/environments.md).
         actions: `continuous`, `discrete` or a custom `Control`.
         reward: `time`, `shaped` or a custom function.
-        time_limit: Simulated time after which an episode is truncated, s. By default 60 s per object.
-        episodes: None for a new house in every episode, a number of different houses that repeat, which makes resets
+        time_limit: Simulated time after which an episode is truncated, in seconds. By default 60 s per object.
+        episodes: None for a new episode at every reset, a number of different episodes that repeat, which makes resets
             fast, or a list of sampled episodes.
-        slots: Number of rows of arrays with a row per object. By default the largest number of objects of an episode.
-        camera: Images of the eye camera.
+        slots: Number of rows in arrays with one row per object. By default the largest number of objects in an episode.
+        camera: Options of the eye camera's images.
         person: Parameters of the person.
         world: Options of the world.
         keep: Number of compiled episodes in the cache, about 20 MB each. By default all if `episodes` is a number,
             otherwise 8.
-        physics_errors: `raise`, or `truncate` so that training continues: a physics error then truncates the episode,
-            with the last valid observation and the error in `info["physics_error"]`.
+        physics_errors: `raise`, or `truncate` to end the episode instead, so that training continues. The last valid
+            observation is then repeated, and `info["physics_error"]` contains the error.
         navigable: Function that computes the walkable floor. By default the installed builder.
 
     Raises:
@@ -120,7 +120,6 @@ class EnvironmentOptions:
 
 
 def _check_types(options: EnvironmentOptions) -> None:
-    """Raise an EnvironmentConfigError for an option of a wrong type."""
     episodes, made = options.episodes, options.actions
     several = isinstance(episodes, Sequence) and all(isinstance(one, Episode) for one in episodes)
     for name, fits, wanted in (
@@ -143,7 +142,7 @@ def _check_types(options: EnvironmentOptions) -> None:
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
-    """Make options from keyword arguments. Raise an EnvironmentConfigError for an unknown name or an invalid value."""
+    """Create options from keyword arguments. Raise an EnvironmentConfigError for an unknown or invalid option."""
     known = [f.name for f in fields(EnvironmentOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:
@@ -152,7 +151,7 @@ def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
 
 
 def build(options: EnvironmentOptions) -> Rearrangement:
-    """Load the house and combine episodes, sensors, control and reward.
+    """Load the house and create the rearrangement task.
 
     Raises:
         EnvironmentConfigError: A name is unknown.

@@ -1,4 +1,4 @@
-"""Rewards: minus the time that passes, optionally with shaping towards the end of the task."""
+"""Reward functions based on elapsed time, with optional shaping."""
 
 import math
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from mjsim.values.episode import CAPACITY
 from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.observation import ObjectStatus, Observation
 
-HANDLING_TIME = 2.0  # approximate time for a pick or a place, s
+HANDLING_TIME = 2.0  # approximate time for a pick or a place, in seconds
 
 
 class RewardFunction(Protocol):
-    """Reward of one step of the environment."""
+    """Function that computes the reward of an environment step."""
 
     def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
         """Return the reward for the step from `before` to `after`."""
@@ -24,15 +24,15 @@ class RewardFunction(Protocol):
 
 @dataclass(frozen=True)
 class TimeReward:
-    """Minus the time that passed, plus potential-based shaping if `shaping` is not 0.
+    """Negative elapsed time, plus potential-based shaping if `shaping` is not 0.
 
-    The shaping is `shaping * (discount * potential(after) - potential(before))`, where the potential is minus the
-    estimated time to the end. Such a term does not change the optimal policy, whatever the estimate, if the agent uses
-    the same discount factor (Ng, Harada and Russell 1999).
+    The shaping is `shaping * (discount * potential(after) - potential(before))`, where the potential is the negative
+    estimated time to finish. Such a term does not change the optimal policy, however poor the estimate, if the agent
+    uses the same discount factor (Ng, Harada and Russell 1999).
 
     Attributes:
-        per_second: Cost of a second.
-        shaping: Weight of the shaping. With 1, an estimated second counts like a real one.
+        per_second: Cost per second.
+        shaping: Weight of the shaping. With 1, an estimated second counts as much as a real one.
         discount: The agent's discount factor per environment step, 0 to 1.
 
     Raises:
@@ -60,7 +60,7 @@ class TimeReward:
 
 
 def potential(scene: Scene, observation: Observation) -> float:
-    """Return minus the time to finish, s, estimated for straight walks with one object at a time. 0 at the end."""
+    """Return the negative time to finish, in seconds, estimated for straight walks with one object at a time."""
     status = observation.object_status
     bins = np.array(
         [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]

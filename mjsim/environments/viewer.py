@@ -1,4 +1,4 @@
-"""A window that shows a running world with dm_control's viewer, frame by frame."""
+"""Window that shows a running world with dm_control's viewer."""
 
 import os
 import time
@@ -17,10 +17,11 @@ _REMEDY = "run it where there is a display, or use render_mode='rgb_array', whic
 class InteractiveViewer:
     """dm_control's viewer without its own loop, for Gymnasium's render mode `human`.
 
-    Sizes are those of the window, pixels. With `realtime`, `show` waits until as much time has passed as was simulated.
+    `width` and `height` are the window size in pixels. With `realtime`, `show` waits so that the world does not run
+    faster than real time.
 
     Raises:
-        ViewerError: There is no display, GLFW or dm-control.
+        ViewerError: There is no display, or GLFW or dm-control is missing.
     """
 
     def __init__(self, *, width: int = 1024, height: int = 768, realtime: bool = True) -> None:
@@ -35,7 +36,7 @@ class InteractiveViewer:
         self._world: World | None = None
         self._renderer: Any = None
         self._viewer: Any = None
-        self._last_shown = (0.0, 0.0)  # wall-clock and simulated time, s
+        self._last_shown = (0.0, 0.0)  # wall-clock and simulated time, in seconds
 
     def show(self, world: World) -> None:
         """Draw the current state of a world. Raise a ViewerError if the viewer is closed."""
@@ -83,7 +84,7 @@ class InteractiveViewer:
 
 
 def can_open_window() -> bool:
-    """Return True if a window can be opened, judging by environment variables."""
+    """Return True if the environment variables allow opening a window."""
     here = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     return here and os.environ.get(_BACKEND, "glfw") == "glfw"
 
@@ -91,8 +92,7 @@ def can_open_window() -> bool:
 def _load() -> tuple[Any, Any, Any, Any]:
     """Load dm_control's viewer modules, with GLFW as the OpenGL backend.
 
-    A process has a single backend for windows and off-screen rendering, determined by its first use. Raises a
-    ViewerError if it is another one.
+    A process has a single OpenGL backend, which is determined at first use. Raises a ViewerError if it is not GLFW.
     """
     if os.environ.get(_BACKEND, "glfw") != "glfw":
         raise ViewerError(
@@ -112,7 +112,7 @@ def _load() -> tuple[Any, Any, Any, Any]:
 
 
 def _check_display() -> None:
-    """Ask GLFW directly, because dm_control would determine the backend of the process before it fails."""
+    """Test GLFW directly, because dm_control would select the backend of the process before it fails."""
     try:
         with warnings.catch_warnings(record=True) as caught:
             import glfw

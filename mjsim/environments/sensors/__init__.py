@@ -32,7 +32,7 @@ BUNDLES = {"state": _VECTORS}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
-    """Resolve names of sensors and bundles, without repetition, in order.
+    """Return the sensors with the given names, in order and without repetition. Bundles are expanded.
 
     Raises:
         EnvironmentConfigError: A name is unknown, there is no sensor, or different sensors have the same name.

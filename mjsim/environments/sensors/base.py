@@ -1,4 +1,4 @@
-"""The base of sensors: the spec of an array, and the function that reads it."""
+"""Sensors, each with the spec of its array and a function that computes the array."""
 
 import math
 from collections.abc import Callable
@@ -23,11 +23,11 @@ IMAGES = ("rgb", "depth", "segmentation")
 
 @dataclass(frozen=True)
 class CameraOptions:
-    """Images of the eye camera.
+    """Options of the eye camera's images.
 
     Attributes:
         profile: Render profile: `draft`, `fast` or `quality`.
-        far: Distance to which depths are clipped, m.
+        far: Distance to which depths are clipped, in metres.
 
     Raises:
         EnvironmentConfigError: A size or `far` is not positive.
@@ -51,36 +51,36 @@ class CameraOptions:
 class ObservationLayout:
     """Sizes and scales of an environment's observation arrays."""
 
-    slots: int  # number of rows of arrays with a row per object; object i of the episode is in row i
+    slots: int  # number of rows in arrays with one row per object; row i belongs to object i of the episode
     categories: tuple[str, ...]  # category keys, in the catalogue's order
     receptacles: tuple[str, ...]  # receptacle keys, in the catalogue's order
     floor: Footprint  # obstacles and bounds of the floor
     camera: CameraOptions
-    max_speed: float  # unit of velocities, m/s
-    time_limit: float  # simulated time after which an episode is truncated, s
+    max_speed: float  # speed by which velocities are divided, in m/s
+    time_limit: float  # simulated time after which an episode is truncated, in seconds
 
     @property
     def scale(self) -> float:
-        """Unit of lengths: the diagonal of the floor's bounds, m."""
+        """Diagonal of the floor's bounds in metres, by which lengths are divided."""
         x_min, y_min, x_max, y_max = self.floor.bounds
         return math.hypot(x_max - x_min, y_max - y_min)
 
     @cached_property
     def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Start points and vectors of the edges of all obstacles, m, each of shape (edges, 2)."""
+        """Start points and vectors of the edges of all obstacles, in metres, each of shape (edges, 2)."""
         outlines = self.floor.obstacles
         if not outlines:
             return np.empty((0, 2)), np.empty((0, 2))
         return np.vstack(outlines), np.vstack([np.roll(o, -1, axis=0) - o for o in outlines])
 
     def scaled(self, lengths: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Convert lengths, m, of any shape to shares of `scale`, clipped to [-1, 1]."""
+        """Divide lengths in metres by `scale`, and clip the results to [-1, 1]."""
         return np.clip(lengths / self.scale, -1.0, 1.0).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class SensorInput:
-    """Input of sensors: one control step of an episode."""
+    """Input of sensors: the current state of an episode."""
 
     layout: ObservationLayout
     episode: CompiledEpisode
@@ -89,7 +89,7 @@ class SensorInput:
 
     @property
     def world(self) -> World:
-        """The simulation, which must not be changed."""
+        """The simulated world, which must not be changed."""
         return self.episode.world
 
     @property
@@ -109,12 +109,12 @@ class SensorInput:
         return renderer.frame(self.world.data, rgb=rgb, depth=depth, segmentation=segmentation)
 
     def to_body(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transform floor points of the house (k, 2), m, to the body frame (forward, left), m, (k, 2)."""
+        """Transform floor points (k, 2) from the house frame to the body frame (forward, left), in metres."""
         return rotated(points - self.state.position, -self.state.heading)
 
 
 def rotated(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Rotate vectors (..., 2) counter-clockwise by an angle, rad."""
+    """Rotate vectors, shape (..., 2), counter-clockwise by an angle in radians."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(vectors @ np.array([[c, s], [-s, c]]))
 
@@ -125,9 +125,9 @@ class Sensor:
 
     Attributes:
         name: Key of the array in the observation.
-        declare: Function from a layout to the spec of the array. The name of the spec is replaced.
-        read: Function from an input to a new array that conforms to the spec.
-        images: Channels of `SensorInput.frame` that it reads: `rgb`, `depth`, `segmentation`.
+        declare: Function that returns the array's spec for a layout. `name` replaces the name of the spec.
+        read: Function that computes a new array, which conforms to the spec.
+        images: Channels of `SensorInput.frame` that `read` uses: `rgb`, `depth`, `segmentation`.
     """
 
     name: str

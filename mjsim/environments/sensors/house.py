@@ -11,12 +11,12 @@ from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInp
 
 MAP_SIZE = 64
 RAYS = 24
-RANGE = 3.0  # m
+RANGE = 3.0  # in metres
 _SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
 
 
 def occupancy(layout: ObservationLayout) -> NDArray[np.uint8]:
-    """Return a grid (MAP_SIZE, MAP_SIZE) with 1 for obstacles. Row 0 is at the minimum y, column 0 at the minimum x."""
+    """Return a square grid with 1 for obstacles. Row 0 is at the minimum y, column 0 at the minimum x."""
     raster = np.zeros((MAP_SIZE, MAP_SIZE), np.uint8)
     x_min, y_min, x_max, y_max = layout.floor.bounds
     cells = np.array([MAP_SIZE / (x_max - x_min), MAP_SIZE / (y_max - y_min)])
@@ -30,7 +30,7 @@ def occupancy(layout: ObservationLayout) -> NDArray[np.uint8]:
 def ray_distances(
     layout: ObservationLayout, position: NDArray[np.float64], heading: float
 ) -> NDArray[np.float64]:
-    """Return distances (RAYS,), m, up to `RANGE`, from a point to obstacles, counter-clockwise from `heading`."""
+    """Return distances in metres from a point to obstacles, at most `RANGE`, counter-clockwise from `heading`."""
     start, edge = _edges_in_front(layout, position)
     angles = heading + 2 * math.pi * np.arange(RAYS) / RAYS
     ray = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -46,7 +46,7 @@ def ray_distances(
 def _edges_in_front(
     layout: ObservationLayout, position: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return start points and vectors, m, of edges in range that face `position`. Outlines are counter-clockwise."""
+    """Return start points and vectors of edges in range that face `position`. Outlines are counter-clockwise."""
     start, edge = layout.edges
     offset = start - position
     facing = edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0] > 0

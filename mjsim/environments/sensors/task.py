@@ -1,4 +1,4 @@
-"""Sensors of the objects and of the remaining task, with one row per slot and zeros in unused slots."""
+"""Sensors of the objects and the remaining task. Arrays have one row per slot, with zeros in unused slots."""
 
 from collections.abc import Sequence
 
@@ -53,9 +53,9 @@ def _categories(inputs: SensorInput) -> Array:
 
 
 def goals(inputs: SensorInput) -> NDArray[np.float64]:
-    """Return the floor point, m, of the next pick or place of each object, shape (objects, 2).
+    """Return the floor point of each object's next pick or place, in metres, shape (objects, 2).
 
-    It is the object while it is loose, and otherwise its receptacle.
+    This is the position of a loose object, and otherwise the position of its receptacle.
     """
     state, scene = inputs.state, inputs.world.scene
     bins = np.array([scene.receptacles[scene.episode.targets[n]].center[:2] for n in state.object_names])
