@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _planner(name: str) -> Solver:
     if name in SOLVERS:
         return solver(name)
-    from experiments.session.own_planner import planner_named  # imported late for a fast start
+    from experiments.session.own_planner import planner_named
 
     return planner_named(name, exact=False)
 
@@ -160,7 +160,7 @@ class _PlanningThread(threading.Thread):
     def _plans(self) -> Iterator[Plan]:
         seconds = self._seconds
         if seconds is not None:
-            from planner.greedy_solver import first_plan  # imported late for a fast start
+            from planner.greedy_solver import first_plan
 
             yield first_plan(self._problem)
             seconds = max(0.001, self._since + seconds - time.perf_counter())
@@ -201,7 +201,7 @@ class _PlanningThread(threading.Thread):
 
 def _publish(problem: RoutingProblem, plan: Plan, certificate: Path | None) -> None:
     if certificate is not None:
-        from mjsim.support.files import write_text_atomically  # imported late for a fast start
+        from mjsim.support.files import write_text_atomically
 
         write_text_atomically(certificate, claim_to_json(problem, plan) + "\n")
     print(plan_to_json(problem, plan))
@@ -210,7 +210,7 @@ def _publish(problem: RoutingProblem, plan: Plan, certificate: Path | None) -> N
 def _check(problem_name: str, claim_name: str) -> int:
     if problem_name == claim_name == "-":
         raise ConfigError("problem and certificate cannot both come from standard input; give a file for one")
-    from planner.checker import verify_optimal  # imported late for a fast start
+    from planner.checker import verify_optimal
 
     problem = _read(problem_name, problem_from_json)
     plan = _read(claim_name, lambda text: claim_from_json(text, problem))

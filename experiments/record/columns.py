@@ -26,7 +26,7 @@ TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "hands": ("i2", (2,)),  # index of the object in each hand, or -1
     "object_position": ("f8", (OBJECTS, 3)),  # positions of the objects in metres
     "object_quaternion": ("f8", (OBJECTS, 4)),  # quaternions in the order w, x, y, z
-    "object_status": ("i1", (OBJECTS,)),  # index in STATUSES
+    "object_status": ("i1", (OBJECTS,)),  # status of each object as an index into STATUSES
     # Type of action (0 move, 1 pick, 2 place), object index or -1, speeds forward and to the left (m/s), and angular
     # speeds of turning and looking (rad/s). With n objects, index n + i refers to entry i of `unknown_objects`, which
     # lists the names in actions that match no object.

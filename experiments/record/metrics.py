@@ -44,8 +44,8 @@ class Metrics:
         nd_bin_tied: As `nd_feasible`, but not counting which of two objects goes into the same bin first.
         nd_regret_10cm: As `nd_feasible`, but counting only deviations with a regret above 0.1 m, over the visits with a
             known regret; None if no regret is known.
-        ipl_locations: The paper's inverse path length: distances between the places of consecutive visits (objects and
-            bins) over the distance walked. It can exceed 1.
+        ipl_locations: The paper's inverse path length: distances between the locations (objects and bins) of
+            consecutive visits over the distance walked. It can exceed 1.
         ipl_stand: Shortest walks between the positions at consecutive visits over the distance walked; at most 1.
         task_distance_m: Distance walked in metres.
         completion_time_s: Time in seconds until the last delivery, or until the end if objects are left.

@@ -203,7 +203,8 @@ class DrawEvent(LoggedEvent, frozen=True):
 
     Attributes:
         draw: The new renderer's side.
-        reason: Why the other side stopped: `slow` (below 20 frames per second), `context lost`, or the missing feature.
+        reason: Reason why the other side stopped: `slow` (below 20 frames per second), `context lost`, or the
+            missing feature.
         wall: Unix time in seconds.
     """
 

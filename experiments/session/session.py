@@ -55,9 +55,9 @@ class Session:
         assistant: Plans, and determines what the HUD shows.
         participant: The user of the assistance.
         record: Receives control steps, checkpoints and events.
-        time_limit: Simulated time after which the session ends, s.
-        viewer: Receives every control step, or None. Without a viewer, paths and waits take many control steps at
-            once, with the same result.
+        time_limit: Simulated time in seconds after which the session ends.
+        viewer: Receives every control step, or None. Without a viewer, walks and waits are simulated many control
+            steps at once, with the same result.
 
     Attributes:
         shows_each_step: False if the viewer receives only the control steps for which `show` is called.
@@ -163,7 +163,7 @@ class Session:
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once. Walking and waiting can take many control steps, other actions take one."""
+        """Let the participant act once. Walking and waiting can last many control steps, other actions last one."""
         self._observe()
         if self.assistant.is_custom:
             self._hud_state()  # detects a faulty condition even if there is no viewer

@@ -218,7 +218,7 @@ def _house(name: str) -> House:
     return house
 
 
-_archive = functools.cache(new_archive)  # one per process, open until the process ends
+_archive = functools.cache(new_archive)  # each process has its own archive until it ends
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:

@@ -46,7 +46,7 @@ class StoredTrial:
     """A trial of a batch.
 
     Attributes:
-        path: Run directory of the trial. A packed trial has the same path.
+        path: Run directory of the trial, or the path that a packed trial would have when unpacked.
         row: Row of the result tables, computed from log and trajectory.
         as_measured: True if `metrics.json` agrees with the row.
         stamp: Stamp of its files, taken before they were read.

@@ -26,7 +26,7 @@ from mjsim.values.observation import Observation
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
-PIXELS_PER_METRE = 90  # scale, reduced for large houses
+PIXELS_PER_METRE = 90  # scale of the picture, reduced for large houses
 MAX_SIDE = 1920  # length of the longer side of the house picture in pixels
 # Frame around the house, row height and column width of the legend, in pixels
 MARGIN, ROW, COLUMN = 28, 24, 240

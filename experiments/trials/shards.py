@@ -55,9 +55,9 @@ class Shard:
 def shard_numbers(trials: Sequence[TrialConfig], count: int) -> list[int]:
     """Return the shard number of each trial, from 1 to `count`.
 
-    The result depends only on the number of trials and their houses. A shard gets all trials of a house if possible,
-    because making a house takes longer than many trials. The trials of a house are shuffled, so that the shards take
-    similar times.
+    The result depends only on the number of trials and their houses. A shard contains whole houses if possible, because
+    making a house takes longer than many trials. The trials of a house are shuffled, so that the shards take similar
+    times.
     """
     houses = {house: k for k, house in enumerate(dict.fromkeys(trial.house for trial in trials))}
     order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _shuffle_key(k)))

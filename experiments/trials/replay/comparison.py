@@ -28,8 +28,8 @@ from experiments.session.assistant import WORLD_EVENTS
 from experiments.session.familiarise import watch_flythrough
 from experiments.trials.replay.replayer import Replayer
 
-# Events that a replay recomputes. Plans and regrets come from the log, because a replay does not search for them again.
-# Only the hashes of the log protect them.
+# Events that a replay recomputes. Plans and regrets come from the log, because a replay does not search for them again,
+# so only the hashes of the log protect plans and regrets.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
 REGRETS = frozenset({"regret_m", "suggested_regret_m"})
 SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # verified by simulating the run again
