@@ -47,7 +47,7 @@ def require_extra(extra: str) -> None:
 def add_checkout_command(commands: Any, name: str, module: str) -> None:
     """Add a subcommand that exists only in the source checkout.
 
-    In an installed package, it reports this when called.
+    If the module of the subcommand is missing, calling the subcommand reports this.
     """
     try:
         importlib.import_module(module).add_parser(commands)

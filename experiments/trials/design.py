@@ -242,7 +242,7 @@ def confounded(trials: Sequence[TrialConfig]) -> str | None:
 
 
 def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
-    """Describe the differences found by `confounded`, for the rows of a table."""
+    """Describe differences between the assistance conditions in a table other than the assistance, or return None."""
     faults = []
     for name in CONFOUNDERS:
         values: dict[str, set[str]] = {}
