@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 PREFIX = "generated:"
 VERSION = 3  # version of the generator, to be increased with every change that alters the home of a seed
-ROOMS = (1, 10)  # smallest and largest number of rooms
+ROOMS = (1, 10)  # minimum and maximum number of rooms
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000
 # Probabilities of 1 to 10 rooms if the name does not specify a number. Bathrooms and halls count as rooms.

@@ -31,9 +31,8 @@ BORDER = 0.4  # default width of the border around the rooms, in metres
 class Footprint:
     """Obstacles and rooms of a floor, seen from above."""
 
-    obstacles: tuple[
-        NDArray[np.float64], ...
-    ]  # convex counter-clockwise polygons in metres, each of shape (k, 2)
+    # Convex counter-clockwise polygons in metres, each of shape (k, 2).
+    obstacles: tuple[NDArray[np.float64], ...]
     bounds: tuple[float, float, float, float]  # extent of the rooms in metres: (xmin, ymin, xmax, ymax)
 
 
@@ -175,9 +174,8 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 class ClearanceField(NamedTuple):
     """Grid of signed distances to the static geoms within a range of heights, in arrays for kernels."""
 
-    distance: NDArray[
-        np.float64
-    ]  # distance from each cell's centre in metres, positive outside geoms, shape (nx, ny)
+    # Distance from each cell's centre in metres, positive outside geoms, shape (nx, ny).
+    distance: NDArray[np.float64]
     gradient: NDArray[np.float64]  # unit vector of steepest increase, shape (nx, ny, 2)
     origin_x: float  # position of the centre of cell (0, 0), in metres
     origin_y: float

@@ -48,7 +48,7 @@ class NavigableFloor(NavigablePoints, Protocol):
 
     @property
     def topdown_map(self) -> NDArray[np.int32]:
-        """Connected region of each cell, shape (rows, columns): 0 for the largest region, -1 for obstacles."""
+        """Region of each cell, shape (rows, columns): 0 for the largest, 1, 2, ... for others, -1 for obstacles."""
 
 
 class NavigableBuilder(Protocol):

@@ -18,9 +18,8 @@ PREFIX = "room:"
 class RoomMap:
     """Rooms as rectangles on the floor. A room has one or more rectangles (PAPER section 5)."""
 
-    labels: Mapping[
-        str, str
-    ]  # labels shown to participants ("Kitchen") by room key, in the catalogue's order
+    # Labels shown to participants ("Kitchen") by room key, in the catalogue's order.
+    labels: Mapping[str, str]
     keys: tuple[str, ...]  # room key of each of the k rectangles
     centers: NDArray[np.float64]  # centres in metres, shape (k, 2)
     half_sizes: NDArray[np.float64]  # half extents in metres along the rectangle's own axes, shape (k, 2)
@@ -127,9 +126,8 @@ class ReceptacleGeometry:
     """Geometry of a receptacle in the house frame."""
 
     key: str
-    center: NDArray[
-        np.float64
-    ]  # centre of the volume in which objects count as delivered, in metres, shape (3,)
+    # Centre of the volume in which objects count as delivered, in metres, shape (3,).
+    center: NDArray[np.float64]
     half_size: NDArray[np.float64]  # half extents in metres along the volume's own axes, shape (3,)
     rotation: NDArray[np.float64]  # axes of the volume as columns, shape (3, 3)
     approach: NDArray[np.float64]  # floor point at which a person stands to use it, in metres, shape (2,)

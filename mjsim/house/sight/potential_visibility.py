@@ -37,9 +37,8 @@ class _VisibilityGrid(NamedTuple):
     """Cached visibility of objects from cells of the floor."""
 
     origin: Floats  # corner of the first cell, and eye height, in metres, shape (3,)
-    seen: NDArray[
-        np.int8
-    ]  # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, shape (rows, columns, n)
+    # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, shape (rows, columns, n).
+    seen: NDArray[np.int8]
 
 
 class PotentialVisibility:

@@ -32,7 +32,7 @@ class FieldOfView:
 
     horizontal: float  # full angle in radians
     vertical: float  # full angle in radians
-    range: float  # distance up to which objects are noticed, in metres
+    range: float  # maximum distance at which objects are noticed, in metres
 
     @classmethod
     def of(cls, person: PersonParameters) -> "FieldOfView":

@@ -17,9 +17,8 @@ class Finding:
     subject: str  # faulty model or object, such as `object mug`, `house` or `object_03`
     message: str  # description of the fault, with the faulty value
     remedy: str
-    severity: Severity = (
-        "error"  # Errors prevent use. Warnings announce effects that may surprise participants.
-    )
+    # Errors prevent use. Warnings announce effects that may surprise participants.
+    severity: Severity = "error"
     file: str = ""  # name of the file to change, unless `subject` already identifies it
     # Position in the frame of the house or object in metres: (x, y) or (x, y, z)
     place: tuple[float, ...] | None = None

@@ -189,7 +189,7 @@ def _parts(compiled: Compiled) -> Iterator[Finding]:
     model = compiled.model
     for geom in compiled.solid:
         thin = float(2 * model.geom_aabb[geom, 3:].min())
-        if thin < THIN - 5e-5:  # tolerance, so that a part printed as 15.0 mm passes
+        if thin < THIN - 5e-5:  # tolerance, so that a part passes whose thickness is printed as 15.0 mm
             yield compiled.warning(
                 "thin",
                 f"geom {compiled.geom_name(int(geom))} is {1000 * thin:.1f} mm thin",

@@ -82,11 +82,7 @@ def _outlines(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
             )
             found.append(points[ConvexHull(points[:, :2]).vertices, :2])
-        except (
-            AssetError,
-            QhullError,
-            ValueError,
-        ):  # The geom is flat or not finite, which another rule reports.
+        except (AssetError, QhullError, ValueError):  # flat or not finite, which another rule reports
             continue
     return tuple(found)
 

@@ -26,9 +26,8 @@ from mjsim.world.body.slots import object_corners
 
 Floats = NDArray[np.float64]
 
-MAX_SERVO_LAG = (
-    0.25  # In metres. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
-)
+# In metres. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
+MAX_SERVO_LAG = 0.25
 LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 _HOUSE, _PERSON = -1, -2  # owner numbers of geoms that do not belong to an object
@@ -73,9 +72,8 @@ class CarryingState:
 
     # How far contacts have pushed each hand away from its posture, in metres, shape (2, 2).
     compliance: NDArray[np.float64]
-    strained: NDArray[
-        np.int64
-    ]  # number of consecutive control steps in which each hand was strained, shape (2,)
+    # Number of consecutive control steps in which each hand was strained, shape (2,).
+    strained: NDArray[np.int64]
 
 
 class Carrying:

@@ -18,9 +18,8 @@ from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-UPRIGHT = (
-    0.3  # A contact whose normal has a larger horizontal part is with an obstacle, not with a surface below.
-)
+# A contact with a larger horizontal component of its normal is with an obstacle, not with a surface below.
+UPRIGHT = 0.3
 
 _ARRIVED = 0.0005  # distance to the goal at which a hand stops, in metres
 

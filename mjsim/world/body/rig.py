@@ -56,9 +56,8 @@ class Rig:
         self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # velocities of `pose`, shape (10,)
         self._activations = _view(data.act, model.actuator_actadr[actuators])
         self._controls = _view(data.ctrl, actuators)
-        self.motion = np.zeros(
-            4
-        )  # commanded velocity forward and left (m/s), yaw rate (rad/s) and pitch (rad)
+        # Commanded velocity forward and left (m/s), yaw rate (rad/s) and pitch (rad).
+        self.motion = np.zeros(4)
         self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, in metres
         self._last_hand_targets = np.zeros((2, 3))
         self._last_command = np.zeros(_SERVOS)

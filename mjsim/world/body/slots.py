@@ -20,9 +20,8 @@ _RAYS_ABOVE = 0.2  # start height of rays above the receptacle's volume, in metr
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
 _SLOPE_COST = 2.0  # cost of a mean gap below the object relative to the cost of fill height
-_MIN_GAIN = (
-    0.015  # Another position is preferred to the best slot only if it costs less by at least this, in metres.
-)
+# Another position is preferred to the best slot only if it costs less by at least this, in metres.
+_MIN_GAIN = 0.015
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +114,8 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
 @kernel
 def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
-    reach = np.maximum(
-        half + _SIDE_GAP, _MAX_SPACING
-    )  # large enough to include at least one point of the map
+    # Large enough to include at least one point of the map.
+    reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)
     for k in range(len(centres)):
         total, count = 0.0, 0
         for p in range(len(points)):

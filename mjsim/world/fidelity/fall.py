@@ -15,9 +15,8 @@ from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.world.fidelity.kinematic_world import KinematicWorld
 
-_SETTLING_TIME = (
-    1.0  # time for other objects to settle after the released object has come to rest, in seconds
-)
+# Time for other objects to settle after the released object has come to rest, in seconds.
+_SETTLING_TIME = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,9 +127,8 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
         model.gait.dt,
     )
     kinematics.advance(body, model.gait, model.floor)
-    for _ in range(
-        model.gait.substeps
-    ):  # Add up in a loop, so that the time is bit-identical to that of the physics.
+    # Add in a loop, so that the time is bit-identical to that of the physics.
+    for _ in range(model.gait.substeps):
         vector[TIME] += model.timestep
     carry(state, model)
 

@@ -132,9 +132,8 @@ class KinematicWorld:
         """Update the poses of bodies, geoms, sites and cameras in `data`, for rendering and ray casts."""
         model, vector = self._model, self.state.vector
         if data.ntree_awake < model.ntree:
-            mujoco.mj_resetData(
-                model, data
-            )  # Without a reset, sleeping bodies would not follow their coordinates.
+            # Without a reset, sleeping bodies would not follow their coordinates.
+            mujoco.mj_resetData(model, data)
         data.time = vector[TIME]
         data.qpos[self._qpos] = self.state.poses.ravel()
         self._rig.pose[:4] = vector[BODY : BODY + 4]

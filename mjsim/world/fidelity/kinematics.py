@@ -50,9 +50,8 @@ class Gait(NamedTuple):
     mass: float  # mass moved along x and y, with gain and force limit of the velocity servos
     walk_gain: float
     walk_force: float
-    inertia: (
-        float  # moment of inertia around the vertical axis, with gain and torque limit of the velocity servo
-    )
+    # Moment of inertia around the vertical axis, with gain and torque limit of the velocity servo.
+    inertia: float
     turn_gain: float
     turn_force: float
     head_inertia: float  # moment of inertia of the head, with gains and torque limit of the position servo

@@ -39,9 +39,8 @@ class PlannedMotion:
     trajectory: MotionTrajectory  # state after each control step
     # True if a picked object is in the hand, or a placed object is at rest in its receptacle.
     success: bool = True
-    incidents: tuple[
-        tuple[int, EventKind, int], ...
-    ] = ()  # other events: control step, type and object index
+    # Other events: control step, type and object index.
+    incidents: tuple[tuple[int, EventKind, int], ...] = ()
 
     @property
     def length(self) -> int:
@@ -114,7 +113,7 @@ class MotionPlanner:
 
     def _load_extent(self, receptacle: ReceptacleGeometry) -> LoadExtent:
         grasp = self._kinematic.grasps[self._hand]
-        if grasp is None:  # never true, because a place starts with a loaded hand; needed by the type checker
+        if grasp is None:  # A place always starts with a loaded hand. Only the type checker needs this line.
             return LoadExtent(np.zeros(3), np.zeros(3))
         if grasp not in self._corners:
             self._corners[grasp] = self._corners_about_hand(*grasp)

@@ -9,9 +9,8 @@ from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
 from mjsim.world.body.rig import VX, VY, X, Y
 
-_MAX_STEP = (
-    0.05  # maximum length of a step, in metres, for which a disc of radius 0.20 m cannot jump over a wall
-)
+# Maximum length of a step, in metres, for which a disc of radius 0.20 m cannot jump over a wall.
+_MAX_STEP = 0.05
 _MAX_ROUNDS = 12
 _TOUCHING = 1e-7  # tolerance in metres
 

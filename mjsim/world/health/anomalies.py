@@ -13,9 +13,8 @@ from mjsim.values.actions import EventKind
 from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.world.health.settle_times import SettlingObject
 
-CHECK_DISTANCE = (
-    0.02  # The path of an object is checked once the object is this far from its anchor, in metres.
-)
+# The path of an object is checked once the object is this far from its anchor, in metres.
+CHECK_DISTANCE = 0.02
 
 MAX_FLIGHT = 1.0  # maximum horizontal distance from the point of release, in metres
 _MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # range of heights at which an object is inside the house, in metres

@@ -16,9 +16,8 @@ from mjsim.world.body.grips import site_angle, site_gap
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-OUTSIDE = (
-    0.3  # Doorways are outside the rooms, so positions up to this far from a room count as inside. In metres.
-)
+# Doorways are outside the rooms, so positions up to this far from a room count as inside. In metres.
+OUTSIDE = 0.3
 
 _TOLERANCE = 1e-6  # tolerance for rounding errors, in metres
 
@@ -64,9 +63,8 @@ class ScanArrays(NamedTuple):
     boxes: Floats  # boxes returned by `static_boxes`
     rooms: tuple[Floats, Floats, Floats]  # see `RoomMap.rectangles`
     grip_sites: NDArray[np.intp]  # see `Grips.sites`
-    anchors: (
-        Floats  # See `AnomalyDetector.anchors`. An anchor moves along if `boxes` show that the path is clear.
-    )
+    # See `AnomalyDetector.anchors`. An anchor moves along if `boxes` show that the path is clear.
+    anchors: Floats
     flags: NDArray[np.uint8]  # output: flags of each object, shape (n,)
     # Output, shape (6,): both overlaps of a `HealthSample`, at least 0, then its weld errors in metres and in radians.
     sample: Floats

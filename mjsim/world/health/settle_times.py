@@ -27,9 +27,8 @@ class SettlingObject:
 class SettleTimerState:
     """State of a `SettleTimer`."""
 
-    objects: tuple[
-        tuple[int, SettlingObject], ...
-    ]  # index and state of released objects that are not at rest
+    # Index and state of released objects that are not at rest.
+    objects: tuple[tuple[int, SettlingObject], ...]
     # Index of each held object, when it was last in the hand, and where its centre (3,) was at that time.
     gripped: tuple[tuple[int, float, list[float]], ...]
 
@@ -43,9 +42,8 @@ class SettleTimer:
 
     def reset(self) -> None:
         self.objects: dict[int, SettlingObject] = {}
-        self._gripped: dict[
-            int, tuple[float, list[float]]
-        ] = {}  # latest time and position in a hand, by object
+        # Latest time and position at which a hand held each object.
+        self._gripped: dict[int, tuple[float, list[float]]] = {}
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
         """Return the settle times in seconds of objects that came to rest. Objects in `gripped` are in hands."""
