@@ -1,6 +1,6 @@
-"""Simulated participants, one module each, and what they share: percepts, decisions and walks.
+"""Simulated participants.
 
-A module of this package that defines `build` is a choice of `--user`.
+Each module that defines `build` can be selected with `--user`.
 """
 
 import lazy_loader

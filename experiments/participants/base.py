@@ -1,4 +1,4 @@
-"""The interface of simulated participants, the percepts that they receive, and helpers that they share."""
+"""Interface of simulated participants, their percepts, and shared helpers."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,25 +22,25 @@ if TYPE_CHECKING:  # the command line imports this module and must not load the 
     from mjsim.house.compiled.sites import ReceptacleGeometry
 
 Point = NDArray[np.float64]
-"""Position on the floor, m, shape (2,)."""
+"""Floor position in metres, shape (2,)."""
 
-NEARBY = 1.3  # distance within which an object counts as at the feet, m
+NEARBY = 1.3  # distance within which an object is noticed without looking at it, in metres
 DEFAULT_PERSON = PersonParameters()
-FAR = 1e6  # distance that stands for "no path", m
+FAR = 1e6  # distance in metres that is used if there is no path
 TURNING = 0.8  # turning speed while looking around, as a share of the person's maximum
-LOOK_GAIN = 4.0  # speed at which the gaze is levelled, rad/s per rad of pitch
+LOOK_GAIN = 4.0  # pitch rate while levelling the gaze, divided by the pitch, in 1/s
 FULL_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Guidance:
-    """The step that the HUD shows now.
+    """Step that the HUD currently shows.
 
     Attributes:
-        visit: The step.
-        path: Floor points of the path that the breadcrumbs mark, m, shape (k, 2).
-        goal: Position of the object or the receptacle, m, shape (2,).
-        tolerance: Distance from the path beyond which a new path is shown, m.
+        visit: Pick or place to make.
+        path: Floor points of the path that the breadcrumbs mark, in metres, shape (k, 2).
+        goal: Position of the object or the receptacle, in metres, shape (2,).
+        tolerance: Distance from the path beyond which a new path is shown, in metres.
     """
 
     visit: Visit
@@ -51,14 +51,14 @@ class Guidance:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A visit that is possible next, and its regret.
+    """Possible next visit and its regret.
 
     Attributes:
-        visit: The visit.
-        goal: Position of the object or the receptacle, m, shape (2,).
-        regret: Extra length of the rest of the task, m, as of the last visit.
+        visit: Pick or place to make.
+        goal: Position of the object or the receptacle, in metres, shape (2,).
+        regret: Length by which the visit extends the rest of the task, in metres, computed after the last visit.
         capped: True if `regret` is only a lower bound.
-        find_exact: Returns the exact regret, m, or None if nothing is proven. Takes about 0.1 s.
+        find_exact: Returns the exact regret in metres, or None if none is proven. Takes about 0.1 s.
     """
 
     visit: Visit
@@ -69,21 +69,22 @@ class Choice:
 
 
 class Percept:
-    """Knowledge of an unassisted person at one control step.
+    """A participant's knowledge at one control step.
 
-    Sessions use a subclass that adds the objects in view and the HUD, computed at the first access.
+    This class describes a participant without assistance. Sessions use a subclass that adds the objects in view and the
+    HUD.
 
     Attributes:
-        time: Simulated time, s.
-        position: Floor position, m, shape (2,).
-        heading: Heading, rad.
-        pitch: Elevation of the gaze, rad, positive upwards.
+        time: Simulated time in seconds.
+        position: Floor position in metres, shape (2,).
+        heading: Heading in radians.
+        pitch: Elevation of the gaze, in radians, positive upwards.
         hands: Objects in the left and the right hand.
         hands_full: True if no other object can be carried.
         busy: True if a pick or place is in progress.
-        targets: Receptacle key of each object, by instance name. The lists of the HUD show them.
-        answer: The world's answer to the previous action, if that was a pick or place.
-        blocked: True if the walk makes no progress, until the person has backed off.
+        targets: Receptacle key of each object, by instance name. The HUD lists them.
+        answer: Result of the previous action, if that was a pick or place.
+        blocked: True if the walk makes no progress. It stays True until the person has backed off.
         person: Parameters of the participant's body.
     """
 
@@ -112,21 +113,21 @@ class Percept:
 
     @cached_property
     def nearby(self) -> Mapping[str, Point]:
-        """Floor positions of misplaced objects at the feet (within 1.3 m), m, shape (2,), by name."""
+        """Floor positions of misplaced objects within 1.3 m, in metres, shape (2,), by name."""
         loose = positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
         return {n: p for n, p in loose.items() if math.dist(p, self.position) < NEARBY}
 
     def look(self) -> Mapping[str, Point]:
-        """Return the floor positions of the misplaced objects in view, m, shape (2,), by name."""
+        """Return the floor positions of the misplaced objects in view, in metres, by name."""
         return {}
 
     def look_for(self, receptacles: Mapping[str, "ReceptacleGeometry"]) -> frozenset[str]:  # noqa: ARG002 - overridden
-        """Return the keys of those receptacles that are in view."""
+        """Return the keys of the receptacles in view."""
         return frozenset()
 
     @property
     def visible_shares(self) -> Mapping[str, float]:
-        """Visible share of each misplaced object in view, 0 < share <= 1."""
+        """Visible share (0 to 1) of each misplaced object in view."""
         return {}
 
     def hud(self) -> HudState | None:
@@ -135,7 +136,7 @@ class Percept:
 
     @property
     def shown_roles(self) -> frozenset[str]:
-        """Roles of the markers that the HUD shows in this condition, known to the person from the training."""
+        """Roles of the markers that the HUD shows in this condition."""
         return frozenset()
 
     @property
@@ -145,30 +146,30 @@ class Percept:
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Floor positions of the flagpoles in view, including those behind walls, m, shape (2,), by object."""
+        """Floor positions of the flagpoles in view, even behind walls, in metres, by object."""
         return {}
 
     @property
     def choices(self) -> Sequence[Choice]:
         """All possible next visits with their regrets, the best first.
 
-        Only models of compliance use them, because no condition shows as much. Empty when all is done, and in live
-        planning until the regrets are known.
+        No condition shows them. They are meant for models of compliance. The list is empty if the task is finished, and
+        in live planning until the regrets have been computed.
         """
         return ()
 
 
 def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
-    """Return the floor positions of objects by name, m, shape (2,)."""
+    """Return the floor positions of objects in metres, by name."""
     return {name: seen.object_positions[seen.object_names.index(name), :2] for name in names}
 
 
 class Participant(Protocol):
-    """A user of the assistance: receives a percept at each decision and returns an action.
+    """A simulated or real participant, who receives a percept and returns an action at each decision.
 
     Attributes:
-        needs: Roles of the markers that the participant requires (`breadcrumb`, `flagpole`). A session whose condition
-            does not show them is refused. The attribute is optional.
+        needs: Roles of the markers that the participant requires (`breadcrumb`, `flagpole`). Sessions whose condition
+            does not show them are rejected. The attribute is optional.
     """
 
     needs: frozenset[str]
@@ -176,22 +177,22 @@ class Participant(Protocol):
     def act(self, percept: Percept) -> Action:
         """Choose the next action.
 
-        A path or a wait takes many control steps, but in a filmed session the participant is asked again after each
-        step. So the answer must stay the same as long as nothing happens.
+        A path or a wait lasts for many control steps. In a filmed session, however, `act` is called after each step. It
+        must therefore return the same action as long as nothing happens.
         """
         ...
 
 
 class ParticipantFactory(Protocol):
-    """A function that makes a participant for one session. The generator is the only source of randomness."""
+    """Function that creates a participant for one session. The generator must be its only source of randomness."""
 
     def __call__(self, house: "House", rng: np.random.Generator) -> Participant:
-        """Make a participant that knows the house from the familiarization."""
+        """Create a participant who has been familiarized with the house."""
         ...
 
 
 def estimated_distance(house: "House", start: Point, goal: Point) -> float:
-    """Return the walking distance between two points (2,), m, or `FAR` if there is no path."""
+    """Return the walking distance between two points in metres, or `FAR` if there is no path."""
     try:
         return house.geodesics.shortest_path(start, goal).geodesic_distance
     except PlannerError:
@@ -199,7 +200,7 @@ def estimated_distance(house: "House", start: Point, goal: Point) -> float:
 
 
 def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) -> list[float]:
-    """Return the walking distances from one point to several points, m. See `estimated_distance`."""
+    """Return the walking distances in metres from one point to several points, or `FAR` if there is no path."""
     try:
         return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
     except PlannerError:  # at least one goal is unreachable
@@ -207,9 +208,9 @@ def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) ->
 
 
 class FullTurn:
-    """A full turn on the spot, starting from a given heading, rad.
+    """A full turn on the spot, which starts at a given heading in radians.
 
-    With `level`, the gaze is also brought to the horizontal. Otherwise the pitch does not change.
+    With `level`, the gaze is also levelled. Otherwise, the pitch does not change.
     """
 
     def __init__(self, heading: float, *, level: bool = False) -> None:

@@ -1,8 +1,8 @@
-"""A model of compliance that knows the regret of every possible next visit and prefers visits of low regret.
+"""A model of compliance that chooses visits at random, and prefers visits of low regret.
 
 A visit that makes the rest of the task r metres longer is chosen with probability proportional to
-exp(-r / temperature). The temperature is the parameter, m: `--user boltzmann:0.5`. Near 0 the visits are optimal, and
-above about 10 m they are almost random. The participant requires no markers, so it works in all conditions.
+exp(-r / temperature). The temperature in metres is part of the name, as in `--user boltzmann:0.5`. With 0 the visits
+are optimal, and above about 10 m they are almost random. This participant works in all conditions.
 """
 
 import math
@@ -17,14 +17,14 @@ from experiments.participants.visit_executor import VisitExecutor
 from mjsim.values.actions import WAIT, Action
 from planner.plan import Visit
 
-TEMPERATURE = 0.5  # m
+TEMPERATURE = 0.5  # default temperature in metres
 
 
 def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
     """Draw a choice with probability proportional to exp(-regret / temperature), or the best one at temperature 0.
 
     A capped regret is only a lower bound. If such a choice is drawn, its exact regret is computed, and the draw is
-    rejected with the probability that compensates for the bound, which keeps the distribution exact.
+    rejected with the probability that compensates for the bound, so that the distribution stays exact.
     """
     if temperature <= 0:
         return min(choices, key=lambda choice: choice.regret)
@@ -43,7 +43,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
 
 
 class Boltzmann:
-    """Draws the next visit and keeps to it until it is done or impossible."""
+    """Draws a visit at random, and pursues it until it is finished or impossible."""
 
     needs: frozenset[str] = frozenset()
 
@@ -66,7 +66,7 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """Return a factory of participants with this temperature. Raises ConfigError if it is not a valid number."""
+    """Return a factory of participants with this temperature. Raises ConfigError for an invalid number."""
     try:
         temperature = float(text)
     except ValueError:

@@ -1,11 +1,11 @@
-"""Distributions of parameters over people. Examples in TOML:
+"""Distributions of parameters over participants. Examples in TOML:
 
 walking_speed = {normal = [1.2, 0.2], min = 0.8}    # mean and standard deviation
 reading_time = {lognormal = [1.35, 0.35]}           # median, and standard deviation of the logarithm
 reach = {uniform = [0.8, 1.1]}                      # lowest and highest value
 lapse = {beta = [0.5, 3]}                           # both shape parameters; values from 0 to 1
-follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # weight and distribution of each group of people
-field_of_view = 1.2                                 # the same for each person
+follows = {mixture = [[0.6, 1.0], [0.4, {beta = [2, 2]}]]}   # weight and distribution of each group
+field_of_view = 1.2                                 # the same value for each participant
 """
 
 import functools
@@ -36,18 +36,18 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     """Distribution of a number, truncated at `min` and `max`.
 
     Raises:
-        ConfigError: There is not exactly one shape, a number is not valid, or no values are left.
+        ConfigError: There is not exactly one shape, a number is invalid, or no value is between `min` and `max`.
     """
 
-    constant: float | None = None  # the same value for each person
+    constant: float | None = None  # the same value for each participant
     normal: _Pair | None = None  # mean and standard deviation
     lognormal: _Pair | None = None  # median, and standard deviation of the logarithm
     uniform: _Pair | None = None  # lowest and highest value
-    beta: _Pair | None = None  # both parameters
-    # (weight, number or distribution) for each group of people
+    beta: _Pair | None = None  # both shape parameters
+    # weight, and number or distribution, of each group of participants
     mixture: "tuple[tuple[_NonNegative, float | Distribution], ...] | None" = None
-    min: float = -math.inf  # lowest value
-    max: float = math.inf  # highest value
+    min: float = -math.inf
+    max: float = math.inf
 
     def __post_init__(self) -> None:
         if len([name for name in SHAPES if getattr(self, name) is not None]) != 1:
@@ -70,12 +70,11 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 
     @property
     def shape(self) -> str:
-        """Name of the given shape, one of `SHAPES`."""
+        """Name of the distribution's shape, one of `SHAPES`."""
         return next(name for name in SHAPES if getattr(self, name) is not None)
 
     @property
     def _numbers(self) -> list[float]:
-        """Parameters of the shape, or weights of a mixture."""
         if self.constant is not None:
             return [self.constant]
         if self.mixture is not None:
@@ -83,7 +82,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return list(getattr(self, self.shape))
 
     def as_value(self) -> Any:
-        """Return the description as in TOML, without infinite limits."""
+        """Return the TOML value that describes the distribution."""
         if self.constant is not None:
             return self.constant
         kinds = [[w, k.as_value() if isinstance(k, Distribution) else k] for w, k in self.mixture or ()]
@@ -93,7 +92,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
         """Return the quantile for a share from 0 to 1, after truncating the distribution to [`lowest`, `highest`].
 
-        In a mixture, the share first selects a component, and then a value of that component.
+        In a mixture, the share selects both a component and a value of that component.
         """
         if self.constant is not None:
             return self.constant
@@ -107,7 +106,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return min(high, max(low, self._value(below + share * (above - below))))
 
     def _kind(self, share: float) -> "tuple[float | Distribution, float]":
-        """Return the mixture component that a share (0 to 1) falls into, and the share rescaled within it."""
+        """Return the mixture component that a share (0 to 1) selects, and the share rescaled within the component."""
         kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
         left = share * sum(weight for weight, _ in kinds)
         for weight, kind in kinds[:-1]:
@@ -153,14 +152,14 @@ def distribution(name: str, given: object) -> Distribution:
 
 
 def converted(given: object) -> Distribution:
-    """Convert like `distribution`, but raise ConfigError or ValidationError without the parameter's name."""
+    """Convert a number or table to a distribution. Raise ConfigError or ValidationError if it is invalid."""
     if isinstance(given, Mapping):
         return msgspec.convert(given, Distribution)
     return Distribution(constant=msgspec.convert(given, float))
 
 
 class Distributions(Mapping[str, Distribution]):
-    """Distributions by parameter name, sorted. Names of grouped parameters have a dot: `motion.reach_time`."""
+    """Distributions by parameter name, sorted. Names of grouped parameters contain a dot: `motion.reach_time`."""
 
     def __init__(self, values: Mapping[str, Distribution] | None = None) -> None:
         self._values = dict(sorted((values or {}).items()))
@@ -182,7 +181,7 @@ class Distributions(Mapping[str, Distribution]):
 
     @classmethod
     def parse(cls, text: str) -> "Distributions":
-        """Read a TOML file, or a description in braces. Raises ConfigError if that fails."""
+        """Parse the path of a TOML file, or an inline TOML table. Raises ConfigError if that fails."""
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])
@@ -196,11 +195,11 @@ class Distributions(Mapping[str, Distribution]):
             raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the description in the form that `of` accepts."""
+        """Return the table from which `of` creates these distributions."""
         return {name: described.as_value() for name, described in self.items()}
 
     def updated(self, other: "Distributions") -> "Distributions":
-        """Return these distributions with those of `other` added or replaced."""
+        """Return a copy in which the distributions of `other` are added or replaced."""
         return Distributions({**self, **other})
 
     def __getitem__(self, name: str) -> Distribution:
@@ -221,20 +220,20 @@ class Distributions(Mapping[str, Distribution]):
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter that differs from person to person."""
+    """A parameter that differs between participants."""
 
-    usual: float | Mapping[str, Any]  # default distribution over people, as in TOML
+    usual: float | Mapping[str, Any]  # default distribution, as in TOML
     lowest: float  # smallest valid value
     highest: float  # largest valid value
     unit: str  # empty for a plain number, `probability` for a number from 0 to 1
 
     @functools.cached_property
     def spread(self) -> Distribution:
-        """The default distribution. It is cached because converting it takes longer than drawing from it."""
+        """The default distribution, cached."""
         return converted(self.usual)
 
     def check(self, name: str, value: float) -> None:
-        """Raise a ConfigError if a value is out of range."""
+        """Raise a ConfigError if `value` is out of range."""
         if not self.lowest <= value <= self.highest:
             bounds = f"{self.lowest:.4g} to {self.highest:.4g} {self.unit}".rstrip()
             raise ConfigError(f"{name} must be {bounds}, got {value:.4g}")
@@ -243,10 +242,10 @@ class Parameter:
 def draw(
     parameters: Mapping[str, Parameter], described: Distributions, rng: "np.random.Generator", of: str
 ) -> dict[str, float]:
-    """Draw the values of a person, by parameter name.
+    """Draw a participant's parameter values, by name.
 
-    Each value depends only on its own random number. `described` replaces default distributions. `of` names the owner
-    of the parameters in errors.
+    Each value depends only on its own random number. `described` overrides default distributions. `of` is the owner of
+    the parameters in error messages.
     """
     return quantiles(parameters, described, rng.random(len(parameters)).tolist(), of)
 
@@ -254,7 +253,7 @@ def draw(
 def quantiles(
     parameters: Mapping[str, Parameter], described: Distributions, shares: Sequence[float], of: str
 ) -> dict[str, float]:
-    """Like `draw`, but take the quantile at a given share (0 to 1) of each parameter instead of a random one."""
+    """Return a participant's parameter values, by name, where each is the quantile at a given share (0 to 1)."""
     for name in described:
         if name not in parameters:
             has = f"it has {', '.join(parameters)}" if parameters else "it has no parameters"
@@ -270,10 +269,10 @@ def quantiles(
 
 
 def varies(usual: float | Mapping[str, Any], lowest: float, highest: float, unit: str = "") -> Any:
-    """Declare a dataclass field whose value differs from person to person. See `Parameter`."""
+    """Declare a dataclass field whose value differs between participants."""
     return field(metadata={"parameter": Parameter(usual, lowest, highest, unit)})
 
 
 def chance(usual: float | Mapping[str, Any]) -> Any:
-    """Declare a dataclass field for a probability that differs from person to person."""
+    """Declare a dataclass field for a probability that differs between participants."""
     return varies(usual, 0.0, 1.0, "probability")

@@ -1,4 +1,4 @@
-"""Follows breadcrumbs if the condition shows them, otherwise behaves as `nearest` or `searcher`."""
+"""Participant that follows breadcrumbs if they are shown, and otherwise behaves like `nearest` or `searcher`."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from mjsim.values.actions import WAIT, Action
 
 
 class BreadcrumbFollower:
-    """Walks along the breadcrumbs and carries out the current step at their end."""
+    """Walks along the breadcrumbs, and picks or places at their end."""
 
     needs = frozenset({"breadcrumb"})
 
@@ -25,7 +25,7 @@ class BreadcrumbFollower:
 
 
 class Follower:
-    """Uses the best guidance on display: breadcrumbs, else flagpoles, else its own eyes."""
+    """Uses the best available guidance: breadcrumbs, flagpoles, or only its own sight."""
 
     needs: frozenset[str] = frozenset()
 

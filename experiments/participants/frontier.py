@@ -1,4 +1,4 @@
-"""Places from which a person still has to search the rooms."""
+"""Viewpoints from which a participant still has to search the rooms."""
 
 import math
 from dataclasses import dataclass
@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point, estimated_distances
 
-SHIFT = 0.15  # standard deviation of random shifts of places in each round, which reveal hidden objects, m
+SHIFT = 0.15  # standard deviation in metres of random shifts of the viewpoints, which reveal hidden objects
 
 
 @dataclass(frozen=True, eq=False)
 class SearchPlace:
-    """A place to look around from."""
+    """Viewpoint from which a room is searched."""
 
-    room: str  # key of its room
-    point: Point  # m, shape (2,)
+    room: str  # room key
+    point: Point  # in metres, shape (2,)
 
 
 class Frontier:
-    """Places that have not been searched.
+    """Viewpoints that have not been searched.
 
-    After the last one, a new round begins in which the person looks more closely.
+    When all have been searched, a new round begins in which the participant looks more closely.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
@@ -31,7 +31,7 @@ class Frontier:
         self._left, self._round = self._all(), 1
 
     def places(self) -> list[SearchPlace]:
-        """Return the places to look around from, at least one."""
+        """Return the remaining viewpoints, at least one."""
         if not self._left:
             self._left, self._round = self._all(), self._round + 1
         return self._left
@@ -44,7 +44,7 @@ class Frontier:
         ]
 
     def of_room(self, room: str, position: Point) -> SearchPlace:
-        """Return the place of a room nearest to a position, m, shape (2,)."""
+        """Return the viewpoint of a room that is nearest to a position."""
         points = self._house.viewpoints.get(room)
         if points is None:  # no free floor in the room
             return SearchPlace(room, position)
@@ -58,8 +58,8 @@ class Frontier:
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
-        """Mark the places of `room` as searched that are in view and nearer than `within`, m."""
-        within /= self._round  # a person who has missed something looks more closely
+        """Mark those viewpoints of `room` as searched that are in view and closer than `within` metres."""
+        within /= self._round  # look more closely in each new round
         walls = self._house.navmesh.outline
         self._left = [
             place
@@ -76,9 +76,9 @@ def _sees(percept: Percept, point: Point, within: float, walls: NDArray[np.float
 
 
 def free_length(walls: NDArray[np.float64], start: Point, goal: Point) -> float:
-    """Return the length of the straight line between two points (2,), m, up to the first wall.
+    """Return the length in metres of the straight line from `start` to `goal` or the first wall.
 
-    Walls (e, 4) are given by their ends x, y, x, y, m.
+    Each row of `walls`, shape (e, 4), contains both ends of a wall: x, y, x, y.
     """
     way, along, offset = goal - start, walls[:, 2:] - walls[:, :2], walls[:, :2] - start
     cross = way[0] * along[:, 1] - way[1] * along[:, 0]

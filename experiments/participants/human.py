@@ -1,4 +1,4 @@
-"""A person at the keyboard, who takes part through `mjsim play` and cannot be simulated."""
+"""Participant at the keyboard, available only in `mjsim play`."""
 
 from typing import Never
 

@@ -1,4 +1,4 @@
-"""Goes to the nearest flagpole while a hand is free, otherwise to the nearest bin (condition `highlight`)."""
+"""Participant that goes to the nearest flagpole while a hand is free, and otherwise to the nearest bin."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from planner.plan import Visit, VisitKind
 
 
 class Nearest:
-    """Makes the nearest possible visit, and keeps to it once chosen.
+    """Chooses the nearest possible visit, and pursues it until it is finished or impossible.
 
-    The participant turns around once to see and remember all flagpoles, and again when it knows of none.
+    The participant turns around at the start to find all flagpoles, and again if it knows of none.
     """
 
     needs = frozenset({"flagpole"})
@@ -39,7 +39,7 @@ class Nearest:
         return self._visit(percept)
 
     def _look(self, percept: Percept) -> None:
-        """Learn the places of flagpoles. Forget those of carried objects and of objects that have moved."""
+        """Remember visible flagpoles. Forget those of carried or moved objects."""
         self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._known.pop(name, None)

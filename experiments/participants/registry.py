@@ -1,4 +1,4 @@
-"""Participants by name: modules of this package, and user code."""
+"""Look up participants by name, in this package or in user code."""
 
 import functools
 import importlib
@@ -18,7 +18,7 @@ _BUILDS = re.compile(r"^(def build\(|build = )", re.MULTILINE)
 
 @functools.cache
 def participant_names() -> tuple[str, ...]:
-    """Return the names of the participants of this package, sorted, without importing them."""
+    """Return the sorted names of the participants in this package, without importing them."""
     folder = Path(__file__).parent
     sources = [*folder.glob("[!_]*.py"), *folder.glob("*/__init__.py")]
     found = [path for path in sources if _BUILDS.search(path.read_text(encoding="utf-8"))]
@@ -26,10 +26,10 @@ def participant_names() -> tuple[str, ...]:
 
 
 def participant(name: str) -> "ParticipantFactory":
-    """Return the factory of a participant by name, or by `package.module:attribute`.
+    """Return a participant's factory by its name, or by `package.module:attribute`.
 
-    A parameter may follow a name after a colon if the module defines `with_parameter(text)`, which returns the factory.
-    Raises ConfigError if there is no such participant, it cannot be loaded or called, or it takes no parameter.
+    If a module defines `with_parameter(text)`, a parameter may follow the name after a colon. Raises ConfigError if the
+    participant is unknown, cannot be loaded or called, or accepts no parameter.
     """
     module, colon, parameter = name.partition(":")
     if module in participant_names():

@@ -1,4 +1,4 @@
-"""The participant of `mjsim study rehearse`, which can play only through a study server."""
+"""Participant of `mjsim study rehearse`, available only through a study server."""
 
 from typing import Never
 

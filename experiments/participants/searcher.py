@@ -1,4 +1,4 @@
-"""Searches room by room by sight, and tidies the objects that it finds (condition `none`)."""
+"""Participant that searches the house room by room, and tidies the objects that it finds."""
 
 import numpy as np
 
@@ -9,14 +9,14 @@ from experiments.participants.visit_executor import VisitExecutor
 from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action
 from planner.plan import Visit, VisitKind
 
-SEARCHED = 0.5  # distance from a viewpoint at which the person starts to look around, m
-GONE = 1.2  # a remembered object that is nearer than this and not in view counts as gone, m
+SEARCHED = 0.5  # distance from a viewpoint at which the participant starts to look around, in metres
+GONE = 1.2  # distance in metres within which a remembered object that is not in view counts as gone
 
 
 class Searcher:
-    """Picks objects that it has seen, and places them when its hands are full or it knows of no others.
+    """Picks objects that it has seen, and places them when its hands are full or it knows of no other objects.
 
-    It searches the rest of the present room before the nearest other place.
+    It finishes the current room before it goes to the nearest viewpoint elsewhere.
     """
 
     needs: frozenset[str] = frozenset()
@@ -52,7 +52,6 @@ class Searcher:
         self._remembered.update(percept.look())
 
     def _next_visit(self, percept: Percept) -> Visit | None:
-        """Return the next visit with known objects: pick the nearest one, or place a carried one."""
         bins = [Visit(VisitKind.PLACE, name) for name in percept.carried]
         known = [Visit(VisitKind.PICK, name) for name in sorted(self._remembered)]
         feasible = bins if percept.hands_full else known or bins

@@ -1,4 +1,4 @@
-"""Execution of visits, shared by all simulated participants: path, stopping distance, action, and search for bins."""
+"""Execution of visits by simulated participants: walking, picking, placing, and searching for bins."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -11,18 +11,19 @@ from mjsim.values.actions import TIME_TOLERANCE, WAIT, Action, FollowPath, Pick,
 from mjsim.world.walking.polyline import project
 from planner.plan import Visit, VisitKind
 
-STOP_SHARE = 0.72  # stopping distance as a share of the reach, large enough not to kick the object
-CLOSER = 0.12  # reduction of the stopping distance after a refusal, m
-MIN_STOP_DISTANCE = 0.30  # m
-ARRIVED = 0.5  # distance from a viewpoint at which the person starts to look around, m
+STOP_SHARE = 0.72  # stopping distance relative to the reach, large enough not to kick the object
+CLOSER = 0.12  # reduction of the stopping distance after a refused pick or place, in metres
+MIN_STOP_DISTANCE = 0.30  # in metres
+ARRIVED = 0.5  # distance from a viewpoint at which the participant starts to look around, in metres
 
 WalkTo = Callable[[Percept, Point, float], Action]
 
 
 class VisitExecutor:
-    """Executes visits. After a refusal, the person stops closer to the goal. If blocked, the person changes path.
+    """Executes visits.
 
-    If the person has not seen the bin yet, it is searched for first.
+    After a refused pick or place, the participant stops closer to the goal. If blocked, the participant takes another
+    path. A bin that has not been seen yet is searched for first.
     """
 
     def __init__(self, house: House) -> None:
@@ -37,9 +38,9 @@ class VisitExecutor:
     def act(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point], *, until: float | None = None
     ) -> Action:
-        """Walk the shortest known path to a visit's place and carry out the visit there.
+        """Walk the shortest known path to the goal of a visit, and pick or place there.
 
-        `objects` are remembered places, m, shape (2,). `until` is the simulated time of the next decision, s.
+        `objects` are remembered positions. `until` is the simulated time of the next decision in seconds.
         """
         if percept.busy:
             return WAIT
@@ -54,7 +55,7 @@ class VisitExecutor:
         return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
-        """Walk along the shown path and carry out the visit at its end. `until` is the time of the next decision, s."""
+        """Walk along the shown path, and pick or place at its end. `until` is the time of the next decision in seconds."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
@@ -73,15 +74,15 @@ class VisitExecutor:
     def walk_to(
         self, percept: Percept, goal: Point, stop_distance: float, *, until: float | None = None
     ) -> Action:
-        """Walk the shortest known path to within `stop_distance`, m, of a place, m, shape (2,)."""
+        """Walk the shortest known path to within `stop_distance` of a point, both in metres."""
         return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
 
     def look_for_bins(self, percept: Percept) -> None:
-        """Notice bins that the person has not seen yet. Call this at each look around."""
+        """Remember the bins in view. Call this at each look around."""
         self._bins.look(percept)
 
     def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:
-        """Return the visit with the shortest path to it. `objects` are remembered places, m, shape (2,)."""
+        """Return the visit with the shortest path. `objects` are remembered positions in metres, shape (2,)."""
         stands = [self._likely_stand(percept, visit, objects) for visit in visits]
         distances = estimated_distances(self._house, percept.position, stands)
         ranked = zip(distances, visits, strict=True)
@@ -91,7 +92,6 @@ class VisitExecutor:
         return visit.kind is VisitKind.PICK or self._bins.knows(percept.targets[visit.object])
 
     def _likely_stand(self, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> Point:
-        """Return the end of the path to a visit, or the start of the search for its bin, m, shape (2,)."""
         if self._knows(percept, visit):
             return places(self._house, percept, visit, objects)[1]
         return self._bins.likely_place(percept.position, percept.targets[visit.object])
@@ -108,7 +108,7 @@ class VisitExecutor:
         return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
-        """Return the current path (k, 2), m. Replan if the goal has changed, or the path was blocked or left."""
+        """Return the current path. Replan if the goal has changed, or if the path was blocked or left."""
         path = self._path
         if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
             self._path = path = np.vstack(
@@ -119,7 +119,6 @@ class VisitExecutor:
     def _find_places(
         self, percept: Percept, visit: Visit, objects: Mapping[str, Point]
     ) -> tuple[Point, Point]:
-        """Return the cached result of `places`. Recompute it if the visit has changed or its object has moved."""
         known = self._places
         if known is not None and known[0] == visit:
             _, goal, stand = known
@@ -131,7 +130,7 @@ class VisitExecutor:
 
 
 def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> tuple[Point, Point]:
-    """Return the place of a visit's object or receptacle and the end of the path to it, m, both of shape (2,)."""
+    """Return the goal of a visit and the end of the path to it, in metres, both of shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
         return goal, house.navmesh.snap(goal)
@@ -152,7 +151,7 @@ def _is_off(path: NDArray[np.float64], percept: Percept) -> bool:
 
 
 class BinSearch:
-    """The bins that the person knows, as given by `House.seen`, and the search for the others."""
+    """Search for the bins that the participant has not seen yet."""
 
     def __init__(self, house: House) -> None:
         self._house = house
@@ -168,7 +167,7 @@ class BinSearch:
         return key not in self._unknown
 
     def look(self, percept: Percept) -> None:
-        """Notice the bins in view and those at the feet."""
+        """Remember the bins in view and nearby."""
         if not self._unknown or percept.time < self._next_look - TIME_TOLERANCE:
             return
         self._next_look = percept.time + percept.person.looking_interval
@@ -176,18 +175,18 @@ class BinSearch:
             del self._unknown[key]
 
     def until(self, time: float | None) -> float | None:
-        """Return the earlier of `time` and the time of the next look, s. None if both are unset."""
+        """Return the earlier of `time` and the time of the next look in seconds, or None if both are unset."""
         if not self._unknown:
             return time
         return self._next_look if time is None else min(time, self._next_look)
 
     def likely_place(self, position: Point, key: str) -> Point:
-        """Return the start of the search for a bin: the nearest viewpoint of its room, m, shape (2,)."""
+        """Return the start of the search for a bin, which is the nearest viewpoint of its room."""
         points = self._viewpoints(key)
         return points[self._nearest(position, points)]
 
     def act(self, percept: Percept, key: str, walk_to: WalkTo) -> Action:
-        """Go to the viewpoints of the bin's room, the nearest first, and look around at each."""
+        """Walk to the viewpoints of the bin's room, nearest first, and look around at each."""
         if key != self._key:
             self._key, self._left, self._target, self._turn = key, [], None, None
         if self._turn is not None:
@@ -204,18 +203,17 @@ class BinSearch:
         return self.act(percept, key, walk_to)
 
     def _next_viewpoint(self, position: Point, key: str) -> Point:
-        """Return the nearest viewpoint not searched yet, or after the last one the place next to the bin."""
         if not self._left:
             self._left = self._viewpoints(key)
         return self._left.pop(self._nearest(position, self._left))
 
     def _viewpoints(self, key: str) -> list[Point]:
-        """Return the viewpoints of a bin's room and, last, the place next to the bin, m, each (2,)."""
+        """Return the viewpoints of the bin's room, followed by the point next to the bin."""
         room = self._house.catalogue.receptacles[key].room
         return [*self._house.viewpoints.get(room, ()), self._house.approaches[key]]
 
     def _nearest(self, position: Point, points: list[Point]) -> int:
-        """Return the index of the nearest point. The last point is considered only if it is the only one."""
+        """Return the index of the nearest point. The last one, next to the bin, is chosen only if no other is left."""
         candidates = points[:-1] or points
         return int(np.argmin(estimated_distances(self._house, position, candidates)))
 

@@ -1,7 +1,7 @@
-"""A simulated person who has seen the house once: models perception, memory, choice, compliance and reading times.
+"""Model of a participant who has seen the house once.
 
-Each part of the model has a class for its parameters, their distributions over people, units and sources.
-`docs/participants.md` lists them, and `docs/paper.md` names the fitted ones.
+It covers perception, memory, choice, compliance and reading times. The parameters of each part are fields of a class,
+with their distributions, units and sources (docs/participants.md). Some are fitted to data (docs/paper.md).
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ PARAMETERS: Final[Mapping[str, Parameter]] = {
     for field in dataclasses.fields(kind)
 }
 # The comfortable walking speed of healthy adults is 0.94 to 1.43 m/s (Bohannon and Williams Andrews, Physiotherapy 97,
-# 2011). The part `perception` determines the distance at which an object is noticed.
+# 2011). The distance at which an object is noticed is a parameter of `perception`.
 PERSON: Final[Mapping[str, Any]] = {
     "walking_speed": {"normal": [1.2, 0.12], "min": 0.94, "max": 1.43},
     "viewing_distance": 14.0,
@@ -32,7 +32,7 @@ PERSON: Final[Mapping[str, Any]] = {
 class _Build:
     """Factory of guests.
 
-    `behaviour` are the parameters of the model, and `person` the distributions of the guests' bodies.
+    `behaviour` contains the parameters of the model, and `person` the distributions of the body's parameters.
     """
 
     behaviour = PARAMETERS
@@ -41,13 +41,13 @@ class _Build:
     def __call__(
         self, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
     ) -> Participant:
-        """Make a guest with these values, or draw them if there are none."""
+        """Create a guest with the given parameter values. By default, draw them."""
         values = behaviour or draw(PARAMETERS, Distributions(), rng, "guest")
         return Guest(house, rng, as_behaviour(values))
 
 
 def as_behaviour(values: Mapping[str, float]) -> Behaviour:
-    """Convert values by name (`compliance.follows`) to the parts of the model."""
+    """Create the parts of the model from values by name, such as `compliance.follows`."""
     return Behaviour(
         **{
             part: kind(**{f.name: values[f"{part}.{f.name}"] for f in dataclasses.fields(kind)})

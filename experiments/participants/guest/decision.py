@@ -1,4 +1,4 @@
-"""The guest's choice of the next visit or search, and the time it takes."""
+"""Choice of the guest's next visit or search, and the time for the decision."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,39 +17,40 @@ from planner.plan import Visit, VisitKind
 
 @dataclass(frozen=True)
 class Decision:
-    """Parameters of the choice.
+    """Parameters of choosing the next visit or search.
 
     People plan several moves ahead, and more of them the better they know a task (van Opheusden et al., Nature 618,
     2023). The regions of a building affect their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003).
-    The number of moves, the error of distances and the cost of a region are assumptions.
+    The planning depth, the distance error and the room cost are assumptions.
     """
 
-    # an option that costs c metres more is chosen with odds exp(-c / temperature), m
+    # scale in metres: an option that costs c metres more is chosen with odds exp(-c / temperature)
     temperature: float = varies({"lognormal": [0.5, 0.35]}, 0.0, 1000.0, "m")
-    # planning depth: visits simulated ahead, nearest first; rounded to an integer
+    # planning depth: number of visits simulated ahead, rounded to an integer
     look_ahead: float = varies({"uniform": [1.5, 4.5]}, 1.0, 12.0, "visits")
     # standard deviation of the logarithm of an estimated distance
     distance_error: float = varies(0.15, 0.0, 5.0)
-    # cost of entering another room in addition to the walk, m
+    # cost of entering another room in addition to the walk, in metres
     room_cost: float = varies(2.0, 0.0, 100.0, "m")
-    search_cost: float = varies(3.0, 0.0, 100.0, "m")  # cost of a search in addition to the walk, m
+    search_cost: float = varies(3.0, 0.0, 100.0, "m")  # cost of a search in addition to the walk, in metres
 
 
 @dataclass(frozen=True)
 class Task:
-    """The rest of the task as the person knows it. Places are numbered. Place 0 is the person's position."""
+    """The rest of the task as the guest knows it. Locations are numbered. Location 0 is the guest's position."""
 
-    legs: NDArray[np.float64]  # costs of walks from place to place, m, shape (n, n)
-    picks: Sequence[int]  # place of each object that can be picked up
-    bins: Sequence[int]  # place of the bin of each of these objects
-    carried: Sequence[int]  # place of the bin of each object in the hands
-    capacity: int  # largest number of objects that can be carried
+    legs: NDArray[np.float64]  # costs of walks between locations, in metres, shape (n, n)
+    picks: Sequence[int]  # location of each object that can be picked up
+    bins: Sequence[int]  # location of the bin of each of these objects
+    carried: Sequence[int]  # location of the bin of each carried object
+    capacity: int  # maximum number of objects that can be carried
 
 
 def first_step_costs(task: Task, look_ahead: int) -> list[float]:
-    """Return the cost of the next `look_ahead` visits for each possible first visit: `picks`, then `carried`, m.
+    """Return the cost in metres of each possible first visit, in the order `picks`, `carried`.
 
-    After the first visit, the nearest possible one always follows. If the hands are full, picks cost infinity.
+    The cost is that of `look_ahead` visits, which continue with the nearest possible visit. If the hands are full,
+    picks cost infinity.
     """
     picks, carried, full = (
         list(range(len(task.picks))),
@@ -71,7 +72,6 @@ def first_step_costs(task: Task, look_ahead: int) -> list[float]:
 def _imagined(
     task: Task, legs: list[list[float]], at: int, picks: list[int], carried: list[int], visits: int
 ) -> float:
-    """Return the cost of the next `visits` visits if the nearest possible one is always next, m."""
     picks, carried, cost = list(picks), list(carried), 0.0
     for _ in range(visits):
         options = [(legs[at][place], 1, place, k) for k, place in enumerate(carried)]
@@ -92,14 +92,14 @@ def _imagined(
 def judged_distances(
     legs: NDArray[np.float64], decision: Decision, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Return distances as a person estimates them, m, in an array of any shape."""
+    """Return distances with random estimation errors, in metres."""
     return np.asarray(legs * np.exp(decision.distance_error * rng.standard_normal(legs.shape)))
 
 
 def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator) -> int:
-    """Choose an option with odds exp(-cost / temperature), m.
+    """Choose an option with odds exp(-cost / temperature), both in metres.
 
-    At 0, choose the cheapest. Infinite costs are never chosen.
+    At temperature 0, choose the cheapest. An option of infinite cost is never chosen.
     """
     noise = rng.gumbel(size=len(costs))
     return int(np.argmin(np.asarray(costs) - temperature * noise))
@@ -107,9 +107,9 @@ def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """The person's knowledge of the task on which a choice depends."""
+    """Knowledge on which a choice depends."""
 
-    objects: Mapping[str, Point]  # remembered places of objects, m, shape (2,)
+    objects: Mapping[str, Point]  # remembered positions of objects in metres, shape (2,)
     pull: float  # weight (0 to 1) of the straight-line distance in estimated distances to these objects
     search: bool  # True if a search is possible when no known object can be fetched
 
@@ -150,7 +150,6 @@ class Chooser:
         return visits[chosen] if chosen < len(visits) else places[best]
 
     def _visit_costs(self, percept: Percept, known: Known, fetchable: Sequence[str]) -> list[float]:
-        """Return the costs of visits, m: objects that can be fetched, then carried ones."""
         names = [*fetchable, *percept.carried]
         bins = sorted({percept.targets[name] for name in names})
         places = [percept.position, *(known.objects[n] for n in fetchable)]
@@ -166,11 +165,6 @@ class Chooser:
         return first_step_costs(task, round(self._decision.look_ahead))
 
     def _judged_legs(self, places: Sequence[Point], pull: float, objects: int) -> NDArray[np.float64]:
-        """Return the estimated costs of walks between places, m, shape (n, n).
-
-        The first `objects` places after the start are visible through walls, so straight lines count in their
-        distances.
-        """
         points = np.array(places)
         legs = self._all_legs(points)
         straight = np.linalg.norm(points[:, None] - points[None], axis=2)
@@ -194,26 +188,26 @@ class Chooser:
 
 @dataclass(frozen=True)
 class Timing:
-    """Times of reading and deciding."""
+    """Parameters of the time for reading and deciding."""
 
-    # factor of all these times: below 1 for quick people, above 1 for slow ones
+    # factor of all times below: less than 1 for fast participants, more than 1 for slow ones
     pace: float = varies({"lognormal": [1.0, 0.35]}, 0.05, 20.0)
-    # time to prepare the next step mentally, s (Card, Moran and Newell, CACM 23, 1980: 1.35 s)
+    # time to prepare the next step mentally, in seconds (Card, Moran and Newell, CACM 23, 1980)
     deciding: float = varies(1.35, 0.0, 60.0, "s")
-    # words per minute (Brysbaert, Journal of Memory and Language 109, 2019: 238)
+    # reading speed in words per minute (Brysbaert, Journal of Memory and Language 109, 2019)
     reading_speed: float = varies(238.0, 10.0, 10_000.0, "words a minute")
-    words: float = varies(4.0, 0.0, 100.0)  # words in a row of the task list
-    # time to understand a suggested step and its path before walking, s; a starting value
+    words: float = varies(4.0, 0.0, 100.0)  # number of words in a row of the task list
+    # time in seconds to understand a suggested step and its path before walking (starting value)
     guided_step: float = varies(6.0, 0.0, 60.0, "s")
-    # time to relate the flagpoles to the house before a choice, s; a starting value
+    # time in seconds to relate the flagpoles to the house before a choice (starting value)
     interpreting: float = varies({"uniform": [1.5, 3.0]}, 0.0, 60.0, "s")
 
     def list_time(self, rows: int) -> float:
-        """Return the time to read a list, s."""
+        """Return the time to read a list, in seconds."""
         return self.pace * rows * self.words / self.reading_speed * 60.0
 
     def choice_time(self, *, poles: bool) -> float:
-        """Return the time to choose the next visit, s, which is longer if there are flagpoles to interpret."""
+        """Return the time to choose the next visit, in seconds. With `poles`, it includes interpreting flagpoles."""
         return self.pace * (self.deciding + (self.interpreting if poles else 0.0))
 
     def suggestion_time(self) -> float:

@@ -1,4 +1,4 @@
-"""The guest's deviations: from suggested steps, and from the shortest path."""
+"""Deviations of the guest from suggested steps and from the shortest path."""
 
 from dataclasses import dataclass
 
@@ -8,30 +8,30 @@ from experiments.house import House
 from experiments.participants.base import Point, estimated_distances
 from experiments.participants.distribution import chance, varies
 
-MIN_DETOUR = 0.5  # shortest detour that a person takes, m
+MIN_DETOUR = 0.5  # minimum length of a detour, in metres
 
 
 @dataclass(frozen=True)
 class Compliance:
     """Parameters of compliance with suggested steps.
 
-    The published variance of deviations is largest under `optimal` at every difficulty, as if there were kinds of
-    people (PAPER section 8): some always follow, some sometimes, some hardly. The weights are starting values. A person
-    who always follows neither gives up a step nor picks up anything else, but may quit following.
+    The published variance of deviations is largest under `optimal` at every difficulty (PAPER section 8). This suggests
+    groups of participants who always, sometimes or rarely follow suggestions. The weights of the groups are starting
+    values. A participant who always follows neither gives up a step nor picks up other objects, but may quit following.
     """
 
     # probability of following a suggested step
     follows: float = chance({"mixture": [[0.62, 1.0], [0.20, {"beta": [2, 2]}], [0.18, {"beta": [1, 9]}]]})
-    abandons: float = chance({"beta": [1.0, 19.0]})  # probability of giving up a step on the way to it
-    # probability of picking up an object that is noticed next to the path, with a hand free
+    abandons: float = chance({"beta": [1.0, 19.0]})  # probability of giving up a suggested step on the way
+    # probability of picking up an object next to the path that is noticed while a hand is free
     picks_up: float = chance({"uniform": [0.15, 0.30]})
-    beside: float = varies(2.0, 0.0, 20.0, "m")  # largest distance of such an object from the person
-    # probability, at each suggestion, of ignoring this and all later suggestions
+    beside: float = varies(2.0, 0.0, 20.0, "m")  # maximum distance of such an object, in metres
+    # probability at each suggestion of ignoring it and all later ones
     quits: float = chance({"beta": [1.0, 99.0]})
 
 
 class Adherence:
-    """A person's decisions about suggestions."""
+    """Decisions of a participant about suggestions."""
 
     def __init__(self, compliance: Compliance, rng: np.random.Generator) -> None:
         self.compliance, self._rng, self._has_quit = compliance, rng, False
@@ -43,13 +43,13 @@ class Adherence:
         return chance < self.compliance.follows and not self._has_quit
 
     def gives_up_after(self, duration: float) -> float | None:
-        """Return the time into a walk of this duration at which the person gives up the step, s, or None."""
+        """Return the time in seconds after which the step is given up during a walk, or None if it is not."""
         chance, share = self._rng.random(2).tolist()
         gives_up = chance < self.compliance.abandons and not self._always_follows
         return share * duration if gives_up else None
 
     def picks_up(self, distance: float) -> bool:
-        """Decide whether to pick up an object that was noticed at this distance, m, in passing."""
+        """Decide whether to pick up an object that was noticed at this distance, in metres."""
         tempted = float(self._rng.random()) < self.compliance.picks_up
         return tempted and distance <= self.compliance.beside and not self._always_follows
 
@@ -62,24 +62,24 @@ class Adherence:
 class Walking:
     """Parameters of departures from the shortest path. The shapes of the distributions are starting values."""
 
-    # probability, at each walk not along a shown path, of absent-mindedly going elsewhere first
+    # probability of first going elsewhere by mistake, at each walk without a shown path
     lapse_rate: float = chance({"beta": [0.5, 3.0]})
-    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # longest walk to that place
-    # probability, at each walk to a flagpole in another room, of first going to the point of this room that is nearest
-    # to it; also the weight of the straight-line distance in estimated distances to flagpoles
+    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # maximum length of this detour, in metres
+    # probability of first going to the point of the current room that is nearest to a flagpole in another room, and
+    # weight of the straight-line distance in estimated distances to flagpoles
     pull: float = chance({"beta": [2.0, 3.0]})
 
 
 class Detours:
-    """Chooses the places that a walk passes before its goal."""
+    """Chooses intermediate stops of a walk."""
 
     def __init__(self, walking: Walking, house: House, rng: np.random.Generator) -> None:
         self._walking, self._house, self._rng = walking, house, rng
 
     def stops(self, start: Point, goal: Point, *, pole: bool) -> list[Point]:
-        """Return the places to pass on the way, m, shape (2,) each. Usually there are none.
+        """Return the intermediate stops of a walk, usually none.
 
-        `pole` tells that a flagpole at the goal is visible through walls.
+        `pole` is True if a flagpole at the goal is visible through walls.
         """
         lapse, pulled = self._rng.random(2).tolist()
         start, stops = self._house.navmesh.snap(start), []
@@ -90,14 +90,12 @@ class Detours:
         return stops
 
     def _lapse(self, start: Point) -> list[Point]:
-        """Return a random place of the house that is not too far away, m, shape (2,), if there is one."""
         places = np.concatenate(list(self._house.viewpoints.values()))
         walks = np.array(estimated_distances(self._house, start, list(places)))
         near = places[(walks > MIN_DETOUR) & (walks <= self._walking.lapse_distance)]
         return [near[self._rng.integers(len(near))]] if len(near) else []
 
     def _towards(self, start: Point, goal: Point) -> list[Point]:
-        """Return the place of this room, (2,), nearest to a goal in another room, if it is nearer than the start."""
         room = self._house.rooms.room_at(start)
         if room == self._house.rooms.room_at(goal):
             return []

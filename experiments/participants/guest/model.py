@@ -1,4 +1,4 @@
-"""The guest, which combines the parts of the model."""
+"""Simulated participant that combines all parts of the model."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,14 +17,14 @@ from mjsim.values.actions import IDLE, TIME_TOLERANCE, WAIT, Action, Wait
 from mjsim.world.walking.polyline import path_length, project
 from planner.plan import Visit, VisitKind
 
-ARRIVED = 0.5  # distance at which a place counts as reached, m
-GONE = 1.2  # a remembered object that is nearer than this and not in view counts as gone, m
-SEEN_BIN = 2.0  # distance within which the person learns a bin's place, m
+ARRIVED = 0.5  # distance at which a stop counts as reached, in metres
+GONE = 1.2  # distance in metres within which a remembered object that is not in view counts as gone
+SEEN_BIN = 2.0  # distance in metres within which the guest learns the location of a bin
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Parameter values of one person."""
+    """Parameter values of one guest."""
 
     perception: Perception
     memory: Memory
@@ -36,17 +36,17 @@ class Behaviour:
 
 @dataclass(frozen=True)
 class Intention:
-    """The visit or search that a person is about to make."""
+    """The visit or search that a guest is about to make."""
 
-    aim: Visit | SearchPlace  # a visit, or a place to search
-    suggested: bool = False  # True if this is the suggested step
-    # True if the person no longer follows the shown path, having left it or been blocked on it
+    aim: Visit | SearchPlace  # visit, or viewpoint to search from
+    suggested: bool = False  # True if the HUD suggested it
+    # True if the guest has left the shown path or was blocked on it
     strays: bool = False
-    gives_up_at: float = math.inf  # simulated time at which the suggested step is given up, s
+    gives_up_at: float = math.inf  # simulated time in seconds at which the suggested step is given up
 
 
 class Guest:
-    """Tidies like a person who was shown the house once, and uses the guidance of any condition."""
+    """Tidies like a participant who has seen the house once, with the guidance of any condition."""
 
     needs: frozenset[str] = frozenset()
 
@@ -64,19 +64,19 @@ class Guest:
         self._turn: FullTurn | None = None
         self._turned_for_poles = self._has_begun = False
         self._carried: set[str] = set()
-        self._brought: set[str] = set()  # objects assumed to be in their bins, as they are no longer carried
-        self._passed: set[str] = set()  # objects considered for picking up in passing
+        self._brought: set[str] = set()  # objects that are assumed to be in their bins
+        self._passed: set[str] = set()  # objects for which picking up in passing was decided
         self._room: str | None = None
         self._read: Visit | None = None
         self._given_up: Visit | None = None
-        self._is_open = False  # True if the person may still follow the suggestion that was read
+        self._is_open = False  # True if the guest may still follow the last suggestion
         self._next_look = self._thinks_until = 0.0
 
     def act(self, percept: Percept) -> Action:
         if percept.busy:
             return WAIT
         self._begin(percept)
-        if self._thinks(percept):  # looks at the HUD, not at the room
+        if self._thinks(percept):  # a thinking guest looks at the HUD, not at the room
             return Wait(self._thinks_until)
         self._look(percept)
         decision = self._turn_around(percept)
@@ -88,7 +88,6 @@ class Guest:
         return Wait(self._thinks_until) if self._thinks(percept) else self._continue(percept)
 
     def _begin(self, percept: Percept) -> None:
-        """Read the list first, unless the HUD shows the next step."""
         if not self._has_begun:
             self._has_begun, self._next_look = True, percept.time
             rows = 0 if BREADCRUMB in percept.shown_roles else len(percept.targets)
@@ -98,7 +97,6 @@ class Guest:
         return percept.time < self._thinks_until - TIME_TOLERANCE
 
     def _look(self, percept: Percept) -> None:
-        """At intervals, learn the places of objects and bins, and perhaps pick up an object in passing."""
         for name in percept.carried:
             self._known.drop(name)
         self._brought |= self._carried - set(percept.carried)
@@ -123,7 +121,6 @@ class Guest:
         self._pick_up_in_passing(percept)
 
     def _look_around_if_there(self, percept: Percept) -> None:
-        """Once the place of a search is reached or in view, perhaps look all around, then choose again."""
         aim = self._intention.aim if self._intention is not None else None
         if not isinstance(aim, SearchPlace) or (
             self._frontier.is_left(aim) and not self._is_at(percept, aim.point)
@@ -156,7 +153,6 @@ class Guest:
         return aim.object if isinstance(aim, Visit) else None
 
     def _is_sensible(self, percept: Percept) -> bool:
-        """Return True if the present intention is still possible and wanted."""
         intention = self._intention
         if intention is None:
             return False
@@ -181,7 +177,6 @@ class Guest:
         return refused and near and name not in percept.look() and name not in percept.flagpoles
 
     def _decide(self, percept: Percept) -> None:
-        """Read a new suggestion, or form an intention. Both take time."""
         shown = percept.guidance
         self._intention, self._stops = None, []
         if shown is not None and shown.visit != self._read:
@@ -237,7 +232,7 @@ class Guest:
         return self._house.approaches[percept.targets[aim.object]]
 
     def _turn_around(self, percept: Percept) -> Action | None:
-        """Continue a turn. After a full turn, the bins of this room are known."""
+        """Continue a turn. After a full turn, all bins of the room are known."""
         turning = self._turn.act(percept) if self._turn is not None else None
         if turning is None and self._turn is not None:
             self._turn = None
@@ -246,7 +241,6 @@ class Guest:
         return turning
 
     def _continue(self, percept: Percept) -> Action:
-        """Walk along the stops to the aim, and pick or place there."""
         intention = self._intention
         if intention is None:
             return IDLE

@@ -1,4 +1,4 @@
-"""The guest's perception and memory of objects and bins."""
+"""Perception and memory of objects and bins."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -14,25 +14,25 @@ from experiments.participants.distribution import chance, varies
 class Perception:
     """Parameters of noticing objects.
 
-    Conspicuity predicts search time (Toet et al., Optical Engineering 37, 1998). That the probability is a logistic
-    function of distance, and its half distance, are assumptions. Field of view and sight range are those of the body
-    (docs/participants.md), and occlusion is computed from the geometry of the scene.
+    Conspicuity predicts search time (Toet et al., Optical Engineering 37, 1998). The probability of noticing is assumed
+    to be a logistic function of distance. The field of view and the sight range are parameters of the body
+    (docs/participants.md). Occlusion is computed from the geometry of the scene.
     """
 
-    # distance at which half of the objects in full view are noticed, m
+    # distance in metres at which half of all fully visible objects are noticed
     half_distance: float = varies({"uniform": [6.0, 8.0]}, 0.1, 100.0, "m")
-    # scale of the logistic curve, m; three scales below `half_distance`, almost all objects are noticed
+    # scale of the logistic function, in metres
     distance_spread: float = varies(1.0, 0.01, 20.0, "m")
-    looks_around: float = chance(0.8)  # probability of looking all around at a searched place
-    # distance within which visible floor counts as searched, m; objects overlooked there are found only in
-    # the next round, when all rooms are searched more closely
+    looks_around: float = chance(0.8)  # probability of turning around at a viewpoint
+    # distance in metres within which visible floor counts as searched; objects that are overlooked there can only be
+    # found in the next round
     covers: float = varies({"uniform": [2.0, 6.0]}, 0.0, 100.0, "m")
 
     def probability(self, distance: float, share: float) -> float:
-        """Return the probability that an object at a distance, m, is noticed on entering a scene.
+        """Return the probability that an object at a distance in metres is noticed.
 
-        `share` of the object is visible, 0 to 1. A quarter of it has the visual angle of the whole at twice the
-        distance.
+        `share` is the visible share of the object, 0 to 1. A quarter of an object has the same visual angle as a whole
+        object at twice the distance.
         """
         if share <= 0:
             return 0.0
@@ -41,18 +41,18 @@ class Perception:
 
 
 class Noticing:
-    """Notices objects. An overlooked object stays overlooked until the person is nearer or calls `look_afresh`."""
+    """Notices objects. An overlooked object stays overlooked until it is closer or `look_afresh` is called."""
 
     def __init__(self, perception: Perception, rng: np.random.Generator) -> None:
         self._perception, self._rng = perception, rng
         self._thresholds: dict[str, float] = {}
 
     def look_afresh(self) -> None:
-        """Give overlooked objects another chance to be noticed from the same place, as on entering a room again."""
+        """Give overlooked objects another chance to be noticed from the same distance."""
         self._thresholds.clear()
 
     def notice(self, percept: Percept) -> dict[str, Point]:
-        """Return the floor positions of noticed objects, m, shape (2,). Objects at the feet are always noticed."""
+        """Return the floor positions of noticed objects, in metres. Nearby objects are always noticed."""
         shares = percept.visible_shares
         found = dict(percept.nearby)
         for name, place in percept.look().items():
@@ -71,22 +71,22 @@ class Noticing:
 class Memory:
     """Parameters of memory.
 
-    After one tour through a building most landmarks are recalled (a share of about 0.8 is a starting value). Memory of
-    where an object was seen fades after an exponentially distributed time, whose mean is a starting value.
+    After one tour through a building, most landmarks are remembered. The location of an object is forgotten after an
+    exponentially distributed time. Both parameters are starting values.
     """
 
-    # probability of knowing where a bin is after the familiarization; the HUD names its room
+    # probability of knowing the location of a bin after the familiarization
     knows_bins: float = chance(0.8)
-    # mean time for which the place of an object is remembered, s
+    # mean time in seconds after which the location of an object is forgotten
     retention: float = varies({"lognormal": [300.0, 0.5]}, 1.0, 1e6, "s")
 
 
 class Recollection:
-    """The places that a person remembers at present.
+    """Locations that a participant remembers.
 
     Attributes:
-        objects: Remembered places of objects, m, shape (2,).
-        bins: Keys of the bins whose place is known.
+        objects: Positions of objects in metres, shape (2,).
+        bins: Keys of the bins whose location is known.
     """
 
     def __init__(self, memory: Memory, receptacles: Collection[str], rng: np.random.Generator) -> None:
@@ -96,7 +96,7 @@ class Recollection:
         self.bins = {key for key in sorted(receptacles) if rng.random() < memory.knows_bins}
 
     def learn(self, found: Mapping[str, Point], time: float) -> list[str]:
-        """Remember where objects were seen at `time`, s. Return the names of those not remembered before."""
+        """Store positions of objects seen at `time`, in seconds. Return the names of objects that are new."""
         new = [name for name in found if name not in self.objects]
         self.objects.update(found)
         for name in found:
@@ -104,7 +104,7 @@ class Recollection:
         return new
 
     def forget(self, time: float, but: str | None = None) -> None:
-        """Forget objects that were last seen too long ago. The object `but` is kept."""
+        """Forget objects that were last seen too long ago, except the object `but`."""
         for name in [n for n, until in self._until.items() if until < time and n != but]:
             self.drop(name)
 
