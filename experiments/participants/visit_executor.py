@@ -55,7 +55,7 @@ class VisitExecutor:
         return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
-        """Walk along the shown path, and pick or place at its end. `until` is the time of the next decision in seconds."""
+        """Walk along the shown path, and pick or place at its end. `until` is the time of the next decision."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)

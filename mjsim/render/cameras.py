@@ -18,9 +18,8 @@ NEAR = 0.04
 FAR = 100.0
 _MARGIN = 0.01  # tolerance of culling, far above rounding errors in single precision, in metres
 _NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)  # geom type that the rasteriser does not draw
-_GEOM = int(
-    mujoco.mjtObj.mjOBJ_GEOM
-)  # an integer, because comparing with the enumeration takes ten times as long
+# An integer, because comparing with the enumeration takes ten times as long
+_GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 
 @dataclass(frozen=True, eq=False)

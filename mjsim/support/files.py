@@ -22,10 +22,8 @@ from pathlib import Path
 from typing import Any
 
 MAX_INPUT = 256_000_000  # size limit of input files, in bytes
-MAX_SILENCE, MAX_WAIT = (
-    8.0,
-    60.0,
-)  # timeouts for the next part of a stream and for the whole stream, in seconds
+# Timeouts for the next part of a stream and for the whole stream, in seconds
+MAX_SILENCE, MAX_WAIT = 8.0, 60.0
 WORK = ".mjsim-work-"
 MAX_AGE = 24 * 3600  # age at which temporary files of killed processes are removed, in seconds
 

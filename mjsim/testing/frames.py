@@ -162,9 +162,8 @@ def _hashes(golden: Path) -> Mapping[str, str]:
 
 
 def _store(frame: Image, path: Path, key: str) -> None:
-    same = path.is_file() and np.array_equal(
-        _read(path), frame
-    )  # a changed image invalidates the hashes of other drivers
+    # A changed image invalidates the hashes of other drivers.
+    same = path.is_file() and np.array_equal(_read(path), frame)
     hashes = {**(_hashes(path) if same else {}), key: _digest(frame)}
     if not same:
         _write(path, frame)

@@ -17,7 +17,7 @@ class WorldOptions:
     """Options of a world that do not depend on the person: time step, grip, settling and fidelity.
 
     Attributes:
-        control_timestep: Duration of one `World.step`, s. A multiple of the model's timestep.
+        control_timestep: Duration of a control step in seconds, a multiple of the model's timestep.
         grip_distance: Maximum distance between a hand and the grip site for a grip, in metres.
         grip_error: Stretch of the weld between hand and object beyond which it slips, in metres.
         grip_patience: Time for which the stretch may exceed `grip_error`, in seconds.

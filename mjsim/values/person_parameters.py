@@ -50,8 +50,8 @@ class PersonParameters:
         viewing_distance: Maximum distance at which an object is noticed, in metres.
         looking_interval: Time between checks for visible objects while walking, in seconds.
         reading_time: Time for which a participant stands and reads the HUD before each visit, in seconds. By default 0.
-            Preparing a step mentally takes 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read 238
-            words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
+            The mental preparation of a step requires 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read
+            238 words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
         patience: Time without progress after which a walking person steps back or looks for another way, in seconds.
         motion: Parameters of picking and placing.
         carrying: Parameters of carrying.
