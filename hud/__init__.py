@@ -1,6 +1,6 @@
-"""The heads-up display: assistance conditions, the HUD state that they return, and its drawing.
+"""The heads-up display: assistance conditions, the HUD states that they return, and the code that draws them.
 
-It depends neither on the physics nor on the planner.
+The package depends neither on the physics nor on the planner.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""The built-in options of assistance conditions. An option changes the HUD state that a condition has made."""
+"""The built-in options, which change the HUD state returned by a condition."""
 
 import itertools
 from dataclasses import replace
@@ -11,12 +11,12 @@ from hud.state import FLOORPLAN, ChecklistItem, HudState, Marker, MiniMap, Vec2
 from hud.task import Alternative, TaskStep, TaskView
 from hud.texts import HudTexts, filled
 
-REROUTE_CLEARANCE = 0.5  # length of path ahead of the person without breadcrumbs, to keep the view free, m
-NEGLIGIBLE = 0.01  # regret below which a step counts as optimal, m
+REROUTE_CLEARANCE = 0.5  # length of path in front of the person without breadcrumbs, in metres
+NEGLIGIBLE = 0.01  # regret below which a step counts as optimal, in metres
 
 
 def bins(view: TaskView, state: HudState) -> HudState:
-    """Add a pin over the bin of every object in the hands."""
+    """Add a pin over the receptacle of every carried object."""
     if _has(state, BIN):
         return state
     carried = dict.fromkeys(view.object(name).receptacle for name in view.hands if name is not None)
@@ -25,7 +25,7 @@ def bins(view: TaskView, state: HudState) -> HudState:
 
 
 def minimap(view: TaskView, state: HudState) -> HudState:
-    """Add a map of the house with the person, and with the markers that the condition shows in the world."""
+    """Add a map of the house with the person and the markers of the condition."""
     if view.bounds is None:
         return state
     goals = _floor_positions(state, GOAL)
@@ -42,21 +42,21 @@ def minimap(view: TaskView, state: HudState) -> HudState:
 
 
 def pin(view: TaskView, state: HudState) -> HudState:
-    """Add a pin over the goal of the plan's next step."""
+    """Add a pin over the goal of the next step."""
     if view.goal is None or _has(state, GOAL):
         return state
     return replace(state, markers=(*state.markers, *markers.pin(view.goal)))
 
 
 def pointer(view: TaskView, state: HudState) -> HudState:
-    """Add an arrow towards the goal of the plan's next step while that goal is out of view."""
+    """Add an arrow towards the goal of the next step while this goal is out of view."""
     if view.goal is None or view.camera is None:
         return state
     return replace(state, pointer=pointer_to(view.camera, view.goal))
 
 
 def regret(view: TaskView, state: HudState) -> HudState:
-    """Add the regret of each possible next step to its row, once the regrets are known."""
+    """Add the regret of each possible next step to the step's row, as soon as the regrets are known."""
     known = {(a.kind, a.object): a for a in view.alternatives()}
     steps = _steps(view, state)
     if not known or len(steps) != len(state.checklist):
@@ -69,9 +69,9 @@ def regret(view: TaskView, state: HudState) -> HudState:
 
 
 def reroute(view: TaskView, state: HudState) -> HudState:
-    """Replace the breadcrumbs by those of the path from the person, which changes when the person leaves it.
+    """Replace the breadcrumbs by those of a path that starts at the person and changes when the person leaves it.
 
-    In the paper, breadcrumbs stay where they were first shown until the next pick or place.
+    In the paper, breadcrumbs stay in place until the next pick or place.
     """
     if view.path is None or not _has(state, BREADCRUMB):
         return state
@@ -81,13 +81,13 @@ def reroute(view: TaskView, state: HudState) -> HudState:
 
 
 def rims(view: TaskView, state: HudState) -> HudState:  # noqa: ARG001 - the interface of options
-    """Add a white rim around each breadcrumb, for people who cannot tell red from a brown floor."""
+    """Add a white rim around each breadcrumb, for participants who cannot distinguish red from a brown floor."""
     crumbs = tuple(marker for marker in state.markers if marker.role == BREADCRUMB)
     return replace(state, markers=(*crumbs, *markers.rims(crumbs), *_without_breadcrumbs(state)))
 
 
 def xray(view: TaskView, state: HudState) -> HudState:  # noqa: ARG001 - the interface of options
-    """Show all markers, dimmed, through walls."""
+    """Show all markers through walls, where they appear dimmed."""
     return replace(state, markers=tuple(replace(marker, x_ray=True) for marker in state.markers))
 
 
@@ -100,12 +100,10 @@ def _without_breadcrumbs(state: HudState) -> tuple[Marker, ...]:
 
 
 def _floor_positions(state: HudState, role: str) -> tuple[Vec2, ...]:
-    """Floor positions of the markers of a role, m, in drawing order without duplicates."""
     return tuple(dict.fromkeys(marker.position[:2] for marker in state.markers if marker.role == role))
 
 
 def _steps(view: TaskView, state: HudState) -> list[TaskStep]:
-    """Return the step of each row: the planned step, or the next possible step with the row's object."""
     if any(item.number is not None for item in state.checklist):
         return [*view.steps_done, *view.plan]
     return [TaskStep("place" if o.status == "carried" else "pick", o.name) for o in random_order(view)]

@@ -1,4 +1,4 @@
-"""Drawing of the HUD, and of captions, over frames."""
+"""Draw the HUD, or captions, over frames."""
 
 import dataclasses
 import functools
@@ -26,8 +26,8 @@ class Compositor:
     """Draws HUD states over frames. A panel is drawn again only if its content has changed.
 
     Args:
-        pictures: RGBA pictures by key, uint8 (s, s, 4), straight alpha. Only the floor plan need not be square. They
-            must not change.
+        pictures: RGBA pictures by key, as uint8 of shape (s, s, 4) with straight alpha. Only the floor plan may have
+            another shape. The pictures must not change.
         texts: Words of the HUD.
 
     Raises:
@@ -48,10 +48,10 @@ class Compositor:
         self._patches: dict[str, tuple[object, Patch]] = {}
 
     def compose(self, frame: NDArray[np.uint8], state: HudState) -> NDArray[np.uint8]:
-        """Return a copy of a frame with the HUD drawn over it. Markers are left to the renderer.
+        """Return a copy of a frame with the HUD drawn over it. The renderer, not this method, draws the markers.
 
         Args:
-            frame: RGB, uint8, shape (H, W, 3), at least 320 x 240.
+            frame: RGB image as uint8 of shape (H, W, 3), at least 320 pixels wide and 240 high.
             state: HUD state to draw.
 
         Raises:
@@ -75,7 +75,7 @@ class Compositor:
         return out
 
     def layout(self, state: HudState, width: int, height: int) -> Layout:
-        """Return the layout of the panels of `state` in a frame of `width` x `height` px."""
+        """Return the layout of a HUD state's panels in a frame of the given size in pixels."""
         unit = unit_of(width, height)
         if self._stencils.unit != unit:
             self._stencils = Stencils(self._stencils.pictures, unit)
@@ -99,7 +99,10 @@ class Compositor:
 def compose(
     frame: NDArray[np.uint8], state: HudState, pictures: Pictures, texts: HudTexts
 ) -> NDArray[np.uint8]:
-    """Draw the HUD over one frame. Arguments and errors are those of `Compositor`, which is faster for many frames."""
+    """Draw the HUD over one frame. For many frames, use a `Compositor`, which is faster.
+
+    Raises FrameError if the frame or a picture has the wrong shape or type, or the frame is too small.
+    """
     return Compositor(pictures, texts).compose(frame, state)
 
 
@@ -120,7 +123,6 @@ def _without_motion(state: HudState) -> HudState:
 
 
 def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tuple[Any, ...]]:
-    """Return the drawing function of each panel and its arguments after `stencils` and `rect`."""
     hidden = panels.hidden_text(layout.first, len(state.checklist) - layout.stop, texts)
     header = (state.checklist_title, panels.count_text(state.checklist, texts))
     bins = state.bins[: len(layout.bin_rows)]
@@ -156,7 +158,7 @@ def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tup
 
 
 class Captions:
-    """Draws captions of a title and a line of detail at the bottom of frames of one size, px."""
+    """Draws captions of a title and a line of detail at the bottom of frames of a fixed size in pixels."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = (width, height)
@@ -164,7 +166,7 @@ class Captions:
         self._patch = functools.lru_cache(64)(self._draw)
 
     def over(self, frame: NDArray[np.uint8], title: str, detail: str = "") -> NDArray[np.uint8]:
-        """Return a copy of an RGB frame, uint8, shape (height, width, 3), with a caption."""
+        """Return a copy of an RGB frame, as uint8 of shape (height, width, 3), with a caption."""
         width, height = self._size
         if frame.shape != (height, width, 3):
             raise FrameError(f"frame must be of shape {(height, width, 3)}, got {frame.shape}")

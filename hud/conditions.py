@@ -1,4 +1,4 @@
-"""Assistance conditions and their options, by name."""
+"""Registry of assistance conditions and their options."""
 
 import functools
 import pkgutil
@@ -20,7 +20,7 @@ OPTIONS = ("bins", "minimap", "pin", "pointer", "regret", "reroute", "rims", "xr
 
 
 def condition(name: str) -> Condition:
-    """Return a condition by name, or by `package.module:attribute`, with the options that follow after hyphens.
+    """Return a condition by its name or `package.module:attribute`. Options may follow the name after hyphens.
 
     Raises:
         ConditionError: There is no such condition or option, or it cannot be loaded.
@@ -54,7 +54,7 @@ def _without_options(name: str) -> Condition:
         raise ConditionError(f"no assistance condition {name!r}; available: {_available()}")
     try:
         found = pkgutil.resolve_name(name)
-    except (Exception, SystemExit) as error:  # user code may raise anything on import
+    except (Exception, SystemExit) as error:  # user code may raise any exception on import
         raise ConditionError(
             f"cannot load condition {name!r} ({type(error).__name__}: {error}); modules are searched for in the "
             f"current folder and among those installed; available: {_available()}"

@@ -1,4 +1,4 @@
-"""Errors of the HUD."""
+"""Exceptions of the HUD."""
 
 
 class HudError(Exception):
@@ -10,7 +10,7 @@ class ConditionError(HudError):
 
 
 class TaskViewError(HudError):
-    """A task view names an object or receptacle that it does not contain."""
+    """A task view refers to an object or receptacle that it does not contain."""
 
 
 class FrameError(HudError):

@@ -23,7 +23,7 @@ CONTEXT_ROWS = 2  # rows that stay visible above the current one
 
 @dataclass(frozen=True)
 class ListRow:
-    """Layout of a list row: its height and the width of its text, px, and its detail broken into lines."""
+    """Layout of a list row: its height, the width of its text, and its detail broken into lines."""
 
     height: int
     text_width: int
@@ -32,13 +32,13 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rectangles of the panels in a frame, px, and the rows and lines that they show."""
+    """Rectangles of the panels in a frame, and the rows and lines that they show."""
 
     panels: Mapping[str, Rect]  # visible panels by name, in drawing order
-    free: Rect  # area between the panels
+    free: Rect  # free view between the panels
     first: int  # index of the first visible row of the task list
     rows: tuple[ListRow, ...]  # visible rows of the task list
-    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, beginning with the first bin
+    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, which starts with the first bin
     message_lines: tuple[str, ...]  # message broken into lines
 
     @property
@@ -48,7 +48,7 @@ class Layout:
 
 
 def unit_of(width: int, height: int) -> float:
-    """Return the largest scale, frame px per theme px, at which 640 x 480 theme px fit into the frame."""
+    """Return the largest scale, in frame pixels per theme pixel, at which 640 x 480 theme pixels fit into a frame."""
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
@@ -58,16 +58,19 @@ def unit_of(width: int, height: int) -> float:
 
 
 def margins(width: int, height: int) -> tuple[int, int, int, int]:
-    """Return the margins around a picture (above, below, left, right; px) that hold all panels except long messages."""
+    """Return the margins above, below, left and right of a picture that leave space for all panels, in pixels.
+
+    Only long messages may extend into the picture.
+    """
     chips = theme.MARGIN + theme.CHIP_HEIGHT + theme.GAP
     left, right = 2 * theme.MARGIN + theme.MAX_LIST_WIDTH, 2 * theme.MARGIN + theme.BINS_WIDTH_WIDE
     hands = theme.GAP + theme.SLOT_HEIGHT + theme.MARGIN
-    unit = min(width / (640.0 - left - right), height / (480.0 - chips - hands))  # `unit_of` the whole frame
+    unit = min(width / (640.0 - left - right), height / (480.0 - chips - hands))
     return round(chips * unit), round(hands * unit), round(left * unit), round(right * unit)
 
 
 def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
-    """Lay out the panels of `state`, except its pointer, in a frame of `width` x `height` px."""
+    """Lay out all panels of a HUD state except its pointer."""
     grid = _PanelGrid(width, height, typeface)
     checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
@@ -88,9 +91,9 @@ def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Lay
 
 
 def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
-    """Return a square of `side` px at the edge of the free view.
+    """Return a square with the given side at the edge of the free view.
 
-    The angle, rad, is counter-clockwise from the right.
+    The angle is in radians, counter-clockwise from the right.
     """
     half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
     dx, dy = math.cos(angle), -math.sin(angle)
@@ -103,9 +106,9 @@ def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
 
 
 def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
-    """Return the index of the first visible row and the index after the last one.
+    """Return the index of the first visible row, and the index after the last one.
 
-    The current row and up to two rows before it are visible, then as many rows as fit into `room` px.
+    The current row and up to two rows before it are visible, then as many rows as fit into `room` pixels.
     """
     first, stop, used = current, current + 1, heights[current]
     while first > max(0, current - CONTEXT_ROWS) and used + heights[first - 1] <= room // 2:
@@ -121,7 +124,7 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
 
 
 def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
-    """Return the visible rows as in `visible_rows`, scrolled to row `first` or as far as the list allows."""
+    """Return the range of visible rows after scrolling to row `first`, or as far as the list allows."""
     ends = np.cumsum(heights)
     last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
     first = min(max(first, 0), last_first, len(heights) - 1)
@@ -130,7 +133,6 @@ def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
 
 
 def _current_row(items: Sequence[ChecklistItem]) -> int:
-    """Return the index of the current row. Without one, return the last row of a plan or the first row of a list."""
     last = len(items) - 1 if items[-1].number is not None else 0
     return next((i for i, item in enumerate(items) if item.current), last)
 
@@ -191,7 +193,6 @@ class _PanelGrid:
     def bins(
         self, entries: tuple[BinEntry, ...], below: Rect | None
     ) -> tuple[Rect | None, tuple[ListRow, ...]]:
-        """Return the rectangle of the list of bins and its rows. Places get fewer lines if many bins must fit."""
         if not entries:
             return None, ()
         px = self._px
@@ -225,7 +226,7 @@ class _PanelGrid:
         )
 
     def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
-        """Return the message bar and its lines. A text too long for one line between the chips gets up to three."""
+        """Lay out the message bar. A message too long for one line between the chips gets up to three lines."""
         if message is None or message.opacity <= 0.0 or not message.text.strip():
             return None, ()
         face, extra = theme.BAR, self._px(theme.MESSAGE_ICON + 2 * theme.PADDING)
@@ -245,5 +246,4 @@ class _PanelGrid:
         return Rect(self._left, top, self._between, inventory.y - self._gap - top)
 
     def _centred(self, width: int, left: int, span: int) -> int:
-        """Return the left edge of an element of `width` px: centred, but kept within `span` px from `left`."""
         return min(max((self._width - width) // 2, left), left + span - width)

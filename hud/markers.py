@@ -1,4 +1,4 @@
-"""Virtual objects that conditions place in the world: breadcrumbs, flagpoles and pins (PAPER section 5)."""
+"""Virtual objects in the world: breadcrumbs, flagpoles and pins (PAPER section 5)."""
 
 import functools
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
-CHEST = 0.75  # height of the breadcrumbs at the person's end of the path, as a share of the eye height
-BREADCRUMB_RADIUS = 0.04  # radius, m; appears 7 px wide at 5 m in a 480 px frame
-BREADCRUMB_SPACING = 0.28  # m along the floor path
+CHEST = 0.75  # height of the first breadcrumb, relative to the eye height
+BREADCRUMB_RADIUS = 0.04  # in metres; 7 pixels wide in a frame of 480 rows at a distance of 5 m
+BREADCRUMB_SPACING = 0.28  # distance between breadcrumbs along the floor path, in metres
 
-RIM_RADIUS = 1.3  # radius of the white rim, in radii of the breadcrumb
+RIM_RADIUS = 1.3  # radius of the white rim, relative to that of the breadcrumb
 
 # Roles of markers.
 BREADCRUMB = "breadcrumb"
@@ -29,9 +29,9 @@ SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
 def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float = 0.0) -> tuple[Marker, ...]:
-    """Make spheres along a floor path (k, 2), m, from chest height down to the floor at its end (PAPER section 5).
+    """Return spheres along a floor path, descending from chest height to the floor at its end (PAPER section 5).
 
-    Their spacing is counted from the end of the path. The first `clearance` m of the path stay empty.
+    They are spaced from the end of the path, of shape (k, 2) in metres. The first `clearance` metres have none.
     """
     chest = CHEST * eye_height
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -55,20 +55,20 @@ def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float =
 
 
 def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
-    """Make a white disc around each breadcrumb, for people who cannot tell red from a brown floor."""
+    """Return a white disc for each breadcrumb, for participants who cannot distinguish red from a brown floor."""
     return tuple(
         Marker("cylinder", crumb.position, (RIM_RADIUS * crumb.size[0], 0.003, 0.0), WHITE, RIM, crumb.x_ray)
         for crumb in crumbs
     )
 
 
-@functools.lru_cache(maxsize=1024)  # most objects do not move between two states
+@functools.lru_cache(maxsize=1024)  # most objects stay in place between two states
 def flagpole(
     position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
 ) -> tuple[Marker, ...]:
-    """Make a banded pole with a flag, 1.2 m tall, over an object.
+    """Return a banded pole with a flag, 1.2 m tall, over an object.
 
-    A low one has half the height and no flag. An x-ray one also shows, dimmed, through walls.
+    If `low`, it has half the height and no flag. If `x_ray`, it is also visible through walls, where it appears dimmed.
     """
     x, y, z = position
     foot, top = z + 0.25, z + (0.85 if low else 1.45)
@@ -88,21 +88,21 @@ def flagpole(
 
 
 def flagpoles(state: HudState) -> dict[str, Vec2]:
-    """Return the floor position of each flagpole, m, by object name, in the order shown.
+    """Return the floor position of each flagpole in metres, by object name.
 
-    Simulated participants see flagpoles only through this function, so they see what the picture shows.
+    Simulated participants perceive flagpoles only through this function, so they use what the picture shows.
     """
     return {
         marker.object: marker.position[:2]
         for marker in state.markers
         if marker.role == FLAGPOLE
         and marker.object is not None
-        and marker.shape != "box"  # skips the flag, which is beside the pole
+        and marker.shape != "box"  # skip the flag, which is next to the pole
     }
 
 
 def pin(position: Vec3, role: str = GOAL) -> tuple[Marker, ...]:
-    """Make a pin over a goal or a bin, and a disc around its foot."""
+    """Return a pin over a goal or a bin, with a disc around its foot."""
     x, y, z = position
     return (
         Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), role),

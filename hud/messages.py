@@ -1,4 +1,4 @@
-"""Messages of the message bar (PAPER section 3.2)."""
+"""Texts of the message bar (PAPER section 3.2)."""
 
 from types import MappingProxyType
 from typing import Final
@@ -8,8 +8,8 @@ from hud.lists import in_sentence
 from hud.state import Message, MessageKind
 from hud.texts import HudTexts, filled
 
-SHOWN = 3.5  # duration of full opacity, s
-FADE = 0.5  # duration of the fade-out after that, s
+SHOWN = 3.5  # time at full opacity, in seconds
+FADE = 0.5  # duration of the fade-out, in seconds
 
 _OK, _NO, _INFO = MessageKind.SUCCESS, MessageKind.REFUSAL, MessageKind.INFO
 
@@ -49,9 +49,9 @@ def message(
     receptacle: str | None = None,
     opacity: float = 1.0,
 ) -> Message:
-    """Make the message for an event or a refusal, such as "picked" or "hands_full".
+    """Return the message for an event ("picked") or a refusal ("hands_full").
 
-    `object` and `receptacle` are labels. Raises MessageError if there is no such message.
+    `object` and `receptacle` are labels. Raises MessageError if the key is unknown.
     """
     if key not in KINDS:
         raise MessageError(f"no message {key!r}; there are {', '.join(KINDS)}")
@@ -66,5 +66,5 @@ def message(
 
 
 def fade(age: float) -> float:
-    """Return the opacity of a message of `age` s: 1 for `SHOWN` s, then falling linearly to 0 within `FADE` s."""
+    """Return the opacity of a message by its age in seconds: 1 for `SHOWN`, then linearly to 0 within `FADE`."""
     return min(1.0, max(0.0, (SHOWN + FADE - age) / FADE))

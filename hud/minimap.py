@@ -1,4 +1,4 @@
-"""Drawing of the mini-map: a fixed base, and a stamp for everything that moves."""
+"""Draw the mini-map: a fixed base, and a stamp for everything that moves."""
 
 import math
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ PICTURE_OPACITY = 0.8
 PATH: Rgb = (213, 94, 0)
 OBJECT: Rgb = (230, 159, 0)
 GOAL: Rgb = (86, 180, 233)
-HEADING_STEPS = 72  # number of drawn directions, 5 degrees apart
+HEADING_STEPS = 72  # number of directions of the person's arrow, 5 degrees apart
 
 Kind = Literal["path", "object", "goal", "person"]
-# Discs of each mark from the largest to the smallest: radius, theme px, and colour.
+# Radius in theme pixels and colour of each mark's discs, largest first.
 DISCS: dict[Kind, tuple[tuple[float, Rgb], ...]] = {
     "path": ((1.8, PATH),),
     "object": ((3.4, theme.PANEL), (2.5, OBJECT)),
     "goal": ((5.0, theme.PANEL), (4.0, GOAL), (1.6, theme.PANEL)),
     "person": (),
 }
-HALF_SIZES: dict[Kind, float] = {"path": 2.0, "object": 4.0, "goal": 6.0, "person": 10.0}  # theme px
+HALF_SIZES: dict[Kind, float] = {"path": 2.0, "object": 4.0, "goal": 6.0, "person": 10.0}  # in theme pixels
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A stamp on the map: its kind, its direction of `HEADING_STEPS`, and its upper left corner in the frame, px."""
+    """A stamp on the map. `step` is its direction index, and `x`, `y` are its upper left corner in the frame."""
 
     kind: Kind
     step: int
@@ -43,7 +43,6 @@ class Mark:
 def draw_base(
     stencils: Stencils, rect: Rect, picture_key: str, bounds: tuple[float, float, float, float]
 ) -> Patch:
-    """Draw the panel with the house in muted colours."""
     canvas = Canvas.panel(stencils, rect)
     area, _ = _map_area(bounds, rect, stencils.unit)
     picture = stencils.pictures.get(picture_key)
@@ -57,7 +56,7 @@ def draw_base(
 
 
 def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
-    """Return the marks of a map in drawing order, each inside `rect`."""
+    """Return the marks of a map in drawing order. All are inside `rect`."""
     area, scale = _map_area(minimap.bounds, rect, unit)
     step = round(minimap.heading / (2.0 * math.pi) * HEADING_STEPS) % HEADING_STEPS
     wanted: list[tuple[Kind, int, Vec2]] = [("path", 0, point) for point in minimap.path]
@@ -77,7 +76,7 @@ def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
 
 
 def draw_mark(stencils: Stencils, kind: Kind, step: int) -> Patch:
-    """Draw a mark. `step` is its direction, 0 to `HEADING_STEPS` - 1, counter-clockwise from the right."""
+    """Draw a mark. `step` is its direction index, from 0 to `HEADING_STEPS` - 1, counter-clockwise from the right."""
     half = math.ceil(HALF_SIZES[kind] * stencils.unit)
     canvas = Canvas(stencils, 2 * half + 1, 2 * half + 1)
     centre = half + 0.5
@@ -91,7 +90,6 @@ def draw_mark(stencils: Stencils, kind: Kind, step: int) -> Patch:
 
 
 def _map_area(bounds: tuple[float, float, float, float], panel: Rect, unit: float) -> tuple[Rect, float]:
-    """Return the area of the house in a panel, px, and its scale, px per metre."""
     xmin, ymin, xmax, ymax = bounds
     inset = round(theme.MAP_INSET * unit)
     room = Rect(inset, inset, max(1, panel.width - 2 * inset), max(1, panel.height - 2 * inset))

@@ -1,4 +1,4 @@
-"""Pinhole projection of the eye camera, and the pointer to a goal out of view."""
+"""Pinhole projection of the eye camera, and pointers to goals outside the view."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from hud.errors import FrameError
 from hud.state import Pointer, Vec3
 
 _IDENTITY, _ROUNDING = np.eye(3), 1e-6
-NEAR = 1e-6  # depth below which points count as behind the eye, m
+NEAR = 1e-6  # depth below which points count as behind the eye, in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,15 +18,15 @@ class CameraView:
     """A pinhole camera with square pixels and its principal point at the image centre.
 
     Raises:
-        FrameError: A shape or a number is not valid.
+        FrameError: A shape or a number is invalid.
     """
 
-    position: NDArray[np.float64]  # eye, m, (3,)
-    # columns right, up and backward (the camera looks along minus the third), (3, 3)
+    position: NDArray[np.float64]  # position of the eye in metres, shape (3,)
+    # the columns point right, up and backward, shape (3, 3)
     rotation: NDArray[np.float64]
-    fovy: float  # vertical field of view, rad
-    width: int  # image width, px
-    height: int  # image height, px
+    fovy: float  # vertical field of view in radians
+    width: int  # image width in pixels
+    height: int  # image height in pixels
 
     def __post_init__(self) -> None:
         if np.shape(self.position) != (3,) or np.shape(self.rotation) != (3, 3):
@@ -44,19 +44,19 @@ class CameraView:
 
     @property
     def focal(self) -> float:
-        """Focal length, px."""
+        """Focal length in pixels."""
         return self.height / 2.0 / math.tan(self.fovy / 2.0)
 
     def to_eye(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Transform points (..., 3), m, from the house frame to the eye frame (right, up, forward)."""
+        """Transform points of shape (..., 3) in metres from the house frame to the eye frame (right, up, forward)."""
         local = (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation
         return np.asarray(local * np.array([1.0, 1.0, -1.0]), dtype=np.float64)
 
 
 def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the pixels (n, 2) of points (n, 3), m, and their depths, m, (n,). Pixels of points behind the eye are NaN.
+    """Return the pixels (n, 2) and the depths (n,) in metres of points (n, 3). Pixels of points behind the eye are NaN.
 
-    x points right and y down. The image spans 0..width and 0..height.
+    x points right and y down. The image spans 0 to `width` and 0 to `height`.
     """
     local = camera.to_eye(np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)))
     depth = local[:, 2]
@@ -70,23 +70,23 @@ def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64],
 
 
 def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
-    """Return True if a point is in the image, at least `margin` times the image height from its edge."""
+    """Return True if a point is in the image and at least `margin` times the image height from its edge."""
     pixels, _ = project(camera, [point])
     x, y = pixels[0]
     inset = margin * camera.height
-    # Points behind the eye have NaN pixels, which compare false.
+    # Points behind the eye have NaN pixels, with which all comparisons are false.
     return bool(inset <= x <= camera.width - inset and inset <= y <= camera.height - inset)
 
 
 def pointer_to(camera: CameraView, target: Vec3, margin: float = 0.02) -> Pointer | None:
-    """Return a pointer to a target, m, or None if the target is in view.
+    """Return a pointer to a target, or None if the target is in view.
 
-    In view means at least `margin` times the image height from the edge of the image.
+    A target is in view if it is at least `margin` times the image height from the edge of the image.
     """
     if in_view(camera, target, margin):
         return None
     right, up, forward = (float(v) for v in camera.to_eye(target))
     if forward <= 0.0:
-        # The target is behind the person, who has to turn left or right.
+        # The target is behind the person, so the pointer shows in which direction to turn.
         return Pointer(angle=0.0 if right >= 0.0 else math.pi)
     return Pointer(angle=math.atan2(up, right))

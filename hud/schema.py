@@ -1,7 +1,4 @@
-"""HUD states as JSON, and their JSON schema.
-
-Both are derived from the annotations of the value types.
-"""
+"""HUD states as JSON, and their JSON schema, both derived from annotations."""
 
 import dataclasses
 import enum
@@ -19,7 +16,7 @@ LARGEST = 1e6  # largest allowed coordinate, size or time
 
 
 def to_dict(state: HudState) -> dict[str, Any]:
-    """Convert a HUD state to plain JSON values."""
+    """Convert a HUD state to values that JSON can represent."""
     plain: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(dataclasses.asdict(state)))
     return plain
 
@@ -28,7 +25,7 @@ def from_dict(raw: object) -> HudState:
     """Convert the result of `to_dict` back to a HUD state.
 
     Raises:
-        SchemaError: A field is missing, unknown or of the wrong type. The message contains its path.
+        SchemaError: A field is missing, unknown or of the wrong type. The message contains the field's path.
     """
     try:
         state = msgspec.convert(raw, HudState)
@@ -39,9 +36,9 @@ def from_dict(raw: object) -> HudState:
 
 
 def check_state(state: object) -> None:
-    """Check that the result of a condition is a HUD state that can be drawn and sent, including values in its fields.
+    """Check that a condition returned a HUD state whose values can be drawn and sent.
 
-    Raises SchemaError with the path of the faulty value.
+    Raises SchemaError with the path of the invalid value.
     """
     if not isinstance(state, HudState):
         kind = "None" if state is None else f"a value of type {type(state).__name__}"
@@ -53,7 +50,6 @@ def check_state(state: object) -> None:
 
 
 def _plain(value: Any, where: str) -> Any:
-    """Convert dataclasses to dictionaries and sequences to lists. Reject numbers and texts that cannot be shown."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {
             f.name: _plain(getattr(value, f.name), f"{where}.{f.name}") for f in dataclasses.fields(value)
@@ -73,7 +69,7 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON schema of `to_dict`'s result. All fields are required, and no others are allowed."""
+    """Return the JSON schema of the result of `to_dict`. It requires all fields and allows no others."""
     schema = msgspec.json.schema(HudState)
     for definition in schema["$defs"].values():
         if "properties" in definition:
@@ -84,7 +80,6 @@ def json_schema() -> dict[str, Any]:
 
 
 def _check_fields(raw: Any, written: Any, where: str) -> None:
-    """Raise a SchemaError if a field is unknown, or is missing although it has a default."""
     if isinstance(written, dict):
         if set(raw) != set(written):
             raise SchemaError(
@@ -98,7 +93,7 @@ def _check_fields(raw: Any, written: Any, where: str) -> None:
 
 
 def _expected(error: str) -> str:
-    """Return a hint about the value that msgspec's `error` names by its path (`$.markers[0].shape`)."""
+    """Return a hint about the value whose path is in an error of msgspec (`$.markers[0].shape`)."""
     definitions = json_schema()["$defs"]
     node = definitions["HudState"]
     for name in re.findall(r"\.(\w+)", error.rpartition(" at `")[2]):

@@ -1,4 +1,4 @@
-"""`HudState`: everything that the person is shown, as one value."""
+"""`HudState`: everything that the HUD shows, as one value."""
 
 import enum
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
 Shape = Literal["sphere", "cylinder", "box"]
-FLOORPLAN = "floorplan"  # key of the picture of the house from above
+FLOORPLAN = "floorplan"  # key of the picture that shows the house from above
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,13 @@ class Marker:
     """A virtual object in the world.
 
     Attributes:
-        shape: `sphere` (size[0] is the radius), `cylinder` (upright; size[0] is the radius, size[1] half the length) or
+        shape: `sphere` (size[0] is the radius), upright `cylinder` (size[0] is the radius, size[1] half the length) or
             `box` (half sizes).
-        position: Centre in the house frame, m.
-        size: Sizes, m. Their meaning depends on the shape.
-        rgba: Colour, components in 0..1.
+        position: Centre in the house frame, in metres.
+        size: Sizes in metres. Their meaning depends on the shape.
+        rgba: Colour, with components from 0 to 1.
         role: Purpose: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal` or `bin`.
-        x_ray: True if the marker also shows, dimmed, through walls.
+        x_ray: True if the marker is also visible through walls, where it appears dimmed.
         object: Instance name of the object below the marker, or None.
         outlined: True if a sphere has a dark outline.
     """
@@ -38,7 +38,7 @@ class Marker:
 
 
 class MessageKind(enum.Enum):
-    """Kind of a message. It determines colour and symbol."""
+    """Type of a message, which determines its colour and symbol."""
 
     INFO = "info"
     SUCCESS = "success"
@@ -47,7 +47,7 @@ class MessageKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Message:
-    """Text of the message bar, with its present opacity: 1 opaque, 0 gone."""
+    """A message with its current opacity, from 0 (invisible) to 1."""
 
     text: str
     kind: MessageKind
@@ -60,13 +60,13 @@ class ChecklistItem:
 
     Attributes:
         text: Label of the object ("Blue mug").
-        detail: Second line, broken at its line break if it is too long ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
+        detail: Second line, split at its line break if too long ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
         picture: Key of the object's picture, or None.
         target_picture: Key of the receptacle's picture, or None.
         number: Step number, or None in a list without an order.
         done: True if the row is crossed out.
-        current: True for the step to do now.
-        carried: True if the object is in a hand. Such a row is crossed out in frames; the browser page marks it.
+        current: True for the step to do next.
+        carried: True if the object is in a hand. Frames cross out such a row, and the browser page marks it.
     """
 
     text: str
@@ -81,7 +81,7 @@ class ChecklistItem:
 
 @dataclass(frozen=True)
 class BinEntry:
-    """A receptacle in the list of bins. `place` is broken at its line break if it is too long for one line."""
+    """A receptacle in the list of bins. `place` is broken at its line break if it does not fit on one line."""
 
     label: str
     place: str
@@ -90,7 +90,7 @@ class BinEntry:
 
 @dataclass(frozen=True)
 class InventorySlot:
-    """Contents of a hand. Both fields are None if it is empty."""
+    """Contents of a hand. Both fields are None if the hand is empty."""
 
     label: str | None = None
     picture: str | None = None
@@ -98,10 +98,10 @@ class InventorySlot:
 
 @dataclass(frozen=True)
 class Pointer:
-    """An arrow at the edge of the view towards a goal that is out of view.
+    """An arrow at the edge of the view towards a goal outside it.
 
     Attributes:
-        angle: Direction on the screen, rad, 0 to the right, counter-clockwise (pi/2 is up).
+        angle: Direction on the screen in radians, counter-clockwise from the right (pi/2 is up).
     """
 
     angle: float
@@ -109,16 +109,16 @@ class Pointer:
 
 @dataclass(frozen=True)
 class MiniMap:
-    """The house from above with north (+y) up.
+    """A map of the house with north (+y) up.
 
     Attributes:
         picture: Key of the picture that shows the house within `bounds`.
-        bounds: xmin, ymin, xmax, ymax, m.
-        position: Position of the person, m.
-        heading: Heading of the person, rad, 0 along +x, counter-clockwise.
-        path: Points along the path to the goal, m.
-        objects: Floor positions of the objects that have a flagpole, m.
-        goal: End of the path, m, or None.
+        bounds: (xmin, ymin, xmax, ymax) in metres.
+        position: Position of the person in metres.
+        heading: Heading of the person in radians, counter-clockwise from +x.
+        path: Points on the path to the goal, in metres.
+        objects: Floor positions in metres of the objects with a flagpole.
+        goal: End of the path in metres, or None.
     """
 
     picture: str
@@ -132,22 +132,22 @@ class MiniMap:
 
 @dataclass(frozen=True)
 class HudState:
-    """Everything that is shown.
+    """Everything that the HUD shows.
 
     Attributes:
         checklist_title: Heading of the task list ("Objects to find", "Your plan").
-        checklist: Rows, in the order shown.
-        bins: The list of receptacles.
-        inventory: Left and right hand. The left one is None for a person who carries one object at most.
-        message: Message bar, or None.
+        checklist: Rows of the task list, from top to bottom.
+        bins: Rows of the list of bins.
+        inventory: Contents of the left and the right hand. The left one is None if the capacity is one.
+        message: Content of the message bar, or None.
         markers: Virtual objects in the world.
         rerouted: True if the breadcrumbs start at the person and are replaced when the person leaves them.
         delivered: Number of objects in their receptacles.
         total: Number of all objects.
-        clock: Elapsed task time, s, or None to show no clock.
-        pointer: Arrow towards a goal out of view, or None.
-        minimap: The house from above, or None.
-        scroll: Number of rows by which the person has scrolled the task list, positive towards its end.
+        clock: Elapsed task time in seconds, or None to show no clock.
+        pointer: Arrow towards a goal outside the view, or None.
+        minimap: Map of the house, or None.
+        scroll: Number of rows by which the participant has scrolled down the task list.
     """
 
     checklist_title: str

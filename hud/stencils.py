@@ -1,6 +1,6 @@
-"""Caches of the masks and pictures that panels are drawn with.
+"""Caches of masks and scaled pictures, which take most of the drawing time.
 
-Making them takes most of the time of drawing. They depend only on their arguments, so caching changes no pixel.
+They depend only on their arguments, so the caches do not change the result.
 """
 
 import functools
@@ -20,7 +20,7 @@ Pictures = Mapping[str, NDArray[np.uint8]]
 
 
 class Stencil(NamedTuple):
-    """Coverage, 0 to 1, shape (h, w), and its upper left corner relative to an origin, px."""
+    """Coverage from 0 to 1, shape (h, w), and its upper left corner relative to an origin, in pixels."""
 
     mask: Floats
     x: int
@@ -28,14 +28,14 @@ class Stencil(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """A scaled picture: colours times opacity, 0 to 1, shape (3, s, s), and opacity, 0 to 1, shape (s, s)."""
+    """A scaled picture: colours times opacity, shape (3, s, s), and opacity, shape (s, s). Both are from 0 to 1."""
 
     colours: Floats
     opacity: Floats
 
 
 class Stencils:
-    """Masks of text and scaled pictures, uint8 RGBA (s, s, 4), straight alpha, at `unit` frame px per theme px."""
+    """Masks of text and scaled pictures, with `unit` frame pixels per theme pixel."""
 
     def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures
@@ -45,7 +45,6 @@ class Stencils:
         self.scaled = functools.lru_cache(128)(self._scaled)
 
     def _text(self, text: str, face: Face) -> Stencil:
-        """Return the mask of a line of text. Its origin is the start of the baseline."""
         mask, baseline = self.typeface.rasterise(text, face)
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not len(rows):
@@ -67,7 +66,7 @@ class Stencils:
 
 @functools.lru_cache(64)
 def rounded(width: int, height: int, radius: float, line: float) -> Floats:
-    """Return the coverage (height, width) of a rounded rectangle, or of its outline if `line` > 0, px."""
+    """Return the coverage of a rounded rectangle, or of its outline if `line` > 0, shape (height, width)."""
     ys, xs = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
     dx = np.abs(xs - width / 2) - (width / 2 - radius)
     dy = np.abs(ys - height / 2) - (height / 2 - radius)
@@ -80,7 +79,7 @@ def rounded(width: int, height: int, radius: float, line: float) -> Floats:
 
 @functools.lru_cache(64)
 def disc(x: float, y: float, radius: float) -> Stencil:
-    """Return the coverage of a disc with smooth edges, centred at column `x` and row `y`, px."""
+    """Return the coverage of a disc with smooth edges. The centre is at column `x` and row `y`."""
     left, top, side = math.floor(x - radius) - 1, math.floor(y - radius) - 1, math.ceil(2 * radius) + 3
     ys, xs = np.mgrid[0:side, 0:side].astype(np.float32) + np.float32(0.5)
     distance = np.hypot(xs + left - x, ys + top - y)

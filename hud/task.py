@@ -1,4 +1,4 @@
-"""`TaskView`: the state of the task as an assistance condition sees it."""
+"""`TaskView`: the state of the task that an assistance condition receives."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,19 +18,19 @@ _Value = TypeVar("_Value")
 
 
 class TaskStep(NamedTuple):
-    """A step of the task: to pick an object up, or to place it into its receptacle."""
+    """A step of the task: picking up an object, or placing it into its receptacle."""
 
     kind: StepKind
     object: str
 
 
 class Alternative(NamedTuple):
-    """A step that is possible next, with its regret.
+    """A possible next step, with its regret.
 
     Attributes:
         kind: `pick` or `place`.
-        object: Instance name.
-        extra: Regret: extra length of the rest of the task compared with the best next step, m.
+        object: Instance name of the object.
+        extra: Regret in metres: how much longer the remaining tour is than with the best next step.
         at_least: True if `extra` is only a lower bound.
     """
 
@@ -46,13 +46,13 @@ class TaskObject:
 
     Attributes:
         name: Instance name, unique in the task.
-        label: Name shown to people ("Blue mug").
-        picture: Key of its picture.
-        category: Category key.
-        room: Label of its present room.
-        position: Present position in the house frame, m.
+        label: Displayed name ("Blue mug").
+        picture: Key of the object's picture, or None.
+        category: Key of the object's category.
+        room: Label of the room in which the object is.
+        position: Current position in the house frame, in metres.
         status: `loose`, `carried` or `delivered`.
-        receptacle: Key of its receptacle.
+        receptacle: Key of the object's receptacle.
     """
 
     name: str
@@ -67,7 +67,7 @@ class TaskObject:
 
 @dataclass(frozen=True)
 class TaskReceptacle:
-    """A receptacle: `place` is a phrase ("on the counter, beside the sink"), `room` the room's label."""
+    """A receptacle. `place` is a phrase ("on the counter, beside the sink"), and `room` is the label of its room."""
 
     key: str
     label: str
@@ -78,32 +78,32 @@ class TaskReceptacle:
 
 
 class PlanAhead(Protocol):
-    """The planner's suggestion. Its properties may be computed at the first access."""
+    """The planner's suggestion. Properties may be computed when they are first read."""
 
     @property
     def steps(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order, the next one first. Empty without a planner."""
+        """Remaining steps in planned order. Empty without a planner."""
         ...
 
     @property
     def segment(self) -> NDArray[np.float64] | None:
-        """See `TaskView.segment`."""
+        """The path that `TaskView.segment` returns."""
         ...
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """See `TaskView.path`."""
+        """The path that `TaskView.path` returns."""
         ...
 
     @property
     def goal(self) -> Vec3 | None:
-        """Position of the next step, m."""
+        """Position of the next step in metres, or None."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class KnownPlan:
-    """A `PlanAhead` with fixed values."""
+    """A plan with fixed values."""
 
     steps: tuple[TaskStep, ...] = ()
     segment: NDArray[np.float64] | None = None
@@ -120,21 +120,21 @@ class TaskView:
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
         texts: Words of the HUD.
-        hands: Object names in the left and the right hand, or None.
-        capacity: Largest number of objects that can be carried.
+        hands: Names of the objects in the left and the right hand. None for an empty hand.
+        capacity: Maximum number of objects that can be carried.
         steps_done: Successful picks and places so far, in order.
         ahead: Source of `plan`, `segment`, `path` and `goal`.
-        position: Floor position of the person, m.
-        eye: Position of the eye, m.
-        eye_height: Height of the eye above the floor when the person looks straight ahead, m.
+        position: Floor position of the person in metres.
+        eye: Position of the eye in metres.
+        eye_height: Height in metres of the eye above the floor when the person looks straight ahead.
         message: Content of the message bar, or None.
-        clock: Elapsed task time to show, s, or None.
-        camera: The eye camera, which a pointer needs, or None.
-        heading: Heading of the person, rad, 0 along +x, counter-clockwise.
-        bounds: xmin, ymin, xmax, ymax of the house, m, or None without a map.
-        scroll: Number of rows by which the person has scrolled the task list, positive towards its end.
-        alternatives: Returns all steps that are possible next, or nothing until their regrets are known. Finding them
-            takes time, so only conditions that show them should call it.
+        clock: Elapsed task time in seconds, or None to show no clock.
+        camera: Eye camera, or None. The option `pointer` needs it.
+        heading: Heading of the person in radians, counter-clockwise from +x.
+        bounds: (xmin, ymin, xmax, ymax) of the house in metres, or None to show no map.
+        scroll: Number of rows by which the participant has scrolled down the task list.
+        alternatives: Function that returns all possible next steps, or an empty tuple until their regrets are known.
+            Finding regrets takes time, so only conditions that show them should call it.
 
     Raises:
         TaskViewError: A name is unknown or repeated, or `order` is not a permutation of the objects.
@@ -179,34 +179,37 @@ class TaskView:
 
     @property
     def plan(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order, the next one first. Empty without a planner."""
+        """Remaining steps in planned order. Empty without a planner."""
         self._check_steps(self.ahead.steps)
         return self.ahead.steps
 
     @property
     def segment(self) -> NDArray[np.float64] | None:
-        """Shortest floor path from the place of the last step, or the start, to the next step, m, shape (k, 2).
+        """Shortest floor path in metres from the last step (or the start) to the next step, shape (k, 2).
 
-        None if nothing is left to do.
+        None if no step is left.
         """
         return _checked_path("segment", self.ahead.segment)
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """Shortest floor path from the person to the next step, replaced when the person leaves it, m, shape (k, 2)."""
+        """Shortest floor path in metres from the person to the next step, shape (k, 2), or None.
+
+        It is replaced when the person leaves it.
+        """
         return _checked_path("path", self.ahead.path)
 
     @property
     def goal(self) -> Vec3 | None:
-        """Position of the next step's object or receptacle, m, or None."""
+        """Position of the next step's object or receptacle in metres, or None."""
         return self.ahead.goal
 
     def object(self, name: str) -> TaskObject:
-        """Return the object called `name`. Raises TaskViewError if there is none."""
+        """Return the object with this name. Raises TaskViewError if there is none."""
         return _named("object", {o.name: o for o in self.objects}, name)
 
     def receptacle(self, key: str) -> TaskReceptacle:
-        """Return the receptacle called `key`. Raises TaskViewError if there is none."""
+        """Return the receptacle with this key. Raises TaskViewError if there is none."""
         return _named("receptacle", {r.key: r for r in self.receptacles}, key)
 
     def _check_steps(self, steps: tuple[TaskStep, ...]) -> None:

@@ -1,4 +1,4 @@
-"""Measuring, shortening, wrapping and rasterizing of text with OpenCV's built-in font."""
+"""Measure, shorten, wrap and rasterize text with OpenCV's built-in font."""
 
 import functools
 import re
@@ -11,13 +11,13 @@ from hud.theme import Face
 
 ELLIPSIS = "…"
 BUILT_IN_FONT = "sans"
-_SMALL = 10  # size below which the font's spaces and decimal points are too narrow, px
+_SMALL = 10  # font size in pixels below which spaces and decimal points are too narrow
 _POINT = re.compile(r"(?<=\d)\.(?=\d)")
-_WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # a number and its unit "m" stay on one line
+_WORD = re.compile(r"\S+(?:\sm(?!\S))?")  # keeps a number and its unit "m" on one line
 
 
 class Typeface:
-    """OpenCV's built-in variable sans font at `unit` frame px per theme px."""
+    """OpenCV's built-in variable sans font, with `unit` frame pixels per theme pixel."""
 
     def __init__(self, unit: float) -> None:
         self._unit = unit
@@ -25,7 +25,7 @@ class Typeface:
         self.width = functools.lru_cache(4096)(self._width)
 
     def px(self, size: float) -> int:
-        """Convert theme px to frame px."""
+        """Convert theme pixels to frame pixels."""
         return round(size * self._unit)
 
     def _width(self, text: str, face: Face) -> int:
@@ -38,11 +38,11 @@ class Typeface:
         return int(max(width, left + width))
 
     def fit(self, text: str, face: Face, width: int) -> str:
-        """Return `text` on one line of at most `width` px, shortened with an ellipsis if necessary."""
+        """Fit text into one line of at most `width` pixels, shortened with an ellipsis if necessary."""
         line = " ".join(text.split())
         if self.width(line, face) <= width:
             return line
-        low, high = 0, len(line)  # the longest prefix that fits, by bisection
+        low, high = 0, len(line)  # bisect for the longest prefix that fits
         while low < high:
             middle = (low + high + 1) // 2
             if self.width(line[:middle].rstrip(" ,.") + ELLIPSIS, face) <= width:
@@ -52,7 +52,7 @@ class Typeface:
         return line[:low].rstrip(" ,.") + ELLIPSIS if low else ""
 
     def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """Break `text` between words into at most `lines` lines of `width` px. The last line may be shortened."""
+        """Break text between words into at most `lines` lines of `width` pixels. The last line may be shortened."""
         done: list[str] = []
         words: list[str] = _WORD.findall(text)
         while words and len(done) < lines - 1:
@@ -66,7 +66,7 @@ class Typeface:
         return tuple(done)
 
     def paragraph(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """Return `text` on one line if it fits in `width` px, else broken at its line breaks, then between words."""
+        """Fit text into one line of `width` pixels, or else break it at its line breaks and then between words."""
         whole = " ".join(text.split())
         if lines <= 1 or self.width(whole, face) <= width:
             fitted = self.fit(whole, face, width)
@@ -79,7 +79,7 @@ class Typeface:
         return tuple(broken)
 
     def rasterise(self, text: str, face: Face) -> tuple[NDArray[np.uint8], int]:
-        """Return the mask (h, w) of a line of text, 0 to 255, and the row of its baseline.
+        """Return the mask of a line of text, from 0 to 255, and the row of its baseline.
 
         The first column of the mask is empty.
         """

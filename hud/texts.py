@@ -1,4 +1,4 @@
-"""Words of the HUD in one language. The caller reads them from a file."""
+"""Words of the HUD in one language."""
 
 import re
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 @dataclass(frozen=True)
 class HudTexts:
-    """All words that are drawn.
+    """All words that the HUD draws.
 
-    `{object}` and `{receptacle}` stand for a label inside a sentence ("blue mug"), `{Object}` and `{Receptacle}` for
+    `{object}` and `{receptacle}` stand for a label within a sentence ("blue mug"), `{Object}` and `{Receptacle}` for
     the label itself ("Blue mug").
     """
 
@@ -66,5 +66,5 @@ class HudTexts:
 
 
 def filled(text: str, **values: object) -> str:
-    """Replace each `{name}` in a text by its value. Names without a value stay."""
+    """Replace each `{name}` in a text by its value. Names without a value are left as they are."""
     return _PLACE.sub(lambda place: str(values.get(place[1], place[0])), text)

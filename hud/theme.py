@@ -1,7 +1,7 @@
-"""Colours and sizes of the HUD. Colours are sRGB, 0..255. Sizes are px of a 640 x 480 frame.
+"""Colours and sizes of the HUD. Colours are sRGB from 0 to 255. Sizes are pixels of a 640 x 480 frame.
 
 The hues are from the Okabe-Ito palette, which is safe for colour-vision deficiencies. No information depends on hue
-alone: messages have symbols, done rows are crossed out, and the current row is bold.
+alone: messages have symbols, completed rows are crossed out, and the current row is bold.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from hud.state import MessageKind
 Rgb = tuple[int, int, int]
 
 PANEL: Final[Rgb] = (13, 17, 24)
-PANEL_OPACITY: Final = 0.72  # white text has a contrast of at least 4.5 : 1 over a white wall
+PANEL_OPACITY: Final = 0.72  # gives white text a contrast of at least 4.5 : 1 in front of a white wall
 EDGE: Final[Rgb] = (255, 255, 255)
 EDGE_OPACITY: Final = 0.16
 
@@ -35,7 +35,7 @@ TONES: Final = MappingProxyType(
 
 @dataclass(frozen=True)
 class Face:
-    """Font size (px at 480 px height) and weight (400 regular, 600 semibold)."""
+    """Font size in pixels at a frame height of 480, and font weight (400 regular, 600 semibold)."""
 
     size: float
     weight: int
@@ -49,16 +49,16 @@ LABEL: Final = Face(12, 600)
 BAR: Final = Face(14, 500)
 CHIP: Final = Face(14, 600)
 
-MIN_FRAME: Final = (320, 240)  # smallest frame with legible text, px
+MIN_FRAME: Final = (320, 240)  # width and height in pixels of the smallest frame with legible text
 
-MARGIN: Final = 8  # distance of the panels from the edge of the frame
+MARGIN: Final = 8  # distance between the panels and the edge of the frame
 GAP: Final = 6
 PADDING: Final = 6
 PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
-TILE: Final = 30  # side of a picture, large enough to tell objects apart
+TILE: Final = 30  # side of a picture, large enough to distinguish objects
 
-# List of bins: side of a picture, height of a line, and gap. Six bins with three lines of place each fit.
+# List of bins. It has space for six bins, each with a location of three lines.
 BIN_TILE: Final = 30
 BIN_LINE: Final = 13
 BIN_GAP: Final = 4
@@ -66,9 +66,9 @@ BIN_GAP: Final = 4
 CHIP_HEIGHT: Final = 28
 CHIP_WIDTH: Final = 76
 
-LIST_SHARE: Final = 0.3  # share of the frame's width
+LIST_SHARE: Final = 0.3  # width of the task list relative to the frame
 MAX_LIST_WIDTH: Final = 230
-LIST_BOTTOM: Final = 64  # free space below the lists, so that objects at the feet are visible
+LIST_BOTTOM: Final = 64  # free space below the lists, which keeps objects at the person's feet visible
 HEADER: Final = 24
 FOOTER: Final = 17
 ROW: Final = 36
@@ -79,8 +79,8 @@ BINS_WIDTH: Final = 160
 BINS_WIDTH_WIDE: Final = 170  # width of the list of bins in frames wider than 4 : 3
 
 SLOT_WIDTH: Final = 118
-SLOT_WIDTH_LONG: Final = 133  # slot width for names that would otherwise be shortened
-SLOT_WIDTH_EMPTY: Final = 86  # narrow, to leave objects at the feet visible between empty hands
+SLOT_WIDTH_LONG: Final = 133  # slot width for long object names
+SLOT_WIDTH_EMPTY: Final = 86  # narrow, so that objects at the person's feet stay visible between empty hands
 SLOT_HEIGHT: Final = 40
 BETWEEN_HANDS: Final = 64
 
@@ -88,4 +88,4 @@ MESSAGE_LINES: Final = 3
 MESSAGE_ICON: Final = 26
 POINTER: Final = 36
 MAP_INSET: Final = 4
-MAX_MAP_HEIGHT: Final = 150  # leaves space for the list of bins if the house is deeper than wide
+MAX_MAP_HEIGHT: Final = 150  # leaves space for the list of bins above the map of a deep house

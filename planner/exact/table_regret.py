@@ -48,7 +48,7 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Return the costs of all next visits in units. Costs up to `longest` are exact, and larger ones are lower bounds.
+    """Return the costs of all next visits in units. Costs up to `longest` are exact. Larger ones are not.
 
     The pass visits every state on a tour of at most this length. A backward sweep then computes the shortest remaining
     tour from each state. `visits` lists the possible next visits: places of carried objects, then picks. The result is

@@ -26,12 +26,12 @@
 /** @typedef {{ type: "markers"; markers: Array<Marker> }} Markers Markers of the HUD, for clients that draw. They are sent when they change. */
 /** @typedef {{ type: "pictures"; pictures: Record<string, string> }} Pictures Pictures that a `hud` message refers to, as data URLs by key. They are sent once to each page. */
 /** @typedef {{ text: string; detail: string; picture: string | null; target_picture: string | null; number: number | null; done: boolean; current: boolean; carried: boolean }} ChecklistItem A row of the task list. */
-/** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list of bins. `place` is broken at its line break if it is too long for one line. */
-/** @typedef {{ label: string | null; picture: string | null }} InventorySlot Contents of a hand. Both fields are None if it is empty. */
-/** @typedef {{ text: string; kind: "info" | "success" | "refusal"; opacity: number }} HudMessage Text of the message bar, with its present opacity: 1 opaque, 0 gone. */
-/** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal that is out of view. */
-/** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap The house from above with north (+y) up. */
-/** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that is shown. */
+/** @typedef {{ label: string; place: string; picture: string | null }} BinEntry A receptacle in the list of bins. `place` is broken at its line break if it does not fit on one line. */
+/** @typedef {{ label: string | null; picture: string | null }} InventorySlot Contents of a hand. Both fields are None if the hand is empty. */
+/** @typedef {{ text: string; kind: "info" | "success" | "refusal"; opacity: number }} HudMessage A message with its current opacity, from 0 (invisible) to 1. */
+/** @typedef {{ angle: number }} Pointer An arrow at the edge of the view towards a goal outside it. */
+/** @typedef {{ picture: string; bounds: [number, number, number, number]; position: [number, number]; heading: number; path: Array<[number, number]>; objects: Array<[number, number]>; goal: [number, number] | null }} MiniMap A map of the house with north (+y) up. */
+/** @typedef {{ checklist_title: string; checklist: Array<ChecklistItem>; bins: Array<BinEntry>; inventory: [InventorySlot | null, InventorySlot]; message: HudMessage | null; markers: Array<Marker>; rerouted: boolean; delivered: number; total: number; clock: number | null; pointer: Pointer | null; minimap: MiniMap | null; scroll: number }} HudState Everything that the HUD shows. */
 /** @typedef {{ type: "hud"; state: HudState }} Hud State of the HUD, without markers and the values sent in `moment`. */
 /** @typedef {{ object: string; receptacle: string | null; at: [number, number] | null; instance: string; place: [number, number, number] }} Reach Effect of the action key: the object that it would pick up or place, and the receptacle when placing. */
 /** @typedef {{ type: "moment"; step: number; clock: number | null; room: string; reach: Reach | null; pointer: Pointer | null; minimap: MiniMap | null }} Moment Values that change with movement: clock in whole seconds, room, object within reach, pointer and map. */
