@@ -44,7 +44,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     lognormal: _Pair | None = None  # median, and standard deviation of the logarithm
     uniform: _Pair | None = None  # lowest and highest value
     beta: _Pair | None = None  # both shape parameters
-    # weight, and number or distribution, of each group of participants
+    # for each group of participants, its weight and a number or distribution
     mixture: "tuple[tuple[_NonNegative, float | Distribution], ...] | None" = None
     min: float = -math.inf
     max: float = math.inf
@@ -122,7 +122,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
             width = second - first
             return min(1.0, max(0.0, (value - first) / width)) if width else float(value >= first)
         if self.beta is not None:
-            from scipy.special import betainc  # imported late: SciPy is slow to import
+            from scipy.special import betainc  # imported here because SciPy is slow to import
 
             return float(betainc(first, second, min(1.0, max(0.0, value))))
         if self.lognormal is not None:
@@ -225,7 +225,7 @@ class Parameter:
     usual: float | Mapping[str, Any]  # default distribution, as in TOML
     lowest: float  # smallest valid value
     highest: float  # largest valid value
-    unit: str  # empty for a plain number, `probability` for a number from 0 to 1
+    unit: str  # unit, empty for a plain number, `probability` for a number from 0 to 1
 
     @functools.cached_property
     def spread(self) -> Distribution:

@@ -17,7 +17,7 @@ class SearchPlace:
     """Viewpoint from which a room is searched."""
 
     room: str  # room key
-    point: Point  # in metres, shape (2,)
+    point: Point  # floor position in metres, shape (2,)
 
 
 class Frontier:
@@ -46,7 +46,7 @@ class Frontier:
     def of_room(self, room: str, position: Point) -> SearchPlace:
         """Return the viewpoint of a room that is nearest to a position."""
         points = self._house.viewpoints.get(room)
-        if points is None:  # no free floor in the room
+        if points is None:  # the room has no free floor
             return SearchPlace(room, position)
         gaps = estimated_distances(self._house, position, list(points))
         return SearchPlace(room, points[int(np.argmin(gaps))])
@@ -59,7 +59,7 @@ class Frontier:
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
         """Mark those viewpoints of `room` as searched that are in view and closer than `within` metres."""
-        within /= self._round  # look more closely in each new round
+        within /= self._round  # the participant looks more closely in each new round
         walls = self._house.navmesh.outline
         self._left = [
             place

@@ -46,7 +46,7 @@ def participant(name: str) -> "ParticipantFactory":
 def _own_participant(name: str) -> "ParticipantFactory":
     try:
         found = pkgutil.resolve_name(name)
-    except (Exception, SystemExit) as error:  # user code may raise anything on import
+    except (Exception, SystemExit) as error:  # user code may raise any exception at import
         raise ConfigError(
             f"cannot load participant {name!r}: {type(error).__name__}: {error}; "
             "modules are looked for in the current folder and among those installed"

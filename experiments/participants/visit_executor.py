@@ -13,7 +13,7 @@ from planner.plan import Visit, VisitKind
 
 STOP_SHARE = 0.72  # stopping distance relative to the reach, large enough not to kick the object
 CLOSER = 0.12  # reduction of the stopping distance after a refused pick or place, in metres
-MIN_STOP_DISTANCE = 0.30  # in metres
+MIN_STOP_DISTANCE = 0.30  # minimum distance from the goal at the end of a walk, in metres
 ARRIVED = 0.5  # distance from a viewpoint at which the participant starts to look around, in metres
 
 WalkTo = Callable[[Percept, Point, float], Action]
@@ -78,7 +78,7 @@ class VisitExecutor:
         return FollowPath(self._path_to(percept, goal), goal, stop_distance, until=self._bins.until(until))
 
     def look_for_bins(self, percept: Percept) -> None:
-        """Remember the bins in view. Call this at each look around."""
+        """Remember the bins in view. Call this each time the participant looks around."""
         self._bins.look(percept)
 
     def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:

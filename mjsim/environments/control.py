@@ -121,10 +121,10 @@ class Discrete:
 
 _GAIN = 8.0  # gain of the controller at the end of a walk or a turn, in 1/s
 _BRAKING = 2 / 3  # planned deceleration, as a share of the limit
-_DISTANCE_TOLERANCE = 0.002  # in metres
+_DISTANCE_TOLERANCE = 0.002  # remaining distance at which a walk is complete, in metres
 _ANGLE_TOLERANCE = math.radians(0.1)
 _STANDING = 0.01  # speed below which the person counts as standing, in m/s
-_MIN_PROGRESS = 0.0005  # in metres per control step
+_MIN_PROGRESS = 0.0005  # distance per control step below which a walk counts as blocked, in metres
 _MAX_BLOCKED_STEPS = 4  # number of control steps without progress after which a walk ends
 _MAX_EXTRA_TIME = 2.0  # additional time for a walk that slides along an obstacle, in seconds
 

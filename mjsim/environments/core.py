@@ -281,7 +281,7 @@ def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[An
         seed, actions = progress
         core.reset(seed)
         for action in actions:
-            with contextlib.suppress(ActionError, PhysicsError):  # also raised in the original run
+            with contextlib.suppress(ActionError, PhysicsError):  # the original run raised it too
                 core.step(action)
     return core
 

@@ -36,9 +36,9 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshade
 class GlInfo:
     """OpenGL driver of this process."""
 
-    vendor: str  # GL_VENDOR
-    renderer: str  # GL_RENDERER: the device or the software rasterizer
-    version: str  # GL_VERSION
+    vendor: str  # value of GL_VENDOR
+    renderer: str  # value of GL_RENDERER, which names the GPU or the software rasterizer
+    version: str  # value of GL_VERSION
     software: bool  # True if the CPU renders
 
 
@@ -223,7 +223,7 @@ def _backend() -> ModuleType:
         raise RenderError(f"cannot load the OpenGL backend {name!r} ({error}); {remedy}") from error
 
 
-# One per process, like EGL's display.
+# There is one context per process, as there is one EGL display.
 _PROCESS = _ProcessContext()
 current_context = _PROCESS.current
 own = _PROCESS.own

@@ -63,7 +63,7 @@ class EnvironmentReport:
         """True if all packages that trials need can be imported, and frames can be drawn."""
         missing = {name for name, version in self.versions.items() if version is None}
         if sys.version_info >= WITHOUT_LABMAZE:
-            missing.discard(DM_CONTROL)  # trials do not need it
+            missing.discard(DM_CONTROL)  # trials do not need dm-control
         return self.gl is not None and not (missing or self.broken or self.hidden)
 
     def lines(self) -> tuple[str, ...]:

@@ -93,6 +93,6 @@ def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
 def _descends(model: Any, root: int) -> NDArray[np.bool_]:
     inside = np.zeros(model.nbody, dtype=bool)
     inside[root] = True
-    for body in range(root + 1, model.nbody):  # parents come before their children
+    for body in range(root + 1, model.nbody):  # MuJoCo lists parents before their children
         inside[body] = inside[model.body_parentid[body]]
     return inside

@@ -146,8 +146,8 @@ def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> ND
 class FloorPlan:
     """An orthographic picture from above. North (+y) is up."""
 
-    rgb: NDArray[np.uint8]  # shape (height, width, 3), rows from the top
-    bounds: tuple[float, float, float, float]  # xmin, ymin, xmax, ymax, in metres
+    rgb: NDArray[np.uint8]  # colour image, shape (height, width, 3), rows from the top
+    bounds: tuple[float, float, float, float]  # drawn area (xmin, ymin, xmax, ymax), in metres
     pixels_per_metre: float
 
     def to_pixels(self, xy: ArrayLike) -> NDArray[np.float64]:

@@ -35,7 +35,7 @@ _FAR_UP = 1e4  # height at which an object has no contact shadow, in metres
 class Layer(NamedTuple):
     """Drawn part of a scene, at the supersampled size and with rows from the bottom."""
 
-    colour: NDArray[np.uint8]  # shape (h, w, 3)
+    colour: NDArray[np.uint8]  # colour image, shape (h, w, 3)
     depth: NDArray[np.float32]  # reversed depth, 1 at the near plane, 0 for the background, shape (h, w)
 
 

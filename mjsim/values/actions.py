@@ -142,7 +142,7 @@ StepAction = Move | Pick | Place
 Action = StepAction | FollowPath | Wait
 
 IDLE = Move()
-"""Stand still."""
+"""Action that stands still for one control step."""
 WAIT = Wait()
 """Wait for the current pick or place to end, or for one control step if there is none."""
 
@@ -205,7 +205,7 @@ class Stop(enum.Enum):
     BLOCKED = "blocked"  # the walk makes no progress
     CHANGED = "changed"  # the person has left the path, or an object has moved
     EVENT = "event"  # a `WorldEvent` occurred
-    DUE = "due"  # the time or the limit of control steps is reached
+    DUE = "due"  # the requested time or the maximum number of control steps is reached
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ POINTS = 40  # default number of points in a house where objects may be dropped
 
 @dataclass(frozen=True)
 class StartPose:
-    """Initial pose of the person: x and y in m, heading in rad."""
+    """Initial pose of the person: x and y in metres, heading in radians."""
 
     x: float
     y: float
@@ -92,7 +92,7 @@ class Episode:
         """
         try:
             found = msgspec.json.decode(text, type=_Header).format
-            if found is True or found != FORMAT_VERSION:  # True equals 1
+            if found is True or found != FORMAT_VERSION:  # in Python, True equals 1
                 raise EpisodeError(
                     f"episode format {found!r} is not {FORMAT_VERSION}; sample it again with this version"
                 )

@@ -97,7 +97,7 @@ class PersonParameters:
 
     @property
     def vertical_field(self) -> float:
-        """Vertical field of view of a 4:3 picture, rad."""
+        """Vertical field of view of a 4:3 picture, in radians."""
         return 2.0 * math.atan(math.tan(self.field_of_view / 2.0) / PICTURE_ASPECT)
 
     def as_dict(self) -> dict[str, Any]:

@@ -65,7 +65,7 @@ class Guest:
         self._turned_for_poles = self._has_begun = False
         self._carried: set[str] = set()
         self._brought: set[str] = set()  # objects that are assumed to be in their bins
-        self._passed: set[str] = set()  # objects for which picking up in passing was decided
+        self._passed: set[str] = set()  # objects that were already considered for picking up in passing
         self._room: str | None = None
         self._read: Visit | None = None
         self._given_up: Visit | None = None

@@ -11,7 +11,7 @@ from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInp
 
 MAP_SIZE = 64
 RAYS = 24
-RANGE = 3.0  # in metres
+RANGE = 3.0  # maximum distance that the rangefinder measures, in metres
 _SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
 
 
