@@ -38,7 +38,7 @@ class Patch:
     """A drawn panel with its transparency. Blending computes `frame * keep / 255 + colour`."""
 
     colour: NDArray[np.uint8]  # colour times opacity, shape (h, w, 3)
-    keep: NDArray[np.uint8]  # transparency, 255 if the frame is unchanged, shape (h, w, 3)
+    keep: NDArray[np.uint8]  # transparency, 255 where the frame stays unchanged, shape (h, w, 3)
 
     def faded(self, opacity: float) -> "Patch":
         """Return a copy with its opacity multiplied by `opacity`, from 0 to 1."""
@@ -102,7 +102,7 @@ class Canvas:
             cv2.polylines(mask, fixed, False, 255, max(1, round(line)), cv2.LINE_AA, 4)
         else:
             cv2.fillPoly(mask, fixed, 255, cv2.LINE_AA, 4)
-        reach = line + 3.0  # covers round ends and smooth edges
+        reach = line + 3.0  # leaves space for round line ends and smooth edges
         x, y = np.maximum(np.floor(corners.min(axis=0) - reach), 0).astype(int)
         right, bottom = np.ceil(corners.max(axis=0) + reach).astype(int)
         share = np.asarray(mask[y:bottom, x:right] / np.float32(255.0), dtype=np.float32)

@@ -38,7 +38,7 @@ class Layout:
     free: Rect  # free view between the panels
     first: int  # index of the first visible row of the task list
     rows: tuple[ListRow, ...]  # visible rows of the task list
-    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins, which starts with the first bin
+    bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins
     message_lines: tuple[str, ...]  # message broken into lines
 
     @property

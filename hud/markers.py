@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
 CHEST = 0.75  # height of the first breadcrumb, relative to the eye height
-BREADCRUMB_RADIUS = 0.04  # in metres; 7 pixels wide in a frame of 480 rows at a distance of 5 m
+BREADCRUMB_RADIUS = 0.04  # in metres; a breadcrumb 5 m away is 7 pixels wide
 BREADCRUMB_SPACING = 0.28  # distance between breadcrumbs along the floor path, in metres
 
 RIM_RADIUS = 1.3  # radius of the white rim, relative to that of the breadcrumb
@@ -31,7 +31,8 @@ SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float = 0.0) -> tuple[Marker, ...]:
     """Return spheres along a floor path, descending from chest height to the floor at its end (PAPER section 5).
 
-    They are spaced from the end of the path, of shape (k, 2) in metres. The first `clearance` metres have none.
+    The path has shape (k, 2), in metres. The spheres are spaced from its end, and its first `clearance` metres stay
+    empty.
     """
     chest = CHEST * eye_height
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)

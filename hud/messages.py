@@ -66,5 +66,5 @@ def message(
 
 
 def fade(age: float) -> float:
-    """Return the opacity of a message by its age in seconds: 1 for `SHOWN`, then linearly to 0 within `FADE`."""
+    """Return the opacity of a message at an age in seconds: 1 until `SHOWN`, then falling to 0 over `FADE`."""
     return min(1.0, max(0.0, (SHOWN + FADE - age) / FADE))

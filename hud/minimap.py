@@ -27,7 +27,8 @@ DISCS: dict[Kind, tuple[tuple[float, Rgb], ...]] = {
     "goal": ((5.0, theme.PANEL), (4.0, GOAL), (1.6, theme.PANEL)),
     "person": (),
 }
-HALF_SIZES: dict[Kind, float] = {"path": 2.0, "object": 4.0, "goal": 6.0, "person": 10.0}  # in theme pixels
+# Half the side of each mark's stamp, in theme pixels.
+HALF_SIZES: dict[Kind, float] = {"path": 2.0, "object": 4.0, "goal": 6.0, "person": 10.0}
 
 
 @dataclass(frozen=True)

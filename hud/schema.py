@@ -93,7 +93,7 @@ def _check_fields(raw: Any, written: Any, where: str) -> None:
 
 
 def _expected(error: str) -> str:
-    """Return a hint about the value whose path is in an error of msgspec (`$.markers[0].shape`)."""
+    """Return a hint for correcting the value that an error message of msgspec refers to."""
     definitions = json_schema()["$defs"]
     node = definitions["HudState"]
     for name in re.findall(r"\.(\w+)", error.rpartition(" at `")[2]):

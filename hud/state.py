@@ -65,7 +65,7 @@ class ChecklistItem:
         target_picture: Key of the receptacle's picture, or None.
         number: Step number, or None in a list without an order.
         done: True if the row is crossed out.
-        current: True for the step to do next.
+        current: True for the row of the current step.
         carried: True if the object is in a hand. Frames cross out such a row, and the browser page marks it.
     """
 

@@ -18,23 +18,23 @@ class HudTexts:
     to_put_away: str
     your_plan: str
     pick_up: str
-    put_in: str  # {Receptacle}
-    at_least: str  # {metres}
+    put_in: str  # contains {Receptacle}
+    at_least: str  # contains {metres}
     decimal: str  # the decimal separator
-    left: str  # {count}
+    left: str  # contains {count}
     none_left: str
-    next_step: str  # {number}, {count}
+    next_step: str  # contains {number} and {count}
     done: str
-    above: str  # {count}
-    more: str  # {count}
+    above: str  # contains {count}
+    more: str  # contains {count}
     bins: str
-    more_bins: str  # {count}
+    more_bins: str  # contains {count}
     left_hand: str
     right_hand: str
     empty: str
     # Floor plan with the paths of a trial
-    path_planned: str  # {metres}
-    path_walked: str  # {metres}
+    path_planned: str  # contains {metres}
+    path_walked: str  # contains {metres}
     path_start: str
     recorded: str
     # Stand-ins for labels in messages

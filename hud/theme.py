@@ -58,7 +58,7 @@ PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
 TILE: Final = 30  # side of a picture, large enough to distinguish objects
 
-# List of bins. It has space for six bins, each with a location of three lines.
+# Sizes in the list of bins, at which six bins with three lines of location each fit.
 BIN_TILE: Final = 30
 BIN_LINE: Final = 13
 BIN_GAP: Final = 4

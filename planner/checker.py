@@ -194,7 +194,7 @@ class Verified:
     cost: float  # length of the plan's tour in metres
     lower_bound: float  # verified lower bound on all tours in metres
     optimal: bool  # True if the bound and the tour length agree within twice the problem's tolerance
-    states: int  # number of states visited beyond the certificate's table
+    states: int  # number of states visited by the search
     why: str = ""  # reason why the plan's lower bound was not verified, or empty
 
 

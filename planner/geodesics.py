@@ -102,7 +102,7 @@ class Geodesics:
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
             islands[k] = self.navmesh.island_of(point) or 0
-            # Points navigable only within the tolerance are also snapped: no tangents start inside an obstacle.
+            # Also snap points that are navigable only due to the tolerance: no tangents start inside an obstacle.
             array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 

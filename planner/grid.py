@@ -39,7 +39,7 @@ class GridFrame(NamedTuple):
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the columns and rows of n points, shape (2, n). Points outside the grid get the nearest cell."""
+        """Return the columns and rows of n points, shape (2, n). Points outside the grid are clipped to it."""
         steps = (points - (self.x_min, self.y_min)) / self.resolution
         cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
         return cells.T
@@ -86,7 +86,7 @@ def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Gri
 def crossed_cells(
     frame: GridFrame, segments: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the cell and the segment of each pair that is within `MARGIN`.
+    """Return all pairs of a cell and a segment within `MARGIN` of each other, as two index arrays.
 
     Cells are numbered row by row. `segments` contains x and y of both ends in metres, shape (s, 4).
     """

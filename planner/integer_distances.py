@@ -31,8 +31,7 @@ class IntegerDistances:
     def metric(self) -> NDArray[np.int64]:
         """Shortest connections in the rounded distances, shape (k, k).
 
-        Rounding can violate the triangle inequality by one unit. Shortest connections satisfy it, and solvers rely on
-        it.
+        Solvers rely on the triangle inequality, which rounding can violate by one unit.
         """
         return shortest_connections(self.legs, self.used)
 

@@ -21,7 +21,7 @@ from planner.grid import GridFrame, crossed_cells
 TOLERANCE = 1e-4  # maximum depth to which a path may cut into an inflated obstacle, in metres
 SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary in metres, to allow for rounding errors
 ARC_SEGMENTS = 8  # segments per quarter circle; path lengths are within 0.01 % of those around true circles
-BLOCKED, MIXED = -1, -2  # values for a cell outside all islands and for a cell that an outline crosses
+BLOCKED, MIXED = -1, -2  # values of `cells` outside all islands and on an outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class NavMesh:
         """
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
-        if count is None:  # ten times as fast as with arrays
+        if count is None:  # scalars are ten times as fast as arrays here
             while True:
                 x, y = rng.uniform(x_min, x_max), rng.uniform(y_min, y_max)
                 cell = self._cell(x, y)

@@ -15,9 +15,8 @@ class Proof(enum.Enum):
     EXHAUSTIVE: Every order of visits was tried, or was excluded because it cannot be shorter.
     FULL_TABLE: The cost-to-go was computed for every set of remaining objects.
     RELAXATION: The cost-to-go was computed for a relaxed problem, which counts objects by group and puts a price on
-    each
-        pick. If the plan's bound exceeds the relaxation's, a search excluded all states that cannot lead to a shorter
-            tour.
+        each pick. If the plan's bound exceeds the relaxation's, a search excluded all states that cannot lead to a
+        shorter tour.
     SPANNING_TREE: No tour is shorter than the minimum spanning tree of its locations.
     """
 

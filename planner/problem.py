@@ -188,8 +188,8 @@ def tour_length(
 ) -> float:
     """Return the length of an open tour.
 
-    If `distances` of shape (k, k) are given, they replace the problem's own. The result is exact for integers below
-    2^53.
+    `distances` of shape (k, k) replaces the problem's own matrix if given. For integers below 2^53, the result is
+    exact.
     """
     stops = problem.stops(visits)
     return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())

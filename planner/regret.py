@@ -1,4 +1,4 @@
-"""Regrets: the extra costs of possible next visits compared with the best one."""
+"""Regrets: how much longer a tour gets if a possible next visit replaces the best one."""
 
 import math
 from dataclasses import dataclass, replace
@@ -36,10 +36,10 @@ class Regret:
 
 
 class RegretEvaluator:
-    """Computes the regrets of possible and actual visits with the exact planner. Results are bit-identical.
+    """Computes the regrets of possible and actual visits with the exact planner.
 
     `limit` applies to each search with more than 18 remaining objects. If it is None, the planner's own budget applies.
-    `all` computes regrets up to `radius`, in metres, exactly.
+    Results are bit-identical unless it limits time. `all` computes regrets of up to `radius` metres exactly.
     """
 
     def __init__(

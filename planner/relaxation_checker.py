@@ -1,4 +1,4 @@
-"""NumPy implementation of the relaxation behind certificates, independent of the solver's."""
+"""The relaxation behind certificates in NumPy, implemented independently of the solver."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ Field = NDArray[Any]
 
 
 def closed(problem: RoutingProblem) -> Lengths:
-    """Return the shortest connections between locations in metres, via locations of the tour, shape (k, k)."""
+    """Return the shortest distances between locations via locations of the tour, in metres, shape (k, k)."""
     shortest: Lengths = np.minimum(problem.distances, problem.distances.T)
     for k in problem.used:
         shortest = np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :])
@@ -75,8 +75,7 @@ class Relaxation:
     def _filled(self, group: Whole, left: list[Whole]) -> Lengths:
         """Fill the table.
 
-        Column b m + c is for bin b with an object for bin c in hand (c = b: empty hands). Column m m + i is for object
-        i.
+        Column b m + c is for bin b with an object for bin c in hand (c = b: none), and column m m + i for object i.
         """
         n, m, home, total = len(self._home), self._bins, self._home, np.sum(left, axis=0)
         leave, to_bin, between = self._d[:m, :m], self._d[m:-1, :m], self._d[m:-1, m:-1].copy()
@@ -109,8 +108,8 @@ class Relaxation:
     def shorter(self, limit: float, max_states: int) -> tuple[bool, int] | None:
         """Return True if a tour shorter than a limit in metres exists, and the number of visited states.
 
-        Every state whose cost so far plus bound is below the limit is visited. The result is None if there are more
-        than `max_states`.
+        All states whose cost plus bound is below the limit are visited. Return None if there are more than
+        `max_states`.
         """
         limit += float(self._prices.sum())
         here, after = self._begin()

@@ -55,7 +55,7 @@ class Route:
 
 
 def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
-    """Return the visits that remain in a state, or None if the state is not reached by the visits in this order."""
+    """Return the visits that remain in a state, or None if the state cannot result from making them in order."""
     loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
     carried = {visit.object for visit in visits} - loose
     done = 0

@@ -1,4 +1,4 @@
-"""The planner of a session, which works in the caller's thread, in one background thread, or live for a participant."""
+"""The planner of a session, which runs in the caller's thread, in a background thread, or live in several threads."""
 
 import contextlib
 import enum
@@ -57,9 +57,8 @@ class Planner:
         self._latest: Future[None] | None = None  # last job submitted to the thread
         self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of the last state, in live mode
         self._stop = threading.Event()  # set to stop the search for these regrets
-        self._late: list[
-            tuple[Any, TaskState, Visit, Plan]
-        ] = []  # visits whose regrets are computed after the task
+        # visits whose regrets are computed after the task
+        self._late: list[tuple[Any, TaskState, Visit, Plan]] = []
         self.use(source)
 
     def use(self, source: PlanSource) -> None:
@@ -164,7 +163,7 @@ class Planner:
         return better
 
     def regrets(self) -> Mapping[Visit, Regret]:
-        """Return the regrets of all possible next visits, smallest first, or nothing if not computed yet."""
+        """Return the regrets of all possible next visits, smallest first. In live mode, the result may be empty."""
         if self.route is None or self._task is None:
             return {}
         if self.mode is not Mode.LIVE:
@@ -175,7 +174,7 @@ class Planner:
         return self._regrets.result() if self._regrets.done() else {}
 
     def regret(self, visit: Visit) -> float | None:
-        """Compute the exact regret of a visit in metres, or None if it is impossible or unproven. This can be slow."""
+        """Return the exact regret of a visit in metres, or None if it is impossible or unproven."""
         return None if self._task is None else self._evaluator.of(self._task[0], visit, self._task[1])
 
     def judge(self, visit: Visit, label: Any) -> float | None:

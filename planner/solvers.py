@@ -51,7 +51,7 @@ class SolveLimit:
 
 @dataclass(frozen=True)
 class Deadline:
-    """The end of a search: a time of `time.perf_counter()`, or never if None, or an event set by another thread."""
+    """End of a search: at a value of `time.perf_counter()` (None: never), or when another thread sets `stop`."""
 
     at: float | None
     stop: threading.Event | None = None

@@ -243,7 +243,7 @@ def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tupl
 
 @kernel
 def distances(graph: Edges, sources: Views, targets: Views) -> NDArray[np.float64]:
-    """Return the shortest distances over vertices between points in metres, infinite without a path, shape (s, t)."""
+    """Return the shortest distances between points via vertices, in metres, infinite without a path, shape (s, t)."""
     count, points = len(sources.starts) - 1, len(targets.starts) - 1
     result = np.full((count, points), np.inf)
     nowhere, rest = np.empty(0), np.full(len(graph.vertices), np.inf)

@@ -1,8 +1,9 @@
 """Kernels that expand a layer of the search.
 
-Layer k contains states (U, place, carried) with k picked objects. The code of a state is U 2^12 + place, where place b
-m + d means at bin b with an object for d in hand, b m + b means at bin b with empty hands, and m m + i means at object
-i with only that object in hand. Reaching a second object is not a state, because the next stop is one of two bins.
+Layer k contains states with k picked objects. The code of a state is U 2^12 + place, where U is the bit mask of the
+remaining objects. Place `b * m + d` means at bin b with an object for bin d in hand, `b * m + b` means at bin b with
+empty hands, and `m * m + i` means at object i with only that object in hand. Arriving at a second object is not a state
+of its own, because the next stop is one of two bins.
 """
 
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from planner.solvers import Deadline
 
 PLACE_BITS = 12
 SLICE = 1 << 12  # number of states expanded between two checks of the deadline, about 5 ms
-CARRYING, EMPTY = range(2)  # stages of a layer, by what the hands hold
+CARRYING, EMPTY = range(2)  # stages of the expansion of a layer
 STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices into `progress`
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem
 
-FAR = 1 << 59  # longer than any tour
+FAR = 1 << 59  # a length greater than that of any tour
 
 
 class Instance(NamedTuple):

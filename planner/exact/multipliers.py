@@ -59,8 +59,7 @@ def first_bound(instance: Instance, upper: int) -> Bound:
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
     """Return the bound for the groups and multipliers of a warm start, by filling one table.
 
-    If the table would have more than `max_rows` rows, groups are merged with the first one, beginning with the last
-    group.
+    To keep the table within `max_rows` rows, the last groups are merged with the first one.
     """
     n, group = len(instance.home), start.group.copy()
     while rows_of(group) > max_rows and group.max(initial=0) > 0:

@@ -17,7 +17,7 @@ class Nodes(NamedTuple):
 
     size: NDArray[np.int64]  # number of states, shape (1,)
     key: NDArray[np.int64]  # code of each state, as defined in `expand`
-    cost: NDArray[np.int64]  # length of the shortest known path to it
+    cost: NDArray[np.int64]  # length of the shortest known path to each state
     total: NDArray[np.int64]  # cost plus lower bound of the cost-to-go
     # 2 x index of the previous state, plus 1 if it is in the same layer, or `NO_PARENT`
     parent: NDArray[np.int64]

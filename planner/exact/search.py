@@ -17,9 +17,9 @@ from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
 ANNEALING_MOVES = 10_000
-# Search for the first plan from a warm start, which takes about 20 ms.
+# Effort for a first plan from a warm start, about 20 ms in total.
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
-WARM_TEMPERATURES = (0.1, 0.02)  # relative to the mean leg length
+WARM_TEMPERATURES = (0.1, 0.02)  # first and last temperature, relative to the mean leg length
 
 
 def improving_tours(
@@ -43,7 +43,7 @@ def improving_tours(
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS and not by_bin:  # only once, at the first table of this size
+        if rows >= BIN_ROWS and not by_bin:  # only once, before the first table of this size
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)

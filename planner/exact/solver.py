@@ -85,7 +85,7 @@ class ExactSolver:
         return not self.why_not(problem)
 
     def why_not(self, problem: RoutingProblem) -> str:
-        """Return the reason why the problem has to be solved by OR-Tools, or an empty text."""
+        """Return the reason why only OR-Tools can solve the problem, or an empty string."""
         if problem.capacity > 2:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
@@ -132,7 +132,7 @@ class ExactSolver:
         start: Start | None,
     ) -> Iterator[Solution]:
         """Yield the annealed tour, then the result of the full table or those of the search."""
-        from planner.exact.search import improving_tours  # imported late: kernels take 0.5 s to load
+        from planner.exact.search import improving_tours  # imported late, because kernels take 0.5 s to load
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         passes = () if tabled else self.passes

@@ -32,7 +32,7 @@ BIN_ROWS = 50_000  # maximum number of rows of a table grouped by bin, enough fo
 SPARE = 8  # number of entries after the last row, because kernels read eight at a time
 # Maximum leg and price at which tours of 40 objects fit into int32, and maximum price for int64, in units.
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
-INFINITE = 1 << 60  # a length that exceeds all sums
+INFINITE = 1 << 60  # a length greater than any sum of legs
 
 
 class CostTable(NamedTuple):

@@ -79,8 +79,8 @@ class Legs(NamedTuple):
     between: Entries
     # index of each object in a row of `between`, where each bin starts at a multiple of eight, shape (n,)
     place: NDArray[np.int64]
-    bin_of: NDArray[np.int64]  # bin of each eight entries in a row of `between`
-    far: int  # a length that exceeds all tours
+    bin_of: NDArray[np.int64]  # bin of each group of eight entries in a row of `between`
+    far: int  # a length greater than that of any tour
 
 
 @inlined
@@ -138,7 +138,7 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
     n, m = inst.to_bin.shape
     wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
     legs, left = legs_of(inst, table), left_of(table, first)
-    picked, second = (np.empty(n, np.int64), np.empty(n * wide, dtype))  # remaining objects; W without prices
+    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # remaining objects; W without prices
     empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V
     holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y
     for row in range(first, last):

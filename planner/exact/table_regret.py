@@ -22,10 +22,9 @@ Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 def costs_in(
     instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Return the costs of all next visits from a filled table. A relaxed table gives lower bounds, including prices.
+    """Return the costs of all next visits from a table. A relaxed table gives lower bounds, including prices.
 
-    `row` is the table row of the objects left at the root. `names` and `carried` are the names of the instance's
-    objects.
+    `row` is the table row of the objects left at the root. `names` and `carried` are names of the instance's objects.
     """
     held, home = instance.carried.tolist(), instance.home
     costs = {}

@@ -46,8 +46,7 @@ class WarmStart:
     def numbered(self, names: Sequence[str], unit: float) -> Start | None:
         """Convert the warm start to object indices, for an instance with these names and a unit in metres.
 
-        Return None if no multiplier of these objects is known. A new object gets the mean price and joins the first
-        group.
+        Return None if no multiplier of these objects is known. New objects get the mean price and join the first group.
         """
         prices = {name: round(price / unit) for name, price in self.multipliers.items()}
         found = [prices[name] for name in names if name in prices]
