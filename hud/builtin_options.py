@@ -69,7 +69,7 @@ def regret(view: TaskView, state: HudState) -> HudState:
 
 
 def reroute(view: TaskView, state: HudState) -> HudState:
-    """Replace the breadcrumbs by those of a path that starts at the person and changes when the person leaves it.
+    """Replace the breadcrumbs with those of a path that starts at the person and changes when the person leaves it.
 
     In the paper, breadcrumbs stay in place until the next pick or place.
     """

@@ -1,4 +1,4 @@
-"""Exceptions of the HUD."""
+"""Exceptions raised by the HUD."""
 
 
 class HudError(Exception):

@@ -103,7 +103,7 @@ class PlanAhead(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class KnownPlan:
-    """A plan with fixed values."""
+    """A planner's suggestion with fixed values."""
 
     steps: tuple[TaskStep, ...] = ()
     segment: NDArray[np.float64] | None = None

@@ -66,5 +66,5 @@ class HudTexts:
 
 
 def filled(text: str, **values: object) -> str:
-    """Replace each `{name}` in a text by its value. Names without a value are left as they are."""
+    """Replace each `{name}` in a text with its value. Names without a value are left as they are."""
     return _PLACE.sub(lambda place: str(values.get(place[1], place[0])), text)

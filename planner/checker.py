@@ -69,7 +69,7 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
 
 
 def allowance(problem: RoutingProblem, plan: Plan) -> float:
-    """Return the maximum excess of a plan's claims due to rounding, in metres."""
+    """Return how far rounding may put a plan's claims above the truth, in metres."""
     return problem.tolerance(plan.cost) + 2 * (problem.resolution or 0.0)
 
 
@@ -189,7 +189,7 @@ def _spanning_tree(problem: RoutingProblem) -> float:
 
 @dataclass(frozen=True)
 class Verified:
-    """Results of a verification, which does not trust the solver."""
+    """Result of verifying a plan without trusting its solver."""
 
     cost: float  # length of the plan's tour in metres
     lower_bound: float  # verified lower bound on all tours in metres

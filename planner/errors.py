@@ -1,4 +1,4 @@
-"""Exceptions of the planner."""
+"""Exceptions raised by the planner."""
 
 
 class PlannerError(Exception):

@@ -1,7 +1,7 @@
 """Exact any-angle shortest paths on a navmesh.
 
-Paths around the inflated obstacles are shortest to within 0.1 mm (`navmesh.TOLERANCE`). Paths along grid cells would be
-several per cent longer.
+Paths are the shortest around the inflated obstacles to within 0.1 mm (`navmesh.TOLERANCE`). Paths along grid cells
+would be several per cent longer.
 """
 
 from dataclasses import dataclass, field

@@ -53,7 +53,7 @@ class OrToolsSolver:
     ) -> Iterator[Plan]:
         """Yield the nearest-first tour immediately, then better tours from searches for 1, 10 and all solutions.
 
-        Each search starts from the beginning. The short ones take little time compared with the last.
+        Each search starts from scratch. The short ones take little time compared with the last.
         """
         started = time.perf_counter()
         best = GreedySolver().solve(problem)

@@ -49,7 +49,7 @@ class Status(enum.Enum):
 
 
 class VisitKind(enum.StrEnum):
-    """Action of a visit."""
+    """Type of a visit."""
 
     PICK = "pick"
     PLACE = "place"

@@ -24,7 +24,7 @@ STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices into `progress`
 
 
 class Expanded(NamedTuple):
-    """Result of the expansion of a layer."""
+    """Result of expanding a layer."""
 
     here: Nodes  # the layer, including states reached by placing an object in its bin
     after: Nodes  # the next layer

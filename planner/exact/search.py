@@ -87,7 +87,7 @@ def _certificate(bound: Bound) -> Certificate:
 
 
 class Pass(NamedTuple):
-    """Result of a pass."""
+    """Result of one pass of the search."""
 
     upper: int  # length of the best known tour
     actions: list[int] | None  # actions of that tour if this pass found it

@@ -17,7 +17,7 @@ from planner.exact import table as tables
 from planner.exact.instance import FAR, Instance
 from planner.exact.table import CostTable
 
-LANES = 8  # number of integers in a vector register
+LANES = 8  # number of integers processed at once
 
 Entries = NDArray[np.integer[Any]]
 
@@ -139,8 +139,8 @@ def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
     wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
     legs, left = legs_of(inst, table), left_of(table, first)
     picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # remaining objects; W without prices
-    empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V
-    holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y
+    empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V of a row
+    holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y of a row
     for row in range(first, last):
         second[:], empty[:], carrying[:] = legs.far, legs.far, legs.far
         count = 0
