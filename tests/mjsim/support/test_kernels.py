@@ -42,7 +42,12 @@ def _run(root, cache):
     run = subprocess.run(
         [sys.executable, "-c", "import planner.caller"],
         cwd=root,
-        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(root)},
+        env={
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(cache),
+            "PYTHONPATH": str(root),
+            "PYTHONDONTWRITEBYTECODE": "1",  # bytecode looks current if a module changes within a second
+        },
         capture_output=True,
         text=True,
     )

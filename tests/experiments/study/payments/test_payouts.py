@@ -251,7 +251,7 @@ KILLED = """
 import os, signal, sys
 from experiments.cli.main import main
 from experiments.study.recruitment import connect, external_question, prolific
-from experiments.visit.store import Ledger
+from experiments.visit.store.ledger import Ledger
 
 def die(function, when):
     async def run(self, *words, **names):

@@ -200,7 +200,7 @@ def test_the_command_plays_takes_pictures_and_says_what_is_missing(tmp_path, cap
     said = capsys.readouterr().out
     assert "line 19: contact is 'nobody'" in said
     assert (
-        "not ready (1 to put right)" in said or "not ready (2" in said
+        "not ready (problems: 1)" in said or "not ready (problems: 2)" in said
     )  # minutes depend on who is simulated
     assert "18.00 USD in all" in said and "partial eta squared" in said
     if browser():

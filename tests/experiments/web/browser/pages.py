@@ -211,3 +211,11 @@ def virtual_screen():
                 yield f":{numbers.readline().strip()}"
         finally:
             process.terminate()
+
+
+def pass_story(page):
+    """Press Enter on the welcome page, and on the story once its button has the focus."""
+    page.hold("Enter")
+    story = "document.querySelector('[name=phase][value=story]')"
+    page.wait_for(f"{story} && document.activeElement.matches('button')")
+    page.hold("Enter")

@@ -11,6 +11,7 @@ from benchmarks.support.play_server import PlayProcess
 from experiments.record.reader import read_run
 from experiments.trials.replay.replay import ReplayFilm, as_seen, replay
 from tests.experiments.web.browser.key_presser import choose
+from tests.experiments.web.browser.pages import pass_story
 from tools.drawn_pairs import decoded, ssim
 
 LEAST = 0.95  # SSIM, as of the pairs of pictures
@@ -29,9 +30,8 @@ def test_the_film_shows_what_the_window_showed(tmp_path, chromium_page, width, h
         options += ["--field-of-view-range", "1.0,2.0"]
     with PlayProcess(tmp_path / "visits", *options) as server:
         page.goto(server.url)
-        for shown in ("[name=phase][value=story]", "[data-trial]"):  # its button has the focus
-            page.hold("Enter")
-            page.wait_for(f"document.querySelector('{shown}')")
+        pass_story(page)
+        page.wait_for("document.querySelector('[data-trial]')")
         address = page.evaluate("location.href")
         page.goto(f"{address}?draw=browser")
         choose(page, "Skip the training")

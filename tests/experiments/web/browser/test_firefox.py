@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.play import FAST
 from benchmarks.support.play_server import PlayProcess
-from tests.experiments.web.browser.pages import FIREFOX, firefox
+from tests.experiments.web.browser.pages import FIREFOX, firefox, pass_story
 
 TITLE = "document.getElementById('panel-title')?.textContent"
 DRAWN = """(() => {
@@ -23,10 +23,7 @@ def test_firefox_shows_the_task_and_turns(tmp_path):
         firefox(tmp_path / "profile") as browser,
     ):
         browser.goto(server.url)
-        browser.hold("Enter")
-        story = "document.querySelector('[name=phase][value=story]')"
-        browser.wait_for(f"{story} && document.activeElement.matches('button')")
-        browser.hold("Enter")
+        pass_story(browser)
         browser.wait_for(f"{TITLE} === 'Training' && document.activeElement.textContent.startsWith('Start')")
         browser.hold("Enter")
         browser.wait_for("!document.getElementById('panel').open")

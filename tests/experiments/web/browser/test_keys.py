@@ -15,6 +15,7 @@ from experiments.trials.setup import trial_episode
 from experiments.trials.trial_config import TrialConfig
 from hud.conditions import CONDITIONS
 from tests.experiments.web.browser.key_presser import WATCH, KeyPresser, choose
+from tests.experiments.web.browser.pages import pass_story
 
 HARMLESS = (  # said where there is no graphics card, or because a test asks
     "KHR_parallel_shader_compile",
@@ -38,9 +39,8 @@ def test_objects_are_put_away_by_keys(tmp_path, request, browser, objects, assis
     page.resize(640, 480)
     with PlayProcess(tmp_path / "visits", *words) as server:
         page.goto(server.url)
-        for shown in ("[name=phase][value=story]", "[data-trial]"):  # its button has the focus
-            page.hold("Enter")
-            page.wait_for(f"document.querySelector('{shown}')")
+        pass_story(page)
+        page.wait_for("document.querySelector('[data-trial]')")
         address = page.evaluate("location.href")
         page.goto(f"{address}?draw=browser")  # however slowly
         choose(page, "Skip the training")
