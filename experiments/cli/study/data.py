@@ -203,5 +203,5 @@ def run_forget(arguments: argparse.Namespace) -> int:
         ("erased", found.erased),
         ("not paid yet", found.unpaid),
     ):
-        print(f"{what}: {', '.join(names) or 'nobody'}")
+        print(f"{what}: {', '.join(names) or 'no participant'}")
     return 0

@@ -25,6 +25,7 @@ from experiments.record.phases import TASK
 from experiments.web.protocol import MAX_INPUTS
 
 HOSTILE, OTHER = "127.0.0.66", "127.0.0.2"  # addresses of the hostile machine, and of who opens new visits
+CLOSING_S = 0.5  # time for the close frames of replaced sockets to arrive, in seconds
 SPOOFED = 60  # visits that the hostile machine begins in the names of others
 DOCUMENT = Path(__file__).parents[3] / "docs" / "browser.md"
 MAIN = """daemon off; pid {folder}/pid; error_log {folder}/error.log; worker_rlimit_nofile 16384;
@@ -115,10 +116,10 @@ def _attack(results: Any, url: str, flooded: str, shared: str, number: int) -> N
 
 async def _attack_at_once(results: Any, url: str, flooded: str, shared: str, number: int) -> None:
     results.send("begins")
-    cut_off, (_connections, most), begun, _writers = await asyncio.gather(
+    cut_off, (_connections, still_open), begun, _writers = await asyncio.gather(
         _flood(flooded, number), _open_sockets(shared, number), _spoof(url), _half_send(url, number)
     )
-    results.send({"flood_cut_off": cut_off, "sockets_served": most, "visits_begun": begun})
+    results.send({"flood_cut_off": cut_off, "sockets_open": still_open, "visits_begun": begun})
     await asyncio.Event().wait()  # the connections stay open
 
 
@@ -137,8 +138,12 @@ async def _flood(address: str, number: int) -> bool:
 
 
 async def _open_sockets(address: str, number: int) -> tuple[list[ClientConnection], int]:
-    """Open sockets of one visit, each with a hello. Return them, and the largest number open at the same time."""
-    parts, served, most = urlsplit(address), list[ClientConnection](), 0
+    """Open sockets of one visit, each with a hello. Return them, and the number that the server leaves open.
+
+    A later socket may replace a silent one, which the server closes. So more sockets than the limit may be served
+    in turn.
+    """
+    parts, served = urlsplit(address), list[ClientConnection]()
     view = {"type": "view", "width": 640, "height": 480, "codec": "none"}
     for i in range(number):
         with suppress(WebSocketException, OSError, TimeoutError):
@@ -146,12 +151,13 @@ async def _open_sockets(address: str, number: int) -> tuple[list[ClientConnectio
                 f"ws://{parts.netloc}{parts.path}",
                 origin=f"http://{parts.netloc}",  # type: ignore[arg-type]
                 local_addr=(HOSTILE, 0),
+                max_queue=None,  # read everything, so that a closed connection is noticed
             )
             served.append(connection)
-            most = max(most, sum(one.state is State.OPEN for one in served))
             hello = {"type": "hello", "tab": f"hostile-{i:05}", "trial": TASK, "view": view}
             await connection.send(json.dumps(hello))
-    return served, most
+    await asyncio.sleep(CLOSING_S)
+    return served, sum(connection.state is State.OPEN for connection in served)
 
 
 async def _spoof(url: str) -> int:

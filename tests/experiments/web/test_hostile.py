@@ -24,6 +24,6 @@ def test_a_hostile_machine_disturbs_nobody(tmp_path, nginx):
     found = measure_hostile(tmp_path, SOCKETS, 3.0, *FAST, nginx=nginx)
     print(found)
     assert found["flood_cut_off"] and found["journal_kb"] < 500.0, "presses do not fill the disk"
-    assert found["sockets_served"] <= SOCKETS_OF_A_PERSON
+    assert 1 <= found["sockets_open"] <= SOCKETS_OF_A_PERSON
     assert found["visits_begun"] <= NEW_PEOPLE[0], "nobody speaks for others"
     assert found["errors"] == 0
