@@ -244,6 +244,7 @@ def test_what_the_paper_page_says_of_departures_is_so(capsys):
         assert option in text and option in told
 
 
+@pytest.mark.slow
 def test_the_site_has_every_public_name(tmp_path):
     """The tutorial is shown without its outputs here; `make site` runs it."""
     text, root = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8"), DOCS.parent

@@ -9,8 +9,9 @@ from benchmarks.support.study_people import arrive_at_once, study_process
 from experiments.visit.store import Store
 
 
-@pytest.mark.parametrize("people", [24, pytest.param(500, marks=pytest.mark.slow)])
-def test_everybody_who_comes_at_once_gets_every_page_and_a_place_of_their_own(tmp_path, url, people):
+@pytest.mark.slow
+def test_everybody_who_comes_at_once_gets_every_page_and_a_place_of_their_own(tmp_path, url):
+    people = 500
     with study_process(tmp_path, "--database", url, people=people // 2) as server:
         times, links = asyncio.run(arrive_at_once(server.url, people))
     print({name: f"{max(seconds):.2f} s" for name, seconds in times.pages.items()})
