@@ -117,6 +117,7 @@ def test_the_report_begins_with_every_hypothesis(analysed):
     assert first.count("optimal - none") == 4 * 4
 
 
+@pytest.mark.slow
 def test_every_figure_has_a_caption_and_one_shows_all_readings_of_a_measure(tmp_path):
     people = made_up_people(SMALL)
     folder = study(tmp_path, [row | {"nd_bin_tied": row["nd_feasible"] ** 2} for row in people])

@@ -22,6 +22,7 @@ from experiments.trials.trial_config import TrialConfig
 from experiments.visit.store import Store
 from mjsim.support.files import WORK
 
+pytestmark = pytest.mark.slow
 PEOPLE = ("anna", "bert", "cleo")
 SEEDS = (6112233, 6445566, 6778899)  # of people; no other number in the files is one of these
 

@@ -148,6 +148,7 @@ def test_bad_arguments_are_named(small_catalogue, arguments, message):
         sample_episode(small_catalogue, Floor(), **{"objects": 6, "seed": 0, **arguments})
 
 
+@pytest.mark.slow
 def test_crowded_floor_says_how_much_was_tried(small_catalogue):
     with pytest.raises(SamplingError, match=r"of 40 points .* rejections"):
         sample_episode(small_catalogue, Floor(), objects=6, seed=0)
