@@ -1,10 +1,10 @@
-"""Exceptions of the package `experiments`, and functions that describe any exception.
+"""The exceptions of this package, and functions that format values and errors for messages.
 
 ExperimentError
 ├── ConfigError     an option of a run or batch is not usable
 ├── SessionError    a session cannot continue
-├── RecordError     a run directory is missing, incomplete or in the way
-├── UserCodeError   a custom participant, condition or planner raised, or returned an invalid value
+├── RecordError     a run folder is missing, incomplete or already exists
+├── UserCodeError   a custom participant, condition or planner fails or returns an invalid value
 ├── StatisticsError the data do not allow a statistical test
 ├── StoreError      the database of a study is not usable, or a request contradicts its content
 └── ReplayError     a recorded run cannot be replayed, or differs from its record
@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("experiments", "hud", "mjsim", "planner", "studies")
 LIBRARIES = tuple({path + os.sep for path in sysconfig.get_paths().values()} | {"<frozen "})
-# Environment variable with the time limit of one call of user code, in seconds. Worker processes inherit it.
+# Environment variable with the time limit for one call of user code, in seconds. Worker processes inherit it.
 CALL_LIMIT = "MJSIM_CALL_LIMIT"
 MAX_SHOWN = 300  # maximum length of a value in an error message, in characters
 
@@ -29,31 +29,31 @@ class ExperimentError(Exception):
 
 
 class ConfigError(ExperimentError):
-    """An option of a run or batch is not valid."""
+    """Raised if an option of a run or batch is not valid."""
 
 
 class SessionError(ExperimentError):
-    """A session cannot continue."""
+    """Raised if a session cannot continue."""
 
 
 class RecordError(ExperimentError):
-    """A run directory is missing, incomplete, or exists although a new one is needed."""
+    """Raised if a run folder is missing or incomplete, or if a new run folder already exists."""
 
 
 class UserCodeError(ExperimentError):
-    """A custom participant, condition or planner raised, or returned an invalid value."""
+    """Raised if a custom participant, condition or planner fails or returns an invalid value."""
 
 
 class StatisticsError(ExperimentError):
-    """The data do not allow a statistical test. The message states the reason."""
+    """Raised if the data do not allow a statistical test. The message states the reason."""
 
 
 class StoreError(ExperimentError):
-    """The database of a study cannot be used, or a request contradicts its contents. The message proposes a remedy."""
+    """Raised if a study database cannot be used, or if a request contradicts its contents."""
 
 
 class ReplayError(ExperimentError):
-    """A recorded run cannot be replayed, or the replay differs from the record.
+    """Raised if a recorded run cannot be replayed, or if the replay differs from the record.
 
     Attributes:
         step: First control step with a difference, or None if the cause is not a single step.
@@ -67,8 +67,8 @@ class ReplayError(ExperimentError):
 
 
 def describe(error: BaseException) -> str:
-    """Describe an exception in one line. The type is included unless the exception is defined by this project."""
-    # Import late: `mjsim doctor` must work even if another distribution shadows one of these packages.
+    """Describe an exception in one line. The type is included unless this project defines the exception."""
+    # Import these here so that `mjsim doctor` works even if another distribution shadows one of the packages.
     from hud.errors import HudError
     from mjsim.values.errors import MjsimError
     from planner.errors import PlannerError
@@ -83,7 +83,7 @@ def describe(error: BaseException) -> str:
 
 
 def shown(value: object) -> str:
-    """Return a value's representation, shortened for an error message."""
+    """Return the `repr` of a value, shortened for error messages."""
     try:
         return _cut(" ".join(repr(value).encode(errors="backslashreplace").decode().split()))
     except Exception:  # custom classes may fail to format

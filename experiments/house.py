@@ -1,4 +1,4 @@
-"""A house prepared for many episodes, with its catalogue, navmesh, geodesics, rooms and receptacles."""
+"""A loaded house, with its catalogue, navmesh, geodesics, rooms and receptacles."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -30,23 +30,23 @@ from planner.navmesh import NavMesh
 TEXTS = Path(__file__).with_name("texts")  # folder with one TOML file per language
 VIEWPOINT_SPACING = 2.2  # maximum distance from any point of a room to a viewpoint, in metres
 VIEWPOINT_CANDIDATES = 3000
-WALL_GAP = 0.05  # additional distance of planned paths from walls, for cutting corners, in metres
+WALL_GAP = 0.05  # extra distance between planned paths and walls, in metres, so that people can cut corners
 
 
 @dataclass(frozen=True, eq=False)
 class House:
-    """The parts of a house that are the same in all episodes. Participants know them from the familiarisation.
+    """A house and all data that are the same in every episode.
 
     Attributes:
         sampling_floor: Navmesh of the default person, on which objects and start positions are sampled for every
             person.
         navmesh: Navmesh of the person who walks in this house.
-        geodesics: Shortest paths for planning and guidance, slightly away from the walls. Objects may be off the
-            navmesh, but within reach of a path.
-        receptacles: Geometry by receptacle key.
+        geodesics: Shortest paths for planning and guidance, at a small distance from the walls. Objects may
+            be off the navmesh if they are within reach of a path.
+        receptacles: Geometry of each receptacle, by key.
         bounds: (x_min, y_min, x_max, y_max) of the floor, in metres.
         texts: HUD texts in the language of the catalogue's labels.
-        seen: Keys of the receptacles that the participant has seen, or None for all.
+        seen: Keys of the receptacles that the participant has seen, or None if all are known.
     """
 
     catalogue: Catalogue
@@ -62,7 +62,7 @@ class House:
 
     @classmethod
     def load(cls, name: str = "apartment") -> "House":
-        """Compile a house and build the navmesh of the default person.
+        """Load a house by name and build the navmesh of the default person.
 
         Args:
             name: Name of a house in `models/houses`, path of a recipe, a `catalogue.toml` or its folder, or a generated
@@ -95,11 +95,11 @@ class House:
         )
 
     def in_language(self, language: str, texts: HudTexts | None = None) -> "House":
-        """Return this house with labels and HUD texts in another language. `texts` overrides the language's HUD texts.
+        """Return a copy of this house in another language. `texts` replaces the HUD texts of that language.
 
         Raises:
             ConfigError: The language is not available.
-            AssetError: A file of labels cannot be used.
+            AssetError: A file with labels cannot be used.
         """
         texts = texts or HudTexts(**read_words(language)["hud"])
         catalogue = self.catalogue.in_language(language)
@@ -107,7 +107,7 @@ class House:
         return dataclasses.replace(self, catalogue=catalogue, rooms=rooms, texts=texts)
 
     def for_person(self, person: PersonParameters) -> "House":
-        """Return this house for a person of a different size or reach. The episodes stay the same.
+        """Return a copy of this house for a person of a different size or reach. Episodes do not change.
 
         Raises:
             ConfigError: A receptacle would be out of reach.
@@ -131,19 +131,19 @@ class House:
 
     @cached_property
     def body_geodesics(self) -> Geodesics:
-        """Shortest paths for a person whose trunk touches the walls, which give lower bounds on walking distances."""
+        """Shortest paths without extra distance from walls, which give lower bounds on walking distances."""
         floor = compiled_house(self.catalogue).floor
         return Geodesics(_navmesh(floor, self.person.body_radius))
 
     @cached_property
     def approaches(self) -> Mapping[str, NDArray[np.float64]]:
-        """For each receptacle, the navigable point from which it can be used. Shape (2,), in metres."""
+        """Navigable points from which receptacles can be used, by receptacle key, in metres, shape (2,)."""
         return {key: self.navmesh.snap(r.approach) for key, r in self.receptacles.items()}
 
     @cached_property
     def viewpoints(self) -> Mapping[str, NDArray[np.float64]]:
-        """For each room, points from which all of the room can be seen. Shape (k, 2), in metres."""
-        # Use a fixed seed, because the viewpoints must be the same in all trials in the house.
+        """Points that together give a view of the whole room, by room key, in metres, shape (k, 2)."""
+        # Use a fixed seed so that the viewpoints are the same in all trials in the house.
         floor = self.navmesh.sample(np.random.default_rng(0), VIEWPOINT_CANDIDATES)
         rooms = np.array(self.rooms.keys)[self.rooms.distances(floor).argmin(axis=1)]
         return {
@@ -155,10 +155,10 @@ class House:
     def sample_episode(
         self, *, objects: int, seed: int, points: int = POINTS, disorder: Disorder | None = None
     ) -> Episode:
-        """Sample a disorganized state of the house (PAPER section 4).
+        """Sample an episode, in which objects are misplaced at random (PAPER section 4).
 
         Raises:
-            SamplingError: `objects` is out of range, or the house is too small for the points.
+            SamplingError: `objects` is out of range, or the house is too small for the number of points.
         """
         floor = self.sampling_floor
         return sample_episode(
@@ -166,16 +166,16 @@ class House:
         )
 
     def sample_points(self, *, seed: int, points: int = POINTS) -> NDArray[np.float64]:
-        """Sample points at which objects may lie. They have shape (points, 2), in metres.
+        """Sample points at which objects can be placed, in metres, shape (points, 2).
 
         Raises:
-            SamplingError: The house is too small for the points.
+            SamplingError: The house is too small for the number of points.
         """
         return house_points(self.catalogue, self.sampling_floor, seed=seed, points=points)
 
 
 def read_words(language: str = "en") -> Mapping[str, Mapping[str, Any]]:
-    """Read all texts of a language, by section and name.
+    """Return all texts of a language, by section and name.
 
     Raises:
         ConfigError: The language is not available.

@@ -1,6 +1,6 @@
-"""The heads-up display: assistance conditions, the HUD states that they return, and the code that draws them.
+"""The heads-up display (HUD): assistance conditions, the HUD states that they return, and drawing functions.
 
-The package depends neither on the physics nor on the planner.
+The package depends on neither the physics simulation nor the planner.
 """
 
 import lazy_loader

@@ -11,7 +11,7 @@ from hud.texts import filled
 
 
 def none(view: TaskView) -> HudState:
-    """Show no assistance: only the list of objects in random order, with their pictures and bins."""
+    """Show only a list of all objects in random order, with their pictures and bins."""
 
     def detail(item: TaskObject) -> str:
         return f"→ {view.receptacle(item.receptacle).label}"
@@ -20,7 +20,7 @@ def none(view: TaskView) -> HudState:
 
 
 def highlight(view: TaskView) -> HudState:
-    """Show the list of `none` with the room of each object, and a flagpole over every misplaced object."""
+    """Show all objects in random order with their rooms, and a flagpole over each misplaced object."""
 
     def detail(item: TaskObject) -> str:
         target = f"→ {view.receptacle(item.receptacle).label}"
@@ -30,7 +30,7 @@ def highlight(view: TaskView) -> HudState:
 
 
 def optimal(view: TaskView) -> HudState:
-    """Show the plan as numbered steps, with breadcrumbs to the next step and flagpoles."""
+    """Show the plan as a list of numbered steps, with flagpoles and with breadcrumbs to the next step."""
     done = len(view.steps_done)
     steps = (*view.steps_done, *view.plan)
     checklist = tuple(_row(view, i, kind, name, done) for i, (kind, name) in enumerate(steps))
@@ -39,7 +39,7 @@ def optimal(view: TaskView) -> HudState:
 
 
 def guided(view: TaskView) -> HudState:
-    """Show `optimal` with four options that are not in the paper but are expected to help."""
+    """Show the condition `optimal` with four additional options that are not described in the paper."""
     added = (options.reroute, options.rims, options.pin, options.pointer)
     return functools.reduce(lambda state, apply: apply(view, state), added, optimal(view))
 

@@ -1,4 +1,4 @@
-"""The built-in options, which change the HUD state returned by a condition."""
+"""The built-in options, which modify the HUD state that a condition returns."""
 
 import itertools
 from dataclasses import replace
@@ -11,7 +11,7 @@ from hud.state import FLOORPLAN, ChecklistItem, HudState, Marker, MiniMap, Vec2
 from hud.task import Alternative, TaskStep, TaskView
 from hud.texts import HudTexts, filled
 
-REROUTE_CLEARANCE = 0.5  # length of path in front of the person without breadcrumbs, in metres
+REROUTE_CLEARANCE = 0.5  # minimum distance from the person to the first breadcrumb, in metres
 NEGLIGIBLE = 0.01  # regret below which a step counts as optimal, in metres
 
 
@@ -25,7 +25,7 @@ def bins(view: TaskView, state: HudState) -> HudState:
 
 
 def minimap(view: TaskView, state: HudState) -> HudState:
-    """Add a map of the house with the person and the markers of the condition."""
+    """Add a map of the house that shows the person and the markers of the condition."""
     if view.bounds is None:
         return state
     goals = _floor_positions(state, GOAL)
@@ -49,14 +49,14 @@ def pin(view: TaskView, state: HudState) -> HudState:
 
 
 def pointer(view: TaskView, state: HudState) -> HudState:
-    """Add an arrow towards the goal of the next step while this goal is out of view."""
+    """Add an arrow that points to the goal of the next step if the goal is out of view."""
     if view.goal is None or view.camera is None:
         return state
     return replace(state, pointer=pointer_to(view.camera, view.goal))
 
 
 def regret(view: TaskView, state: HudState) -> HudState:
-    """Add the regret of each possible next step to the step's row, as soon as the regrets are known."""
+    """Add the regret of each possible next step to its row in the task list, once the regrets are known."""
     known = {(a.kind, a.object): a for a in view.alternatives()}
     steps = _steps(view, state)
     if not known or len(steps) != len(state.checklist):
@@ -69,7 +69,7 @@ def regret(view: TaskView, state: HudState) -> HudState:
 
 
 def reroute(view: TaskView, state: HudState) -> HudState:
-    """Replace the breadcrumbs with those of a path that starts at the person and changes when the person leaves it.
+    """Show breadcrumbs from the person to the goal. If the person leaves their path, a new path replaces it.
 
     In the paper, breadcrumbs stay in place until the next pick or place.
     """
@@ -81,13 +81,13 @@ def reroute(view: TaskView, state: HudState) -> HudState:
 
 
 def rims(view: TaskView, state: HudState) -> HudState:  # noqa: ARG001 - the interface of options
-    """Add a white rim around each breadcrumb, for participants who cannot distinguish red from a brown floor."""
+    """Add a white rim around each breadcrumb, for participants who cannot distinguish red from brown."""
     crumbs = tuple(marker for marker in state.markers if marker.role == BREADCRUMB)
     return replace(state, markers=(*crumbs, *markers.rims(crumbs), *_without_breadcrumbs(state)))
 
 
 def xray(view: TaskView, state: HudState) -> HudState:  # noqa: ARG001 - the interface of options
-    """Show all markers through walls, where they appear dimmed."""
+    """Make all markers visible through walls, where they appear dimmed."""
     return replace(state, markers=tuple(replace(marker, x_ray=True) for marker in state.markers))
 
 

@@ -1,4 +1,4 @@
-"""A transparent drawing surface, and the patches that are blended onto frames."""
+"""A transparent surface for drawing panels, and the resulting patches, which are blended onto frames."""
 
 import math
 from collections.abc import Sequence
@@ -24,24 +24,24 @@ class Rect:
 
     @property
     def right(self) -> int:
-        """First column to the right of the rectangle."""
+        """The first column to the right of the rectangle."""
         return self.x + self.width
 
     @property
     def bottom(self) -> int:
-        """First row below the rectangle."""
+        """The first row below the rectangle."""
         return self.y + self.height
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A drawn panel with its transparency. Blending computes `frame * keep / 255 + colour`."""
+    """The image of a panel and its transparency. Blending computes `frame * keep / 255 + colour`."""
 
     colour: NDArray[np.uint8]  # colour times opacity, shape (h, w, 3)
-    keep: NDArray[np.uint8]  # transparency, 255 where the frame stays unchanged, shape (h, w, 3)
+    keep: NDArray[np.uint8]  # transparency, 255 where the frame remains unchanged, shape (h, w, 3)
 
     def faded(self, opacity: float) -> "Patch":
-        """Return a copy with its opacity multiplied by `opacity`, from 0 to 1."""
+        """Return a copy of the patch whose opacity is multiplied by `opacity`, from 0 to 1."""
         share = min(max(opacity, 0.0), 1.0)
         levels = np.arange(256.0)
         colour = np.rint(levels * share).astype(np.uint8)
@@ -49,7 +49,7 @@ class Patch:
         return Patch(cv2.LUT(self.colour, colour), cv2.LUT(self.keep, keep))
 
     def lay_over(self, frame: NDArray[np.uint8], x: int, y: int) -> None:
-        """Blend onto a frame in place, with the upper left corner at `x`, `y`. The patch must be inside the frame."""
+        """Blend the patch onto a frame in place, with its corner at (x, y). It must fit into the frame."""
         height, width = self.keep.shape[:2]
         view = frame[y : y + height, x : x + width]
         cv2.multiply(view, self.keep, dst=view, scale=1.0 / 255.0)
@@ -65,7 +65,7 @@ class Canvas:
         self.typeface = stencils.typeface
         self.unit = stencils.unit
         self.px = stencils.typeface.px
-        # Red, green and blue times opacity, then opacity. Planes are faster than interleaved channels.
+        # Planes of red, green, blue (each times opacity) and opacity. Interleaved channels would be slower.
         self._planes: Floats = np.zeros((4, height, width), dtype=np.float32)
 
     @classmethod
@@ -78,7 +78,7 @@ class Canvas:
         return canvas
 
     def fill(self, mask: Floats, colour: Rgb, opacity: float, x: int = 0, y: int = 0) -> None:
-        """Blend a colour onto the canvas. `mask` is the coverage from 0 to 1, and is clipped to the canvas."""
+        """Blend a colour onto the canvas. `mask` is the coverage from 0 to 1. The canvas clips the mask."""
         x0, y0 = max(x, 0), max(y, 0)
         x1, y1 = min(x + mask.shape[1], self.width), min(y + mask.shape[0], self.height)
         if x0 >= x1 or y0 >= y1:
@@ -90,11 +90,11 @@ class Canvas:
         area += change
 
     def rounded(self, rect: Rect, radius: float, colour: Rgb, opacity: float, line: float = 0.0) -> None:
-        """Draw a filled rounded rectangle, or its outline of width `line`."""
+        """Draw a filled rounded rectangle, or only its outline if the width `line` is positive."""
         self.fill(rounded(rect.width, rect.height, radius, line), colour, opacity, rect.x, rect.y)
 
     def shape(self, points: Sequence[tuple[float, float]], colour: Rgb, line: float = 0.0) -> None:
-        """Draw a filled polygon with smooth edges, or an open polyline of width `line`."""
+        """Draw a filled polygon with smooth edges, or an open polyline if the width `line` is positive."""
         mask = np.zeros((self.height, self.width), dtype=np.uint8)
         corners = np.asarray(points, dtype=np.float64)
         fixed = [np.rint(corners * 16.0).astype(np.int32).reshape(-1, 1, 2)]
@@ -111,13 +111,13 @@ class Canvas:
     def arrow(
         self, centre: float, angle: float, outline: Sequence[tuple[float, float]], size: float, colour: Rgb
     ) -> None:
-        """Draw a polygon in units of `size` with y downwards, rotated by `angle` radians around `centre`."""
+        """Draw a polygon whose y axis points down, scaled by `size` and rotated by `angle` radians."""
         c, s = math.cos(angle), -math.sin(angle)
         points = [(centre + size * (a * c - b * s), centre + size * (a * s + b * c)) for a, b in outline]
         self.shape(points, colour)
 
     def text(self, x: int, baseline: int, text: str, face: Face, colour: Rgb) -> int:
-        """Draw one line of text from column `x`. Return its width."""
+        """Draw one line of text that starts at column `x`. Return the width of the text."""
         if not text:
             return 0
         stencil = self.stencils.text(text, face)
@@ -125,7 +125,7 @@ class Canvas:
         return self.typeface.width(text, face)
 
     def tile(self, key: str | None, x: int, y: int, size: int, opacity: float = 1.0) -> None:
-        """Draw a picture on a light square with rounded corners. If the key is unknown, the square is empty."""
+        """Draw a picture on a light square with rounded corners. The square is empty for an unknown key."""
         self.rounded(Rect(x, y, size, size), 4.0 * self.unit, theme.TILE_COLOUR, 0.94 * opacity)
         inset = self.px(1)
         side = size - 2 * inset
@@ -138,7 +138,7 @@ class Canvas:
         area[3] += (1.0 - area[3]) * share
 
     def image(self, colours: Floats, opacity: Floats, x: int, y: int) -> None:
-        """Draw an image (h, w, 3), 0 to 255, with an opacity per pixel (h, w), 0 to 1. It must be inside the canvas."""
+        """Draw an image (h, w, 3), 0 to 255, with an opacity (h, w), 0 to 1. It must fit into the canvas."""
         area = self._planes[:, y : y + colours.shape[0], x : x + colours.shape[1]]
         area[:3] += (np.moveaxis(colours, 2, 0) - area[:3]) * opacity
         area[3] += (1.0 - area[3]) * opacity

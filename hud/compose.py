@@ -1,4 +1,4 @@
-"""Draw the HUD, or captions, over frames."""
+"""Classes and functions that draw the HUD or captions over frames."""
 
 import dataclasses
 import functools
@@ -23,12 +23,12 @@ Draw = Callable[..., Patch]
 
 
 class Compositor:
-    """Draws HUD states over frames. A panel is drawn again only if its content has changed.
+    """A compositor that draws HUD states over frames. It redraws a panel only if its content has changed.
 
     Args:
-        pictures: RGBA pictures by key, as uint8 of shape (s, s, 4) with straight alpha. Only the floor plan may have
-            another shape. The pictures must not change.
-        texts: Words of the HUD.
+        pictures: RGBA pictures by key, as uint8 of shape (s, s, 4) with straight alpha. Only the floor plan
+            may have another shape. The arrays must not be modified later.
+        texts: Texts of the HUD.
 
     Raises:
         FrameError: A picture has the wrong shape or type.
@@ -48,7 +48,7 @@ class Compositor:
         self._patches: dict[str, tuple[object, Patch]] = {}
 
     def compose(self, frame: NDArray[np.uint8], state: HudState) -> NDArray[np.uint8]:
-        """Return a copy of a frame with the HUD drawn over it. The renderer, not this method, draws the markers.
+        """Return a copy of a frame with the HUD drawn over it. The markers are drawn by the renderer.
 
         Args:
             frame: RGB image as uint8 of shape (H, W, 3), at least 320 pixels wide and 240 high.
@@ -99,7 +99,7 @@ class Compositor:
 def compose(
     frame: NDArray[np.uint8], state: HudState, pictures: Pictures, texts: HudTexts
 ) -> NDArray[np.uint8]:
-    """Draw the HUD over one frame. For many frames, use a `Compositor`, which is faster.
+    """Return a copy of a frame with the HUD drawn over it. For many frames, a `Compositor` is faster.
 
     Raises FrameError if the frame or a picture has the wrong shape or type, or the frame is too small.
     """
@@ -158,7 +158,7 @@ def _contents(state: HudState, layout: Layout, texts: HudTexts) -> dict[str, tup
 
 
 class Captions:
-    """Draws captions of a title and a line of detail at the bottom of frames of a fixed size in pixels."""
+    """Captions at the bottom of frames of a fixed size. Each caption has a title and a line of detail."""
 
     def __init__(self, width: int, height: int) -> None:
         self._size = (width, height)
@@ -166,7 +166,7 @@ class Captions:
         self._patch = functools.lru_cache(64)(self._draw)
 
     def over(self, frame: NDArray[np.uint8], title: str, detail: str = "") -> NDArray[np.uint8]:
-        """Return a copy of an RGB frame, as uint8 of shape (height, width, 3), with a caption."""
+        """Return a copy of an RGB frame (uint8, shape (height, width, 3)) with a caption drawn over it."""
         width, height = self._size
         if frame.shape != (height, width, 3):
             raise FrameError(f"frame must be of shape {(height, width, 3)}, got {frame.shape}")

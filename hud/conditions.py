@@ -1,4 +1,4 @@
-"""Registry of assistance conditions and their options."""
+"""The registry of assistance conditions and their options."""
 
 import functools
 import pkgutil
@@ -14,13 +14,13 @@ if TYPE_CHECKING:  # the command line imports this module and must not load NumP
 Condition: TypeAlias = "Callable[[TaskView], HudState]"
 Option: TypeAlias = "Callable[[TaskView, HudState], HudState]"
 
-# Functions of `hud.builtin_conditions` and `hud.builtin_options`.
+# Names of functions in `hud.builtin_conditions` and `hud.builtin_options`.
 CONDITIONS = ("guided", "highlight", "none", "optimal")
 OPTIONS = ("bins", "minimap", "pin", "pointer", "regret", "reroute", "rims", "xray")
 
 
 def condition(name: str) -> Condition:
-    """Return a condition by its name or `package.module:attribute`. Options may follow the name after hyphens.
+    """Return a condition by its name, such as `optimal`, `optimal-minimap` or `package.module:attribute`.
 
     Raises:
         ConditionError: There is no such condition or option, or it cannot be loaded.

@@ -1,25 +1,25 @@
-"""Exceptions raised by the HUD."""
+"""The exceptions that the HUD raises."""
 
 
 class HudError(Exception):
-    """Base class of all errors of :mod:`hud`."""
+    """The base class of all exceptions in :mod:`hud`."""
 
 
 class ConditionError(HudError):
-    """An assistance condition does not exist or cannot be used."""
+    """Raised if an assistance condition does not exist or cannot be used."""
 
 
 class TaskViewError(HudError):
-    """A task view refers to an object or receptacle that it does not contain."""
+    """Raised if a task view refers to an object or receptacle that it does not contain."""
 
 
 class FrameError(HudError):
-    """A frame, picture or camera has the wrong shape."""
+    """Raised if a frame, a picture or a camera has the wrong shape."""
 
 
 class MessageError(HudError):
-    """A message key does not exist."""
+    """Raised if a message key does not exist."""
 
 
 class SchemaError(HudError):
-    """A dictionary does not describe a HUD state."""
+    """Raised if a value is not a valid HUD state."""

@@ -1,4 +1,4 @@
-"""Layout of the panels, which never overlap.
+"""The layout of the HUD's panels, which never overlap.
 
 progress        message bar         clock
 task list                            bins
@@ -18,12 +18,12 @@ from hud.errors import FrameError
 from hud.state import BinEntry, ChecklistItem, HudState, Message, MiniMap
 from hud.text import Typeface
 
-CONTEXT_ROWS = 2  # rows that stay visible above the current one
+CONTEXT_ROWS = 2  # number of rows that stay visible above the current row
 
 
 @dataclass(frozen=True)
 class ListRow:
-    """Layout of a list row: its height, the width of its text, and its detail broken into lines."""
+    """The layout of a row in a list: its height, the width of its text, and the lines of its detail."""
 
     height: int
     text_width: int
@@ -32,23 +32,23 @@ class ListRow:
 
 @dataclass(frozen=True)
 class Layout:
-    """Rectangles of the panels in a frame, and the rows and lines that they show."""
+    """The rectangles of all panels in a frame, and the rows and lines of text in the panels."""
 
-    panels: Mapping[str, Rect]  # visible panels by name, in drawing order
-    free: Rect  # free view between the panels
+    panels: Mapping[str, Rect]  # rectangles of the visible panels by name, in drawing order
+    free: Rect  # area between the panels in which the view is free
     first: int  # index of the first visible row of the task list
     rows: tuple[ListRow, ...]  # visible rows of the task list
     bin_rows: tuple[ListRow, ...]  # visible rows of the list of bins
-    message_lines: tuple[str, ...]  # message broken into lines
+    message_lines: tuple[str, ...]  # lines of the message
 
     @property
     def stop(self) -> int:
-        """Index after the last visible row of the task list."""
+        """The index after the last visible row of the task list."""
         return self.first + len(self.rows)
 
 
 def unit_of(width: int, height: int) -> float:
-    """Return the largest scale, in frame pixels per theme pixel, at which 640 x 480 theme pixels fit into a frame."""
+    """Return the scale, in frame pixels per theme pixel, at which 640 x 480 theme pixels fit into a frame."""
     smallest = theme.MIN_FRAME
     if width < smallest[0] or height < smallest[1]:
         raise FrameError(
@@ -58,7 +58,7 @@ def unit_of(width: int, height: int) -> float:
 
 
 def margins(width: int, height: int) -> tuple[int, int, int, int]:
-    """Return the margins above, below, left and right of a picture that leave space for all panels, in pixels.
+    """Return the margins (top, bottom, left, right) around a picture, in pixels, in which all panels fit.
 
     Only long messages may extend into the picture.
     """
@@ -70,7 +70,7 @@ def margins(width: int, height: int) -> tuple[int, int, int, int]:
 
 
 def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Layout:
-    """Lay out all panels of a HUD state except its pointer."""
+    """Compute the layout of all panels of a HUD state except the pointer."""
     grid = _PanelGrid(width, height, typeface)
     checklist, first, rows = grid.checklist(state.checklist, state.scroll)
     minimap = grid.minimap(state.minimap)
@@ -91,9 +91,9 @@ def arrange(state: HudState, width: int, height: int, typeface: Typeface) -> Lay
 
 
 def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
-    """Return a square with the given side at the edge of the free view.
+    """Return the square at the edge of the free view in which the pointer is drawn.
 
-    The angle is in radians, counter-clockwise from the right.
+    `angle` is the direction of the pointer in radians, counter-clockwise from the right.
     """
     half_width, half_height = (free.width - side) / 2.0, (free.height - side) / 2.0
     dx, dy = math.cos(angle), -math.sin(angle)
@@ -106,9 +106,9 @@ def pointer_rect(angle: float, free: Rect, side: int) -> Rect:
 
 
 def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, int]:
-    """Return the index of the first visible row, and the index after the last one.
+    """Return the index of the first visible row and the index after the last visible row.
 
-    The current row and up to two rows before it are visible, then as many rows as fit into `room` pixels.
+    The current row, up to two rows before it, and as many other rows as fit into `room` pixels are visible.
     """
     first, stop, used = current, current + 1, heights[current]
     while first > max(0, current - CONTEXT_ROWS) and used + heights[first - 1] <= room // 2:
@@ -124,7 +124,7 @@ def visible_rows(heights: Sequence[int], current: int, room: int) -> tuple[int, 
 
 
 def scrolled(heights: Sequence[int], first: int, room: int) -> tuple[int, int]:
-    """Return the range of visible rows after scrolling to row `first`, or as far as the list allows."""
+    """Return the range of visible rows after the list was scrolled to row `first` or as far as possible."""
     ends = np.cumsum(heights)
     last_first = int(np.searchsorted(ends, ends[-1] - room)) + 1 if ends[-1] > room else 0
     first = min(max(first, 0), last_first, len(heights) - 1)
@@ -226,7 +226,7 @@ class _PanelGrid:
         )
 
     def message(self, message: Message | None) -> tuple[Rect | None, tuple[str, ...]]:
-        """Lay out the message bar. A message too long for one line between the chips gets up to three lines."""
+        """Return the rectangle of the message bar, and its lines of text. Long text has up to three lines."""
         if message is None or message.opacity <= 0.0 or not message.text.strip():
             return None, ()
         face, extra = theme.BAR, self._px(theme.MESSAGE_ICON + 2 * theme.PADDING)

@@ -1,4 +1,4 @@
-"""Building blocks of conditions: task lists in random order, flagpoles, and the panels that all conditions share."""
+"""Building blocks of conditions, such as task lists in random order and flagpoles."""
 
 import math
 from collections.abc import Callable
@@ -7,11 +7,11 @@ from hud.markers import flagpole
 from hud.state import BinEntry, ChecklistItem, HudState, InventorySlot, Marker, Pointer
 from hud.task import TaskObject, TaskView
 
-NEAR = 1.6  # distance in metres at which an object nearly leaves the view at the bottom
+NEAR = 1.6  # distance in metres below which an object is close to the lower edge of the view
 
 
 def in_sentence(label: str) -> str:
-    """Adapt a label to a sentence: "Blue mug" becomes "blue mug", but "LEGO car" and "T-shirt" are unchanged."""
+    """Adapt a label for use in a sentence: "Blue mug" becomes "blue mug", but "LEGO car" is unchanged."""
     first, _, rest = label.partition(" ")
     stem = first.partition("-")[0]
     plain = len(stem) > 1 and stem.isalpha() and first[:1].isupper() and first[1:].islower()
@@ -19,12 +19,12 @@ def in_sentence(label: str) -> str:
 
 
 def bins(view: TaskView) -> tuple[BinEntry, ...]:
-    """List all receptacles with their picture, room and place in the room (PAPER sections 5 and 7)."""
+    """Return an entry with the picture, room and place of each receptacle (PAPER sections 5 and 7)."""
     return tuple(BinEntry(r.label, f"{r.room}, {r.place}", r.picture) for r in view.receptacles)
 
 
 def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
-    """Return the contents of the left and the right hand. The left one is None if the capacity is one."""
+    """Return the contents of the left and the right hand. With a capacity of one, the left value is None."""
     left, right = (
         InventorySlot() if name is None else InventorySlot(view.object(name).label, view.object(name).picture)
         for name in view.hands
@@ -33,10 +33,7 @@ def inventory(view: TaskView) -> tuple[InventorySlot | None, InventorySlot]:
 
 
 def random_order(view: TaskView) -> tuple[TaskObject, ...]:
-    """Return the loose objects in the participant's random order, then the others in the order of their picks.
-
-    An object that was dropped counts as loose again.
-    """
+    """Return the loose objects in the participant's random order, then the others in the order of picks."""
     picks = [name for kind, name in view.steps_done if kind == "pick"]
     last_pick = {name: i for i, name in enumerate(picks)}
     objects = [view.object(name) for name in view.order]
@@ -46,7 +43,7 @@ def random_order(view: TaskView) -> tuple[TaskObject, ...]:
 
 
 def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tuple[ChecklistItem, ...]:
-    """Return a row for each object, in the order of `random_order`. Rows of picked objects are crossed out."""
+    """Return a row for each object in the order of `random_order`. Rows of picked objects are crossed out."""
     return tuple(
         ChecklistItem(
             text=o.label,
@@ -61,7 +58,7 @@ def random_order_rows(view: TaskView, detail: Callable[[TaskObject], str]) -> tu
 
 
 def misplaced_flagpoles(view: TaskView) -> tuple[Marker, ...]:
-    """Return a flagpole, visible through walls, for every misplaced object (PAPER section 5)."""
+    """Return the markers of a flagpole over every misplaced object (PAPER section 5)."""
     markers: list[Marker] = []
     for item in view.objects:
         if item.status == "loose":
@@ -77,7 +74,7 @@ def assemble(
     markers: tuple[Marker, ...] = (),
     pointer: Pointer | None = None,
 ) -> HudState:
-    """Return the HUD state of a condition from its task list, markers and pointer.
+    """Create the HUD state of a condition from its task list, markers and pointer.
 
     The bins, hands, message, progress and clock come from the task view and are the same in every condition.
     """

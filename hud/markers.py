@@ -1,4 +1,4 @@
-"""Virtual objects in the world: breadcrumbs, flagpoles and pins (PAPER section 5)."""
+"""Breadcrumbs, flagpoles and pins, which are virtual objects in the house (PAPER section 5)."""
 
 import functools
 
@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from hud.state import HudState, Marker, Rgba, Shape, Vec2, Vec3
 
-CHEST = 0.75  # height of the first breadcrumb, relative to the eye height
-BREADCRUMB_RADIUS = 0.04  # in metres; a breadcrumb 5 m away is 7 pixels wide
+CHEST = 0.75  # height of the first breadcrumb as a fraction of the eye height
+BREADCRUMB_RADIUS = 0.04  # radius of a breadcrumb in metres, at which it is 7 pixels wide 5 m away
 BREADCRUMB_SPACING = 0.28  # distance between breadcrumbs along the floor path, in metres
 
-RIM_RADIUS = 1.3  # radius of the white rim, relative to that of the breadcrumb
+RIM_RADIUS = 1.3  # radius of the white rim as a multiple of the breadcrumb's radius
 
 # Roles of markers.
 BREADCRUMB = "breadcrumb"
@@ -29,10 +29,9 @@ SKY: Rgba = (0.34, 0.71, 0.91, 1.0)
 
 
 def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float = 0.0) -> tuple[Marker, ...]:
-    """Return spheres along a floor path, descending from chest height to the floor at its end (PAPER section 5).
+    """Return spheres along a floor path that descend from chest height to the floor (PAPER section 5).
 
-    The path has shape (k, 2), in metres. The spheres are spaced from its end, and its first `clearance` metres stay
-    empty.
+    The path has shape (k, 2), in metres. Its first `clearance` metres contain no spheres.
     """
     chest = CHEST * eye_height
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -56,20 +55,20 @@ def breadcrumbs(path: NDArray[np.float64], eye_height: float, clearance: float =
 
 
 def rims(crumbs: tuple[Marker, ...]) -> tuple[Marker, ...]:
-    """Return a white disc for each breadcrumb, for participants who cannot distinguish red from a brown floor."""
+    """Return a white disc for each breadcrumb, for participants who cannot distinguish red from brown."""
     return tuple(
         Marker("cylinder", crumb.position, (RIM_RADIUS * crumb.size[0], 0.003, 0.0), WHITE, RIM, crumb.x_ray)
         for crumb in crumbs
     )
 
 
-@functools.lru_cache(maxsize=1024)  # most objects stay in place between two states
+@functools.lru_cache(maxsize=1024)  # most objects do not move from one state to the next
 def flagpole(
     position: Vec3, *, object: str | None = None, low: bool = False, x_ray: bool = False
 ) -> tuple[Marker, ...]:
-    """Return a banded pole with a flag, 1.2 m tall, over an object.
+    """Return the markers of a striped pole with a flag, 1.2 m tall, over an object.
 
-    If `low`, it has half the height and no flag. If `x_ray`, it is also visible through walls, where it appears dimmed.
+    If `low` is True, the pole has half the height and no flag. If `x_ray` is True, walls do not hide it.
     """
     x, y, z = position
     foot, top = z + 0.25, z + (0.85 if low else 1.45)
@@ -91,19 +90,19 @@ def flagpole(
 def flagpoles(state: HudState) -> dict[str, Vec2]:
     """Return the floor position of each flagpole in metres, by object name.
 
-    Simulated participants perceive flagpoles only through this function, so they use what the picture shows.
+    Simulated participants find flagpoles only with this function, so they have no information beyond the HUD.
     """
     return {
         marker.object: marker.position[:2]
         for marker in state.markers
         if marker.role == FLAGPOLE
         and marker.object is not None
-        and marker.shape != "box"  # skip the flag, which is next to the pole
+        and marker.shape != "box"  # ignore the flag, which is next to the pole
     }
 
 
 def pin(position: Vec3, role: str = GOAL) -> tuple[Marker, ...]:
-    """Return a pin over a goal or a bin, with a disc around its foot."""
+    """Return the markers of a pin over a goal or a bin, with a disc around its foot."""
     x, y, z = position
     return (
         Marker("cylinder", (x, y, z + 0.005), (0.16, 0.004, 0.0), (*SKY[:3], 0.45), role),

@@ -1,4 +1,4 @@
-"""Texts of the message bar (PAPER section 3.2)."""
+"""The messages that the message bar shows (PAPER section 3.2)."""
 
 from types import MappingProxyType
 from typing import Final
@@ -8,8 +8,8 @@ from hud.lists import in_sentence
 from hud.state import Message, MessageKind
 from hud.texts import HudTexts, filled
 
-SHOWN = 3.5  # time at full opacity, in seconds
-FADE = 0.5  # duration of the fade-out, in seconds
+SHOWN = 3.5  # time for which a message has full opacity, in seconds
+FADE = 0.5  # time for which a message fades out, in seconds
 
 _OK, _NO, _INFO = MessageKind.SUCCESS, MessageKind.REFUSAL, MessageKind.INFO
 
@@ -66,5 +66,5 @@ def message(
 
 
 def fade(age: float) -> float:
-    """Return the opacity of a message at an age in seconds: 1 until `SHOWN`, then falling to 0 over `FADE`."""
+    """Return the opacity of a message that appeared `age` seconds ago."""
     return min(1.0, max(0.0, (SHOWN + FADE - age) / FADE))

@@ -1,4 +1,4 @@
-"""Draw the mini-map: a fixed base, and a stamp for everything that moves."""
+"""The mini-map, which consists of a fixed base image and of marks that are drawn over it."""
 
 import math
 from dataclasses import dataclass
@@ -20,20 +20,20 @@ GOAL: Rgb = (86, 180, 233)
 HEADING_STEPS = 72  # number of directions of the person's arrow, 5 degrees apart
 
 Kind = Literal["path", "object", "goal", "person"]
-# Radius in theme pixels and colour of each mark's discs, largest first.
+# Discs of each type of mark, as pairs of radius (theme pixels) and colour, with the largest disc first.
 DISCS: dict[Kind, tuple[tuple[float, Rgb], ...]] = {
     "path": ((1.8, PATH),),
     "object": ((3.4, theme.PANEL), (2.5, OBJECT)),
     "goal": ((5.0, theme.PANEL), (4.0, GOAL), (1.6, theme.PANEL)),
     "person": (),
 }
-# Half the side of each mark's stamp, in theme pixels.
+# Half the side length of each type of mark, in theme pixels.
 HALF_SIZES: dict[Kind, float] = {"path": 2.0, "object": 4.0, "goal": 6.0, "person": 10.0}
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A stamp on the map. `step` is its direction index, and `x`, `y` are its upper left corner in the frame."""
+    """A mark on the map. `step` is its direction index, and (x, y) is its upper left corner in the frame."""
 
     kind: Kind
     step: int
@@ -57,7 +57,7 @@ def draw_base(
 
 
 def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
-    """Return the marks of a map in drawing order. All are inside `rect`."""
+    """Return the marks on a map in drawing order. All marks are inside `rect`."""
     area, scale = _map_area(minimap.bounds, rect, unit)
     step = round(minimap.heading / (2.0 * math.pi) * HEADING_STEPS) % HEADING_STEPS
     wanted: list[tuple[Kind, int, Vec2]] = [("path", 0, point) for point in minimap.path]
@@ -77,7 +77,7 @@ def marks(rect: Rect, minimap: MiniMap, unit: float) -> tuple[Mark, ...]:
 
 
 def draw_mark(stencils: Stencils, kind: Kind, step: int) -> Patch:
-    """Draw a mark. `step` is its direction index, from 0 to `HEADING_STEPS` - 1, counter-clockwise from the right."""
+    """Draw a mark. `step` is its direction in steps of 5 degrees, counter-clockwise from the right."""
     half = math.ceil(HALF_SIZES[kind] * stencils.unit)
     canvas = Canvas(stencils, 2 * half + 1, 2 * half + 1)
     centre = half + 0.5

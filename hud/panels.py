@@ -1,4 +1,4 @@
-"""Draw all panels except the mini-map."""
+"""Functions that draw all panels except the mini-map."""
 
 import math
 
@@ -45,7 +45,7 @@ def draw_inventory(
     hands: tuple[str, str],
     empty: str,
 ) -> Patch:
-    """Draw the hands at both ends of the panel. `hands` are their names, and `empty` labels an empty hand."""
+    """Draw the contents of both hands. `hands` are the names of the hands. `empty` labels an empty hand."""
     canvas = Canvas(stencils, rect.width, rect.height)
     for slot, hand, at_the_left in zip(slots, hands, (True, False), strict=True):
         if slot is not None:
@@ -60,7 +60,7 @@ def _draw_hand(canvas: Canvas, slot: InventorySlot, when_empty: tuple[str, str],
     inset = px(5) + side + px(theme.GAP) if held else px(theme.PADDING + 1)
     face, colour = (theme.LABEL, theme.TEXT) if held else (theme.DETAIL, theme.QUIET)
     lines: tuple[str, ...] = ()
-    # Long names get a wider slot, which hides more of the view.
+    # Only long names get the wider slot, because it hides more of the view.
     for size in (
         (theme.SLOT_WIDTH, theme.SLOT_WIDTH_LONG) if held else (theme.SLOT_WIDTH_EMPTY, theme.SLOT_WIDTH)
     ):
@@ -128,7 +128,7 @@ def draw_progress(stencils: Stencils, rect: Rect, delivered: int, total: int) ->
 
 
 def clock_text(seconds: float) -> str:
-    """Format a time in seconds as m:ss, or as h:mm:ss from one hour."""
+    """Format a time in seconds as m:ss, or as h:mm:ss if it is at least one hour."""
     whole = max(0, math.floor(seconds))
     hours, minutes = divmod(whole // 60, 60)
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
@@ -148,7 +148,7 @@ def draw_clock(stencils: Stencils, rect: Rect, text: str) -> Patch:
 
 
 def draw_pointer(stencils: Stencils, rect: Rect, step: int) -> Patch:
-    """Draw an arrow on a disc. `step` is its direction index, counter-clockwise from the right."""
+    """Draw an arrow on a disc. `step` is its direction in units of 5 degrees, where 0 points right."""
     canvas = Canvas(stencils, rect.width, rect.height)
     centre, u = rect.width / 2.0, canvas.unit
     canvas.circle(centre, centre, 16.5 * u, theme.TEXT, 0.9)
@@ -167,7 +167,7 @@ def count_text(items: tuple[ChecklistItem, ...], texts: HudTexts) -> str:
 
 
 def hidden_text(above: int, more: int, texts: HudTexts) -> str:
-    """Return a note about the numbers of hidden rows above and below the visible ones."""
+    """Return a note with the numbers of hidden rows above and below the visible rows."""
     notes = (
         filled(texts.above, count=above) if above else "",
         filled(texts.more, count=more) if more else "",
@@ -183,7 +183,7 @@ def draw_checklist(
     rows: tuple[ListRow, ...],
     hidden: str,
 ) -> Patch:
-    """Draw the task list. `header` is its title and count, and `hidden` is a note about hidden rows."""
+    """Draw the task list. `header` is the title and the count, and `hidden` is a note about hidden rows."""
     canvas = Canvas.panel(stencils, rect)
     px, width = canvas.px, canvas.typeface.width
     title, count = header

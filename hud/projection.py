@@ -1,4 +1,4 @@
-"""Pinhole projection of the eye camera, and pointers to goals outside the view."""
+"""The pinhole projection of the eye camera, and pointers to goals outside the view."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class CameraView:
     """
 
     position: NDArray[np.float64]  # position of the eye in metres, shape (3,)
-    # the columns point right, up and backward, shape (3, 3)
+    # rotation matrix (3, 3) whose columns are the right, up and backward axes of the camera
     rotation: NDArray[np.float64]
     fovy: float  # vertical field of view in radians
     width: int  # image width in pixels
@@ -44,19 +44,19 @@ class CameraView:
 
     @property
     def focal(self) -> float:
-        """Focal length in pixels."""
+        """The focal length in pixels."""
         return self.height / 2.0 / math.tan(self.fovy / 2.0)
 
     def to_eye(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Transform points of shape (..., 3) in metres from the house frame to the eye frame (right, up, forward)."""
+        """Transform points (..., 3) in metres from the house frame to the eye frame (right, up, forward)."""
         local = (np.asarray(points, dtype=np.float64) - self.position) @ self.rotation
         return np.asarray(local * np.array([1.0, 1.0, -1.0]), dtype=np.float64)
 
 
 def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the pixels (n, 2) and the depths (n,) in metres of points (n, 3). Pixels of points behind the eye are NaN.
+    """Return the pixel coordinates (n, 2) and the depths (n,) in metres of points (n, 3).
 
-    x points right and y down. The image spans 0 to `width` and 0 to `height`.
+    Pixel coordinates start at the upper left corner of the image. They are NaN for points behind the eye.
     """
     local = camera.to_eye(np.reshape(np.asarray(points, dtype=np.float64), (-1, 3)))
     depth = local[:, 2]
@@ -70,7 +70,7 @@ def project(camera: CameraView, points: ArrayLike) -> tuple[NDArray[np.float64],
 
 
 def in_view(camera: CameraView, point: Vec3, margin: float = 0.0) -> bool:
-    """Return True if a point is in the image and at least `margin` times the image height from its edge."""
+    """Return True if a point is in the image and at least `margin` times the image height from its edges."""
     pixels, _ = project(camera, [point])
     x, y = pixels[0]
     inset = margin * camera.height

@@ -1,4 +1,4 @@
-"""HUD states as JSON, and their JSON schema, both derived from annotations."""
+"""Convert HUD states to and from JSON, and describe them with a JSON schema."""
 
 import dataclasses
 import enum
@@ -36,7 +36,7 @@ def from_dict(raw: object) -> HudState:
 
 
 def check_state(state: object) -> None:
-    """Check that a condition returned a HUD state whose values can be drawn and sent.
+    """Check that the result of a condition is a HUD state that can be drawn and converted to JSON.
 
     Raises SchemaError with the path of the invalid value.
     """
@@ -69,7 +69,7 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON schema of the result of `to_dict`. It requires all fields and allows no others."""
+    """Return the JSON schema of the result of `to_dict`. All fields are required. No others are allowed."""
     schema = msgspec.json.schema(HudState)
     for definition in schema["$defs"].values():
         if "properties" in definition:
@@ -93,7 +93,7 @@ def _check_fields(raw: Any, written: Any, where: str) -> None:
 
 
 def _expected(error: str) -> str:
-    """Return a hint for correcting the value that an error message of msgspec refers to."""
+    """Return a hint on how to correct the value that caused an error message of msgspec."""
     definitions = json_schema()["$defs"]
     node = definitions["HudState"]
     for name in re.findall(r"\.(\w+)", error.rpartition(" at `")[2]):

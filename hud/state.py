@@ -1,4 +1,4 @@
-"""`HudState`: everything that the HUD shows, as one value."""
+"""The class `HudState`, which describes everything that the HUD shows."""
 
 import enum
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ FLOORPLAN = "floorplan"  # key of the picture that shows the house from above
 
 @dataclass(frozen=True)
 class Marker:
-    """A virtual object in the world.
+    """A virtual object that is drawn in the house.
 
     Attributes:
-        shape: `sphere` (size[0] is the radius), upright `cylinder` (size[0] is the radius, size[1] half the length) or
-            `box` (half sizes).
+        shape: `sphere`, `cylinder` (upright) or `box`.
         position: Centre in the house frame, in metres.
-        size: Sizes in metres. Their meaning depends on the shape.
-        rgba: Colour, with components from 0 to 1.
+        size: Sizes in metres. size[0] is the radius of a sphere or cylinder, and size[1] is half the length
+            of a cylinder. The sizes of a box are half its side lengths.
+        rgba: Red, green, blue and opacity, each from 0 to 1.
         role: Purpose: `breadcrumb`, `rim` (of a breadcrumb), `flagpole`, `goal` or `bin`.
         x_ray: True if the marker is also visible through walls, where it appears dimmed.
         object: Instance name of the object below the marker, or None.
-        outlined: True if a sphere has a dark outline.
+        outlined: True if the marker is a sphere with a dark outline.
     """
 
     shape: Shape
@@ -38,7 +38,7 @@ class Marker:
 
 
 class MessageKind(enum.Enum):
-    """Type of a message, which determines its colour and symbol."""
+    """The type of a message, which determines its colour and symbol."""
 
     INFO = "info"
     SUCCESS = "success"
@@ -60,13 +60,13 @@ class ChecklistItem:
 
     Attributes:
         text: Label of the object ("Blue mug").
-        detail: Second line, split at its line break if too long ("Kitchen\\n→ Dish bin", "Pick up ·\\nKitchen").
+        detail: Second line of text, split at its line break if it is too long ("Pick up ·\\nKitchen").
         picture: Key of the object's picture, or None.
         target_picture: Key of the receptacle's picture, or None.
-        number: Step number, or None in a list without an order.
+        number: Number of the step, or None in a list without an order.
         done: True if the row is crossed out.
         current: True for the row of the current step.
-        carried: True if the object is in a hand. Frames cross out such a row, and the browser page marks it.
+        carried: True if the object is in a hand. Such a row is crossed out in frames and marked in browsers.
     """
 
     text: str
@@ -81,7 +81,7 @@ class ChecklistItem:
 
 @dataclass(frozen=True)
 class BinEntry:
-    """A receptacle in the list of bins. `place` is broken at its line break if it does not fit on one line."""
+    """A receptacle in the list of bins. `place` is split at its line break if it is too long for one line."""
 
     label: str
     place: str
@@ -90,7 +90,7 @@ class BinEntry:
 
 @dataclass(frozen=True)
 class InventorySlot:
-    """Contents of a hand. Both fields are None if the hand is empty."""
+    """The contents of a hand. Both fields are None if the hand is empty."""
 
     label: str | None = None
     picture: str | None = None
@@ -98,7 +98,7 @@ class InventorySlot:
 
 @dataclass(frozen=True)
 class Pointer:
-    """An arrow at the edge of the view towards a goal outside it.
+    """An arrow at the edge of the view that points to a goal outside the view.
 
     Attributes:
         angle: Direction on the screen in radians, counter-clockwise from the right (pi/2 is up).
@@ -109,11 +109,11 @@ class Pointer:
 
 @dataclass(frozen=True)
 class MiniMap:
-    """A map of the house with north (+y) up.
+    """A map of the house with north (+y) at the top.
 
     Attributes:
         picture: Key of the picture that shows the house within `bounds`.
-        bounds: (xmin, ymin, xmax, ymax) in metres.
+        bounds: Area (xmin, ymin, xmax, ymax) that the map shows, in metres.
         position: Position of the person in metres.
         heading: Heading of the person in radians, counter-clockwise from +x.
         path: Points on the path to the goal, in metres.
@@ -132,18 +132,18 @@ class MiniMap:
 
 @dataclass(frozen=True)
 class HudState:
-    """Everything that the HUD shows.
+    """The content of the HUD at one moment.
 
     Attributes:
         checklist_title: Heading of the task list ("Objects to find", "Your plan").
         checklist: Rows of the task list, from top to bottom.
         bins: Rows of the list of bins.
-        inventory: Contents of the left and the right hand. The left one is None if the capacity is one.
+        inventory: Contents of the left and the right hand. If the capacity is one, the left value is None.
         message: Content of the message bar, or None.
-        markers: Virtual objects in the world.
+        markers: Virtual objects in the house.
         rerouted: True if the breadcrumbs start at the person and are replaced when the person leaves them.
         delivered: Number of objects in their receptacles.
-        total: Number of all objects.
+        total: Total number of objects.
         clock: Elapsed task time in seconds, or None to show no clock.
         pointer: Arrow towards a goal outside the view, or None.
         minimap: Map of the house, or None.

@@ -1,6 +1,6 @@
-"""Caches of masks and scaled pictures, which take most of the drawing time.
+"""Caches of masks and scaled pictures, whose computation takes most of the drawing time.
 
-They depend only on their arguments, so the caches do not change the result.
+Cached values depend only on their arguments, so the caches do not change any results.
 """
 
 import functools
@@ -20,7 +20,7 @@ Pictures = Mapping[str, NDArray[np.uint8]]
 
 
 class Stencil(NamedTuple):
-    """Coverage from 0 to 1, shape (h, w), and its upper left corner relative to an origin, in pixels."""
+    """A coverage mask (h, w), from 0 to 1, and the position of its upper left corner in pixels."""
 
     mask: Floats
     x: int
@@ -28,14 +28,14 @@ class Stencil(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """A scaled picture: colours times opacity, shape (3, s, s), and opacity, shape (s, s). Both are from 0 to 1."""
+    """A scaled picture: colours times opacity (3, s, s), and opacity (s, s), both from 0 to 1."""
 
     colours: Floats
     opacity: Floats
 
 
 class Stencils:
-    """Masks of text and scaled pictures, with `unit` frame pixels per theme pixel."""
+    """A cache of text masks and scaled pictures. `unit` is the number of frame pixels per theme pixel."""
 
     def __init__(self, pictures: Pictures, unit: float) -> None:
         self.pictures = pictures

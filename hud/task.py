@@ -1,4 +1,4 @@
-"""`TaskView`: the state of the task that an assistance condition receives."""
+"""The class `TaskView`, which describes the state of the task to an assistance condition."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,19 +18,19 @@ _Value = TypeVar("_Value")
 
 
 class TaskStep(NamedTuple):
-    """A step of the task: picking up an object, or placing it into its receptacle."""
+    """A step of the task, in which an object is picked up or placed into its receptacle."""
 
     kind: StepKind
     object: str
 
 
 class Alternative(NamedTuple):
-    """A possible next step, with its regret.
+    """A possible next step and its regret.
 
     Attributes:
         kind: `pick` or `place`.
         object: Instance name of the object.
-        extra: Regret in metres: how much longer the remaining tour is than with the best next step.
+        extra: Regret in metres, which is the extra length of the remaining tour compared with the best step.
         at_least: True if `extra` is only a lower bound.
     """
 
@@ -46,7 +46,7 @@ class TaskObject:
 
     Attributes:
         name: Instance name, unique in the task.
-        label: Displayed name ("Blue mug").
+        label: Name to display ("Blue mug").
         picture: Key of the object's picture, or None.
         category: Key of the object's category.
         room: Label of the room in which the object is.
@@ -67,7 +67,7 @@ class TaskObject:
 
 @dataclass(frozen=True)
 class TaskReceptacle:
-    """A receptacle. `place` is a phrase ("on the counter, beside the sink"), and `room` is the label of its room."""
+    """A receptacle. `place` is its location in the room, such as "on the counter, beside the sink"."""
 
     key: str
     label: str
@@ -78,11 +78,11 @@ class TaskReceptacle:
 
 
 class PlanAhead(Protocol):
-    """The planner's suggestion. Properties may be computed when they are first read."""
+    """The interface of a planner's suggestion. Properties may be computed when they are first read."""
 
     @property
     def steps(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order. Empty without a planner."""
+        """The remaining steps in planned order. Empty if there is no planner."""
         ...
 
     @property
@@ -97,13 +97,13 @@ class PlanAhead(Protocol):
 
     @property
     def goal(self) -> Vec3 | None:
-        """Position of the next step in metres, or None."""
+        """The position of the next step in metres, or None."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class KnownPlan:
-    """A planner's suggestion with fixed values."""
+    """A planner's suggestion whose values are already known."""
 
     steps: tuple[TaskStep, ...] = ()
     segment: NDArray[np.float64] | None = None
@@ -113,13 +113,13 @@ class KnownPlan:
 
 @dataclass(frozen=True, eq=False)
 class TaskView:
-    """State of the task and of the plan, in the house frame.
+    """The state of the task and of the plan. All positions are in the house frame.
 
     Attributes:
         objects: All objects of the task.
         receptacles: All receptacles, in the order in which they are listed.
         order: Object names in this participant's random order (PAPER section 5).
-        texts: Words of the HUD.
+        texts: Texts of the HUD.
         hands: Names of the objects in the left and the right hand. None for an empty hand.
         capacity: Maximum number of objects that can be carried.
         steps_done: Successful picks and places so far, in order.
@@ -131,10 +131,10 @@ class TaskView:
         clock: Elapsed task time in seconds, or None to show no clock.
         camera: Eye camera, or None. The option `pointer` needs it.
         heading: Heading of the person in radians, counter-clockwise from +x.
-        bounds: (xmin, ymin, xmax, ymax) of the house in metres, or None to show no map.
+        bounds: Area (xmin, ymin, xmax, ymax) of the house in metres, or None to show no map.
         scroll: Number of rows by which the participant has scrolled down the task list.
-        alternatives: Function that returns all possible next steps, or an empty tuple until their regrets are known.
-            Finding regrets takes time, so only conditions that show them should call it.
+        alternatives: Function that returns all possible next steps, or an empty tuple until their regrets are
+            known. Finding regrets takes time, so only conditions that show them should call it.
 
     Raises:
         TaskViewError: A name is unknown or repeated, or `order` is not a permutation of the objects.
@@ -179,13 +179,13 @@ class TaskView:
 
     @property
     def plan(self) -> tuple[TaskStep, ...]:
-        """Remaining steps in planned order. Empty without a planner."""
+        """The remaining steps in planned order. Empty if there is no planner."""
         self._check_steps(self.ahead.steps)
         return self.ahead.steps
 
     @property
     def segment(self) -> NDArray[np.float64] | None:
-        """Shortest floor path in metres from the last step (or the start) to the next step, shape (k, 2).
+        """The shortest floor path (k, 2), in metres, from the last step (or the start) to the next step.
 
         None if no step is left.
         """
@@ -193,15 +193,15 @@ class TaskView:
 
     @property
     def path(self) -> NDArray[np.float64] | None:
-        """Shortest floor path in metres from the person to the next step, shape (k, 2), or None.
+        """The shortest floor path (k, 2), in metres, from the person to the next step, or None.
 
-        It is replaced when the person leaves it.
+        The path is replaced with a new one when the person leaves it.
         """
         return _checked_path("path", self.ahead.path)
 
     @property
     def goal(self) -> Vec3 | None:
-        """Position of the next step's object or receptacle in metres, or None."""
+        """The position of the next step's object or receptacle in metres, or None."""
         return self.ahead.goal
 
     def object(self, name: str) -> TaskObject:

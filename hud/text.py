@@ -38,7 +38,7 @@ class Typeface:
         return int(max(width, left + width))
 
     def fit(self, text: str, face: Face, width: int) -> str:
-        """Fit text into one line of at most `width` pixels, shortened with an ellipsis if necessary."""
+        """Fit text into one line of at most `width` pixels. Long text is shortened with an ellipsis."""
         line = " ".join(text.split())
         if self.width(line, face) <= width:
             return line
@@ -52,7 +52,7 @@ class Typeface:
         return line[:low].rstrip(" ,.") + ELLIPSIS if low else ""
 
     def wrap(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """Break text between words into at most `lines` lines of `width` pixels. The last line may be shortened."""
+        """Break text into at most `lines` lines of `width` pixels. The last line may be shortened."""
         done: list[str] = []
         words: list[str] = _WORD.findall(text)
         while words and len(done) < lines - 1:
@@ -66,7 +66,7 @@ class Typeface:
         return tuple(done)
 
     def paragraph(self, text: str, face: Face, width: int, lines: int) -> tuple[str, ...]:
-        """Fit text into one line of `width` pixels, or else break it at its line breaks and then between words."""
+        """Fit text into one line of `width` pixels. Break longer text at line breaks and between words."""
         whole = " ".join(text.split())
         if lines <= 1 or self.width(whole, face) <= width:
             fitted = self.fit(whole, face, width)

@@ -1,4 +1,4 @@
-"""Words of the HUD in one language."""
+"""The texts of the HUD in one language."""
 
 import re
 from dataclasses import dataclass
@@ -8,36 +8,36 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 @dataclass(frozen=True)
 class HudTexts:
-    """All words that the HUD draws.
+    """All texts that the HUD shows.
 
-    `{object}` and `{receptacle}` stand for a label within a sentence ("blue mug"), `{Object}` and `{Receptacle}` for
-    the label itself ("Blue mug").
+    `{object}` and `{receptacle}` are replaced with a label within a sentence ("blue mug"), `{Object}` and
+    `{Receptacle}` with the label itself ("Blue mug").
     """
 
-    # Task list, bins and hands
+    # Texts for the task list, the bins and the hands
     to_put_away: str
     your_plan: str
     pick_up: str
-    put_in: str  # contains {Receptacle}
-    at_least: str  # contains {metres}
+    put_in: str  # contains the placeholder {Receptacle}
+    at_least: str  # contains the placeholder {metres}
     decimal: str  # the decimal separator
-    left: str  # contains {count}
+    left: str  # contains the placeholder {count}
     none_left: str
-    next_step: str  # contains {number} and {count}
+    next_step: str  # contains the placeholders {number} and {count}
     done: str
-    above: str  # contains {count}
-    more: str  # contains {count}
+    above: str  # contains the placeholder {count}
+    more: str  # contains the placeholder {count}
     bins: str
-    more_bins: str  # contains {count}
+    more_bins: str  # contains the placeholder {count}
     left_hand: str
     right_hand: str
     empty: str
-    # Floor plan with the paths of a trial
-    path_planned: str  # contains {metres}
-    path_walked: str  # contains {metres}
+    # Texts on the floor plan that shows the paths of a trial
+    path_planned: str  # contains the placeholder {metres}
+    path_walked: str  # contains the placeholder {metres}
     path_start: str
     recorded: str
-    # Stand-ins for labels in messages
+    # Words that messages use if an object or receptacle has no label
     object: str
     receptacle: str
     # Messages about events and refusals

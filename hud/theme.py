@@ -1,7 +1,7 @@
-"""Colours and sizes of the HUD. Colours are sRGB from 0 to 255. Sizes are pixels of a 640 x 480 frame.
+"""Colours and sizes of the HUD. Colours are sRGB from 0 to 255. Sizes are in pixels of a 640 x 480 frame.
 
-The hues are from the Okabe-Ito palette, which is safe for colour-vision deficiencies. No information depends on hue
-alone: messages have symbols, completed rows are crossed out, and the current row is bold.
+The hues are from the Okabe-Ito palette, which people with colour-vision deficiencies can distinguish. No
+information depends on hue alone. For example, messages have symbols and completed rows are crossed out.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from hud.state import MessageKind
 Rgb = tuple[int, int, int]
 
 PANEL: Final[Rgb] = (13, 17, 24)
-PANEL_OPACITY: Final = 0.72  # gives white text a contrast of at least 4.5 : 1 in front of a white wall
+PANEL_OPACITY: Final = 0.72  # ensures that text has a contrast of at least 4.5 : 1 in front of a white wall
 EDGE: Final[Rgb] = (255, 255, 255)
 EDGE_OPACITY: Final = 0.16
 
@@ -35,7 +35,7 @@ TONES: Final = MappingProxyType(
 
 @dataclass(frozen=True)
 class Face:
-    """Font size in pixels at a frame height of 480, and font weight (400 regular, 600 semibold)."""
+    """A font size in pixels at a frame height of 480, and a font weight (400 regular, 600 semibold)."""
 
     size: float
     weight: int
@@ -56,9 +56,9 @@ GAP: Final = 6
 PADDING: Final = 6
 PANEL_RADIUS: Final = 8.0
 LINE: Final = 14  # height of a line of text
-TILE: Final = 30  # side of a picture, large enough to distinguish objects
+TILE: Final = 30  # side length of an object's picture, large enough to distinguish objects
 
-# Sizes in the list of bins, at which six bins with three lines of location each fit.
+# Sizes in the list of bins, which leave space for six bins with three lines of text each.
 BIN_TILE: Final = 30
 BIN_LINE: Final = 13
 BIN_GAP: Final = 4
@@ -66,21 +66,21 @@ BIN_GAP: Final = 4
 CHIP_HEIGHT: Final = 28
 CHIP_WIDTH: Final = 76
 
-LIST_SHARE: Final = 0.3  # width of the task list relative to the frame
+LIST_SHARE: Final = 0.3  # width of the task list as a fraction of the frame width
 MAX_LIST_WIDTH: Final = 230
 LIST_BOTTOM: Final = 64  # free space below the lists, which keeps objects at the person's feet visible
 HEADER: Final = 24
 FOOTER: Final = 17
 ROW: Final = 36
 NUMBER: Final = 19
-TARGET: Final = 20  # side of the receptacle's picture
+TARGET: Final = 20  # side length of the receptacle's picture
 
 BINS_WIDTH: Final = 160
 BINS_WIDTH_WIDE: Final = 170  # width of the list of bins in frames wider than 4 : 3
 
 SLOT_WIDTH: Final = 118
 SLOT_WIDTH_LONG: Final = 133  # slot width for long object names
-SLOT_WIDTH_EMPTY: Final = 86  # narrow, so that objects at the person's feet stay visible between empty hands
+SLOT_WIDTH_EMPTY: Final = 86  # slot width for an empty hand, narrow so that objects on the floor stay visible
 SLOT_HEIGHT: Final = 40
 BETWEEN_HANDS: Final = 64
 
@@ -88,4 +88,4 @@ MESSAGE_LINES: Final = 3
 MESSAGE_ICON: Final = 26
 POINTER: Final = 36
 MAP_INSET: Final = 4
-MAX_MAP_HEIGHT: Final = 150  # leaves space for the list of bins above the map of a deep house
+MAX_MAP_HEIGHT: Final = 150  # maximum height of the map, which leaves space for the list of bins above it

@@ -1,8 +1,8 @@
-"""Physics of the rearrangement simulator: houses, episodes, world, observations and rendering.
+"""A simulator for household rearrangement, with houses, episodes, physics, observations and rendering.
 
-Semantic versioning applies to the names below, as documented in their docstrings and in `docs/`, to the command line,
-and to its output files. Names are loaded at their first use, so that `import mjsim` is fast.
-The Gymnasium environment is `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")`.
+Semantic versioning applies to the public names of this package, to the command line, and to its output files.
+Names are loaded on first use, so that `import mjsim` is fast.
+The Gymnasium environment is created by `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0")`.
 
     catalogue = mjsim.Catalogue.load("apartment")
     episode = mjsim.sample_episode(catalogue, objects=12, seed=3)

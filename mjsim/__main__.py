@@ -7,7 +7,7 @@ from mjsim.support.environment import hidden_package
 
 
 def main() -> int:
-    """Run the command line. Print a message and return 1 if another package hides `experiments`."""
+    """Run the `mjsim` command. Print a message and return 1 if another package hides `experiments`."""
     if hidden := hidden_package("experiments"):
         print(f"mjsim: {hidden}", file=sys.stderr)
         return 1

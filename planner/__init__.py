@@ -1,6 +1,6 @@
-"""Navmesh, geodesic distances, routing problems and their planners.
+"""Navigation meshes, geodesic distances, routing problems and planners.
 
-The package works only with distances and names. Sessions use `Planner`, and `mjsim plan` uses `solver`.
+Planners need only distances and object names. Sessions use `Planner`, and `mjsim plan` uses `solver`.
 """
 
 import lazy_loader

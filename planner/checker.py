@@ -1,8 +1,9 @@
-"""Independent checks of plans, which share no code with the solvers.
+"""Check plans independently of the solvers.
 
-`check` is fast enough for every plan. `verify_optimal` may take seconds. A certificate yields a lower bound on the rest
-of the task from every state. A tour shorter than claimed can pass only through states whose cost so far plus bound is
-below the claim. `verify_optimal` visits all these states. If no tour ends in one of them, the claim holds.
+`check` is fast enough for every plan, whereas `verify_optimal` may take seconds. A certificate provides a
+lower bound on the remaining cost of every state. A tour that is shorter than the claimed bound can only visit
+states whose cost so far plus this lower bound is below the claim. `verify_optimal` examines all these states.
+The claim holds if none of them completes a tour.
 """
 
 from dataclasses import dataclass
@@ -17,32 +18,32 @@ from planner.problem import RoutingProblem
 from planner.relaxation_checker import Relaxation, closed
 
 EXHAUSTIVE_OBJECTS = 7  # maximum number of objects for which all tours are tried
-CHECK_ROWS = 1 << 16  # maximum number of table rows that `check` fills, in about 2 s
-VERIFY_ROWS = 1 << 20  # maximum number of table rows that `verify_optimal` fills, in about 30 s
+CHECK_ROWS = 1 << 16  # maximum number of table rows that `check` fills, which takes about 2 s
+VERIFY_ROWS = 1 << 20  # maximum number of table rows that `verify_optimal` fills, which takes about 30 s
 MAX_STATES = 30_000_000  # maximum number of states that `verify_optimal` visits
 
-# Location, remaining objects (bit mask), and bins of the carried objects.
+# Current location, bit mask of the remaining objects, and bins of the carried objects
 State = tuple[int, int, tuple[int, ...]]
 
 
 def check(problem: RoutingProblem, plan: Plan) -> float:
-    """Check a plan against the constraints of equation 1 (PAPER section 2). Return a lower bound on tours in metres.
+    """Check a plan and return a lower bound on tour lengths in metres (PAPER section 2, equation 1).
 
-    With up to seven objects, every order of visits is tried. With more, the bound follows from a spanning tree, or from
-    the certificate's table if that has at most 2^16 rows. Otherwise it is 0. The solver's search is not repeated, so
-    the bound may be below `plan.lower_bound`.
+    With up to seven objects, every order of visits is tried. With more objects, the bound results from a
+    spanning tree, or from the certificate's table if this table has at most 2^16 rows. Otherwise, the bound
+    is 0. The search of the solver is not repeated, so the bound may be below `plan.lower_bound`.
 
     Raises:
-        ProblemError: A visit is impossible or repeated, an object is not delivered, the cost is wrong, the lower bound
-            exceeds the cost, an optimal plan has a gap, or the certificate claims more than it proves.
+        ProblemError: A visit is impossible or repeated, an object is not delivered, the cost is wrong, the
+            lower bound exceeds the cost, an optimal plan has a gap, or the certificate is wrong.
     """
     return derive(problem, plan, CHECK_ROWS)[0]
 
 
 def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, Relaxation | None]:
-    """Check a plan with tables of at most `max_rows` rows. Return a lower bound on tours in metres.
+    """Check a plan. Return a lower bound on tour lengths in metres, and the relaxation if it was computed.
 
-    Also return the relaxation if its table was filled.
+    The relaxation is not computed if its table has more than `max_rows` rows.
     """
     _check_numbers(plan, replayed(problem, plan))
     rounding, certificate = allowance(problem, plan), plan.certificate
@@ -69,22 +70,23 @@ def derive(problem: RoutingProblem, plan: Plan, max_rows: int) -> tuple[float, R
 
 
 def allowance(problem: RoutingProblem, plan: Plan) -> float:
-    """Return how far rounding may put a plan's claims above the truth, in metres."""
+    """Return the tolerance for rounding errors in the lengths that a plan reports, in metres."""
     return problem.tolerance(plan.cost) + 2 * (problem.resolution or 0.0)
 
 
 def shortest_tour(
     problem: RoutingProblem, limit: float, max_states: float = np.inf
 ) -> tuple[float, int] | None:
-    """Return the length of the shortest tour below a limit in metres, and the number of visited states.
+    """Return the length of the shortest tour in metres, and the number of visited states.
 
-    The length is infinite if there is no such tour. The result is None if more than `max_states` states were visited.
+    The length is infinite if no tour is shorter than `limit` metres. The result is None if more than
+    `max_states` states were visited.
     """
     d, direct = problem.distances.tolist(), closed(problem).tolist()
     jobs = [(s.pickup, s.delivery) for s in problem.shipments]
 
     def farthest(here: int, left: int, carried: tuple[int, ...]) -> float:
-        """Return the longest remaining single trip, which is a lower bound on the rest of the tour."""
+        """Return the length of the longest remaining trip, which is a lower bound on the rest of the tour."""
         trips = [direct[here][a] + direct[a][b] for k, (a, b) in enumerate(jobs) if left >> k & 1]
         return max([*trips, *(direct[here][j] for j in carried)], default=0.0)
 
@@ -177,7 +179,6 @@ def _claim(
 
 
 def _spanning_tree(problem: RoutingProblem) -> float:
-    """Apply Prim's algorithm to all locations of the tour."""
     direct, total = closed(problem), 0.0
     apart = {j: direct[problem.start, j] for j in problem.used if j != problem.start}
     while apart:
@@ -189,19 +190,19 @@ def _spanning_tree(problem: RoutingProblem) -> float:
 
 @dataclass(frozen=True)
 class Verified:
-    """Result of verifying a plan without trusting its solver."""
+    """The result of verifying a plan independently of its solver."""
 
     cost: float  # length of the plan's tour in metres
-    lower_bound: float  # verified lower bound on all tours in metres
-    optimal: bool  # True if the bound and the tour length agree within twice the problem's tolerance
+    lower_bound: float  # verified lower bound on tour lengths in metres
+    optimal: bool  # True if the bound equals the tour length, apart from rounding errors
     states: int  # number of states visited by the search
-    why: str = ""  # reason why the plan's lower bound was not verified, or empty
+    why: str = ""  # reason why the plan's lower bound was not verified, or an empty string
 
 
 def verify_optimal(problem: RoutingProblem, plan: Plan, *, max_states: int = MAX_STATES) -> Verified:
-    """Verify a plan's tour and, if possible, its lower bound, using only the problem and the certificate.
+    """Verify a plan and, if possible, its lower bound, using only the problem and the certificate.
 
-    The search ends after `max_states` states.
+    The search stops after visiting `max_states` states.
 
     Raises:
         ProblemError: The tour is not feasible or has another length, the certificate claims more than it proves, or
@@ -233,6 +234,6 @@ def _shorter(
     if relaxation is not None:
         found = relaxation.shorter(limit, max_states)
         if found is None or not found[0] or relaxation.exact:
-            return found  # if not exact, the tour may use connections shorter than the given distances
+            return found  # otherwise, the tour may use shortcuts that the given distances do not contain
     shortest = shortest_tour(problem, limit, max_states // 30)
     return None if shortest is None else (shortest[0] < limit, shortest[1])

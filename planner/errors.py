@@ -2,19 +2,19 @@
 
 
 class PlannerError(Exception):
-    """Base class of all errors of :mod:`planner`."""
+    """Base class of all exceptions raised by :mod:`planner`."""
 
 
 class NavMeshError(PlannerError):
-    """The obstacles, bounds or sizes of a navmesh are invalid."""
+    """Raised if the obstacles, bounds or sizes of a navmesh are invalid."""
 
 
 class NotNavigableError(PlannerError):
-    """No navigable point is near a position."""
+    """Raised if there is no navigable point near a position."""
 
 
 class UnreachableError(PlannerError):
-    """Two positions are on different islands of the navmesh.
+    """Raised if there is no path between two positions.
 
     Attributes:
         names: Names of the unreachable objects, if known.
@@ -26,8 +26,8 @@ class UnreachableError(PlannerError):
 
 
 class ProblemError(PlannerError):
-    """A routing problem is malformed, or a plan does not solve it."""
+    """Raised if a routing problem is malformed, or if a plan does not solve it."""
 
 
 class InfeasibleError(PlannerError):
-    """A well-formed problem has no feasible plan."""
+    """Raised if a well-formed problem has no feasible plan."""

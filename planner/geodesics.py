@@ -1,7 +1,7 @@
-"""Exact any-angle shortest paths on a navmesh.
+"""Find exact any-angle shortest paths on a navmesh.
 
-Paths are the shortest around the inflated obstacles to within 0.1 mm (`navmesh.TOLERANCE`). Paths along grid cells
-would be several per cent longer.
+Paths cut into inflated obstacles by at most 0.1 mm (`navmesh.TOLERANCE`). Shortest paths on a grid would be
+several per cent longer.
 """
 
 from dataclasses import dataclass, field
@@ -20,14 +20,14 @@ from planner.visibility_graph import (
     visible_vertices,
 )
 
-MAX_CACHED = 4096  # maximum number of points whose visible vertices are cached
+MAX_CACHED = 4096  # maximum number of points for which visible vertices are cached
 
 
 @dataclass(frozen=True, eq=False)
 class ShortestPath:
     """A shortest path and its length."""
 
-    # corners and both ends, which may be snapped, in metres, shape (k, 2) with k >= 2
+    # Points of the path in metres, including both (possibly snapped) ends, shape (k, 2) with k >= 2
     points: NDArray[np.float64]
     geodesic_distance: float  # length of the path in metres
 
@@ -43,10 +43,10 @@ class _Query:
 class Geodesics:
     """Shortest paths and distances between points of a navmesh, in metres.
 
-    A point that is not navigable is replaced by the nearest point of the largest island (`NavMesh.snap`). The distance
-    to that point does not count. A navigable point on a smaller island is not replaced. All methods raise
-    NotNavigableError if no navigable point is within `max_snap` of a point, and UnreachableError if two points are on
-    different islands.
+    A point that is not navigable is replaced by the nearest point of the largest island (`NavMesh.snap`).
+    Path lengths do not include the distance between the two. A navigable point on a smaller island is not
+    replaced. All methods raise NotNavigableError if no navigable point is within `max_snap` of a point, and
+    UnreachableError if two points are on different islands.
 
     Example:
         >>> wall = np.array([[2.0, 0.0], [2.2, 0.0], [2.2, 3.0], [2.0, 3.0]])
@@ -79,7 +79,7 @@ class Geodesics:
         return ShortestPath(path, length)
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the symmetric matrix (n, n) of geodesic distances between n points (n, 2), in metres."""
+        """Return the geodesic distances between points (n, 2) in metres, as a symmetric matrix (n, n)."""
         query = self._query(*self._locate(points))
         result = self._between(query, query)
         result = np.minimum(result, result.T)
@@ -87,13 +87,13 @@ class Geodesics:
         return result
 
     def distances_from(self, point: ArrayLike, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances (n,) from one point to n points (n, 2), in metres."""
+        """Return the geodesic distances from one point to n points (n, 2) in metres, shape (n,)."""
         targets = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         between = self.distances_between(np.asarray(point, dtype=np.float64)[None], targets)
         return np.asarray(between[0])
 
     def distances_between(self, sources: ArrayLike, targets: ArrayLike) -> NDArray[np.float64]:
-        """Return the geodesic distances (s, t) from points (s, 2) to points (t, 2), in metres."""
+        """Return the geodesic distances from points (s, 2) to points (t, 2) in metres, shape (s, t)."""
         source, target = (self._query(*self._locate(points)) for points in (sources, targets))
         return self._between(source, target)
 
@@ -102,7 +102,7 @@ class Geodesics:
         islands = np.zeros(len(array), dtype=np.int64)
         for k, point in enumerate(array):
             islands[k] = self.navmesh.island_of(point) or 0
-            # Also snap points that are navigable only due to the tolerance: no tangents start inside an obstacle.
+            # Also snap points that are only within the tolerance, because they may be inside an obstacle.
             array[k] = self.navmesh.snap(point, self.max_snap, int(islands[k]))
         return array, islands
 

@@ -1,4 +1,4 @@
-"""The greedy planner, which is a baseline and provides the first plan of other planners."""
+"""The greedy planner, which serves as a baseline and provides a first plan for other planners."""
 
 import time
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from planner.solvers import SolveLimit
 
 @dataclass(frozen=True)
 class GreedySolver:
-    """Planner that always chooses the nearest possible visit."""
+    """A planner that always chooses the nearest possible visit."""
 
     name: str = "greedy"
 
@@ -27,7 +27,7 @@ class GreedySolver:
 
 
 def first_plan(problem: RoutingProblem) -> Plan:
-    """Return the nearest-first tour with a lower bound of 0. No other plan is faster to compute."""
+    """Return the greedy tour with a lower bound of 0, which is the fastest plan to compute."""
     return _plan(problem, 0)
 
 

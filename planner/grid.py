@@ -1,4 +1,4 @@
-"""Floor grids, and line segments indexed by the grid cells that they cross."""
+"""Grids on the floor, and an index of the line segments that cross each grid cell."""
 
 import math
 from typing import NamedTuple
@@ -8,24 +8,24 @@ from numpy.typing import NDArray
 
 from mjsim.support.kernels import kernel
 
-MARGIN = 1e-3  # distance by which a segment may miss a cell and still be listed in it, in metres
+MARGIN = 1e-3  # maximum distance from a cell to the segments listed for it, in metres
 
 
 class GridFrame(NamedTuple):
-    """Position and size of a grid.
+    """The position, resolution and size of a grid.
 
-    The cell in row r, column c spans x_min + [c, c + 1] resolution and y_min + [r, r + 1] resolution.
+    The cell in row r and column c covers x_min + [c, c + 1] * resolution and y_min + [r, r + 1] * resolution.
     """
 
-    x_min: float  # corner of the first cell, in metres
+    x_min: float  # smallest coordinates of the grid in metres
     y_min: float
-    resolution: float  # side of a cell, in metres
+    resolution: float  # side length of a cell in metres
     rows: int  # number of cells along y
     columns: int  # number of cells along x
 
     @classmethod
     def covering(cls, bounds: tuple[float, float, float, float], resolution: float) -> "GridFrame":
-        """Return the frame that covers the bounds (x_min, y_min, x_max, y_max) in metres."""
+        """Return a grid that covers the bounds (x_min, y_min, x_max, y_max), in metres."""
         x_min, y_min, x_max, y_max = bounds
         columns, rows = (
             max(1, math.ceil(side / resolution - 1e-9)) for side in (x_max - x_min, y_max - y_min)
@@ -39,14 +39,14 @@ class GridFrame(NamedTuple):
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def columns_rows(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the columns and rows of n points, shape (2, n). Points outside the grid are clipped to it."""
+        """Return the column and row of each point, shape (2, n). Points outside belong to border cells."""
         steps = (points - (self.x_min, self.y_min)) / self.resolution
         cells: NDArray[np.int64] = np.clip(steps.astype(np.int64), 0, (self.columns - 1, self.rows - 1))
         return cells.T
 
 
 class SegmentGrid(NamedTuple):
-    """Line segments indexed by the grid cells that they cross."""
+    """An index of line segments by the grid cells that they cross."""
 
     frame: GridFrame
     segments: NDArray[np.float64]  # x and y of both ends in metres, shape (s, 4)
@@ -86,9 +86,10 @@ def column_span(ax: float, ay: float, bx: float, by: float, row: int, frame: Gri
 def crossed_cells(
     frame: GridFrame, segments: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return all pairs of a cell and a segment within `MARGIN` of each other, as two index arrays.
+    """Return the grid cells that each line segment crosses, as two index arrays of cells and segments.
 
-    Cells are numbered row by row. `segments` contains x and y of both ends in metres, shape (s, 4).
+    Segments within `MARGIN` of a cell are included. Cells are numbered row by row. `segments` contains x and
+    y of both ends in metres, shape (s, 4).
     """
     cells, numbers = [0], [0]
     for k in range(len(segments)):
@@ -104,7 +105,7 @@ def crossed_cells(
 
 @kernel
 def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -> bool:
-    """Return True if the closed segment from a to b, both on the grid, touches no wall."""
+    """Return True if the line from a to b does not touch a wall. Both points must be on the grid."""
     frame = walls.frame
     first, last = row_span(ay, by, frame)
     for row in range(first, last + 1):
@@ -118,7 +119,7 @@ def is_visible(ax: float, ay: float, bx: float, by: float, walls: SegmentGrid) -
 
 @kernel
 def touch(ax: float, ay: float, bx: float, by: float, wall: NDArray[np.float64]) -> bool:
-    """Return True if the closed segment from a to b and a wall have a point in common."""
+    """Return True if the line segment from a to b touches a wall, end points included."""
     cx, cy, dx, dy = wall[0], wall[1], wall[2], wall[3]
     if max(cx, dx) < min(ax, bx) or min(cx, dx) > max(ax, bx):
         return False

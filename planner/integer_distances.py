@@ -1,4 +1,4 @@
-"""Distances in whole units, with which tour lengths are summed and compared exactly."""
+"""Convert distances to integers so that tour lengths can be summed and compared exactly."""
 
 import math
 from collections.abc import Sequence
@@ -9,27 +9,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-TOLERANCE = 1e-9  # maximum relative excess of an optimal tour over the shortest one
-FINE = 1 << 44  # largest distance in units if no coarser unit is exact; sums of 2^18 legs fit into int64
-TIE = 1e-10  # difference between tours that may be due to rounding, relative to the largest distance
-COARSE = 1 << 20  # largest distance in units at which tours of 40 objects fit into 32 bits
+TOLERANCE = 1e-9  # maximum relative error in the length of a tour that counts as optimal
+FINE = 1 << 44  # largest distance in the finest unit; sums of 2^18 such legs fit into int64
+TIE = 1e-10  # length difference that may be due to rounding, relative to the largest distance
+COARSE = 1 << 20  # largest distance in units for which tours of 40 objects fit into 32 bits
 ROUND = 1e-15  # rounding error of decimal fractions in floats, relative to the largest distance
 
 
 @dataclass(frozen=True, eq=False)
 class IntegerDistances:
-    """Distances of a problem in whole units."""
+    """The distances of a problem, rounded to integer units."""
 
-    unit: float  # length of a unit in metres
+    unit: float  # length of one unit in metres
     tie: int  # maximum difference between tours that count as equal, in units
     rounding: float  # maximum rounding error of a leg in units, 0 if the unit is exact
     used: Sequence[int]  # indices of the locations that every tour visits
-    # rounded distances, symmetric, 0 for locations that no tour visits, shape (k, k)
+    # Symmetric matrix of rounded distances, 0 for locations that no tour visits, shape (k, k)
     legs: NDArray[np.int64]
 
     @cached_property
     def metric(self) -> NDArray[np.int64]:
-        """Shortest connections in the rounded distances, shape (k, k).
+        """The lengths of shortest paths between locations, based on rounded distances, shape (k, k).
 
         Solvers rely on the triangle inequality, which rounding can violate by one unit.
         """
@@ -44,10 +44,10 @@ class IntegerDistances:
 def integer_distances(
     distances: NDArray[np.float64], used: Sequence[int], resolution: float | None
 ) -> IntegerDistances:
-    """Round distances in metres between the `used` locations to whole units.
+    """Convert the distances between the `used` locations from metres to integer units.
 
-    The unit is the resolution if one is given. Otherwise it is a power of ten of which all distances are multiples, or
-    2^-44 of the largest distance, so that rounding changes a tour by less than `TOLERANCE`.
+    The unit is the resolution if one is given. Otherwise, it is a power of ten if all distances are multiples
+    of it. If not, it is 2^-44 of the largest distance, so that rounding errors stay below `TOLERANCE`.
     """
     block = distances[np.ix_(used, used)]
     unit, tie = (resolution, 0) if resolution is not None else _unit(block)
@@ -70,8 +70,8 @@ def _unit(block: NDArray[np.float64]) -> tuple[float, int]:
 
 
 def shortest_connections(distances: NDArray[Any], used: Sequence[int]) -> NDArray[Any]:
-    """Return the shortest connections via the `used` locations, given symmetric distances of shape (k, k)."""
+    """Return the lengths of shortest paths via the `used` locations, given symmetric distances (k, k)."""
     shortest = distances.copy()
-    for k in used:  # Floyd-Warshall; SciPy's version treats a distance of 0 as a missing edge
+    for k in used:  # Floyd-Warshall algorithm; SciPy's version treats 0 as a missing edge
         np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :], out=shortest)
     return shortest

@@ -1,7 +1,7 @@
-"""Navigable floor: free space outside the obstacles, which are inflated by the person's radius.
+"""Navigation meshes, which describe the free floor around obstacles that are inflated by a person's radius.
 
-A grid answers most queries. If a cell lies entirely on one island, or outside all islands, so do all its points. Only
-cells that an outline crosses need the exact polygons.
+Most queries are answered by a grid, whose cells are usually on one island or outside all islands. Exact
+polygons are needed only for points in cells that the outline of an island crosses.
 """
 
 import math
@@ -20,8 +20,8 @@ from planner.grid import GridFrame, crossed_cells
 
 TOLERANCE = 1e-4  # maximum depth to which a path may cut into an inflated obstacle, in metres
 SNAP_CLEARANCE = 1e-6  # distance of snapped points from the boundary in metres, to allow for rounding errors
-ARC_SEGMENTS = 8  # segments per quarter circle; path lengths are within 0.01 % of those around true circles
-BLOCKED, MIXED = -1, -2  # values of `cells` outside all islands and on an outline
+ARC_SEGMENTS = 8  # number of segments per quarter circle, which makes path lengths accurate to 0.01 %
+BLOCKED, MIXED = -1, -2  # values of `cells`: outside all islands, or crossed by an outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class NavMesh:
     """The navigable part of a floor.
 
     A point is navigable if it is inside the bounds and not inside an obstacle inflated by the agent's radius. Points on
-    the boundary are navigable, with a tolerance of 0.05 mm. Bounds are not inflated.
+    the boundary are navigable, with a tolerance of 0.05 mm. The radius does not apply to the bounds.
 
     Attributes:
         bounds: (x_min, y_min, x_max, y_max) in metres.
@@ -37,8 +37,8 @@ class NavMesh:
         frame: Position and size of the grid.
         islands: Connected polygons of free space, largest first.
         solid: Inflated obstacles shrunk by `TOLERANCE`. Paths may not touch them.
-        cells: For each cell, the index of the island that contains all of it, `BLOCKED` or `MIXED`, as int32 of shape
-            (rows, columns).
+        cells: Value of each grid cell, int32 of shape (rows, columns): the index of the island that contains
+            the whole cell, `BLOCKED` or `MIXED`.
     """
 
     bounds: tuple[float, float, float, float]
@@ -59,13 +59,13 @@ class NavMesh:
         agent_radius: float = 0.25,
         resolution: float = 0.05,
     ) -> "NavMesh":
-        """Inflate obstacles and find the islands of free space.
+        """Build a navmesh from obstacles and bounds.
 
         Args:
             obstacles: Convex polygons, each with its vertices in any order, in metres, shape (k, 2).
             bounds: (x_min, y_min, x_max, y_max) in metres.
             agent_radius: Distance by which obstacles are inflated, in metres.
-            resolution: Side of a grid cell in metres.
+            resolution: Side length of a grid cell in metres.
 
         Raises:
             NavMeshError: An obstacle, the bounds or a size is invalid.
@@ -99,11 +99,11 @@ class NavMesh:
 
     @cached_property
     def topdown_map(self) -> NDArray[np.int32]:
-        """Index of the island at the centre of each grid cell, 0 for the largest island, -1 outside all islands.
+        """The island index at the centre of each grid cell: 0 for the largest island, -1 outside all islands.
 
-        The array is read-only and has the shape (rows, columns). The centre of row r, column c is at (x_min + (c + 0.5)
-        resolution, y_min + (r + 0.5) resolution). Row 0 has the smallest y, so draw the map with the origin at the
-        lower left. `frame.centres()` returns all centres.
+        The array is read-only and has the shape (rows, columns). The cell in row r and column c has its
+        centre at x_min + (c + 0.5) * resolution, y_min + (r + 0.5) * resolution. Row 0 has the smallest y, so
+        draw the map with the origin at the lower left. `frame.centres()` returns all centres.
         """
         islands = self.cells.copy()
         mixed = self.cells == MIXED
@@ -112,7 +112,7 @@ class NavMesh:
         return islands
 
     def island_of(self, point: ArrayLike) -> int | None:
-        """Return the index of the island that contains a point (x, y) in metres, or None if there is none."""
+        """Return the index of the island that contains a point (x, y) in metres, or None if not navigable."""
         x, y = _point(point)
         island = self._cell(x, y)
         if island == MIXED:
@@ -120,14 +120,14 @@ class NavMesh:
         return None if island == BLOCKED else island
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Return True if a person can stand at a point (x, y) in metres, on any island."""
+        """Return True if a point (x, y) in metres is navigable. The point may be on any island."""
         return self.island_of(point) is not None
 
     def snap(self, point: ArrayLike, max_distance: float = 1.0, island: int = 0) -> NDArray[np.float64]:
-        """Return the point of an island, by default the largest, that is nearest to a point (x, y) in metres.
+        """Return the nearest point on an island, by default the largest one, to a point (x, y) in metres.
 
-        A point on the island is returned unchanged, without the tolerance of `is_navigable`. Raises NotNavigableError
-        if the island is more than `max_distance` metres away.
+        A point that is already on the island is returned unchanged. The tolerance of `is_navigable` does not
+        apply. Raises NotNavigableError if the island is more than `max_distance` metres away.
         """
         x, y = _point(point)
         cell = self._cell(x, y)
@@ -144,9 +144,9 @@ class NavMesh:
         return nearest
 
     def sample(self, rng: np.random.Generator, count: int | None = None) -> NDArray[np.float64]:
-        """Draw one point, or `count` points of shape (count, 2), uniformly from the largest island, in metres.
+        """Draw one or `count` random points, uniformly distributed over the largest island, in metres.
 
-        Drawing `count` points at once gives the same points as `count` calls.
+        With `count`, the shape is (count, 2), and the points are the same as those of `count` separate calls.
         """
         island = self.islands[0]
         x_min, y_min, x_max, y_max = island.bounds
@@ -170,7 +170,7 @@ class NavMesh:
 
     @cached_property
     def outline(self) -> NDArray[np.float64]:
-        """Edges of the navigable floor as x and y of both ends, in metres, shape (e, 4).
+        """The edges of the navigable floor, as x and y of both ends in metres, shape (e, 4).
 
         A point is navigable if a ray from it crosses an odd number of edges.
         """

@@ -1,4 +1,4 @@
-"""The paper's planner, which solves equation 1 with OR-Tools routing (PAPER section 2)."""
+"""The planner of the paper, which uses the routing library of OR-Tools (PAPER section 2, equation 1)."""
 
 import math
 import time
@@ -14,27 +14,27 @@ from planner.plan import Certificate, Plan, Proof, Visit
 from planner.problem import RoutingProblem, make_plan, possible_next, spanning_bound
 from planner.solvers import SolveLimit
 
-FIRST_SOLUTIONS = (1, 10)  # maximum number of solutions of the first searches of `improve`
-DEFAULT_SOLUTIONS = 200  # maximum number of solutions; 0.1 s for 6 objects, 2 s for 24
+FIRST_SOLUTIONS = (1, 10)  # solution limits of the first two searches in `improve`
+DEFAULT_SOLUTIONS = 200  # default solution limit; a search takes 0.1 s for 6 objects and 2 s for 24 objects
 MAX_INSERTED = 250  # maximum number of nodes for which the insertion heuristic is used
 MAX_COUNTED = 1e9  # longest time limit that OR-Tools accepts, in seconds
-MAX_SECONDS = 60.0  # time limit in seconds of a search that is limited by solutions but may find too few
+MAX_SECONDS = 60.0  # time limit in seconds, in case a search does not reach its solution limit
 
 
 @dataclass(frozen=True)
 class OrToolsSolver:
-    """Planner that uses parallel cheapest insertion, then guided local search.
+    """A planner that uses parallel cheapest insertion, followed by guided local search.
 
-    `SolveLimit.work` counts the solutions that the local search accepts.
+    `SolveLimit.work` is the maximum number of solutions that the local search accepts.
     """
 
     name: str = "ortools"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Solve a problem within a number of solutions or seconds, whichever ends first. The seed has no effect.
+        """Solve a problem, up to a maximum number of solutions or seconds. The seed has no effect.
 
-        With up to three objects, all tours are tried and the plan is OPTIMAL. Otherwise it is FEASIBLE, with the bound
-        of a spanning tree.
+        With up to three objects, all tours are tried and the plan is OPTIMAL. With more objects, the plan's
+        lower bound is the length of a spanning tree.
         """
         del seed
         started = time.perf_counter()
@@ -51,9 +51,9 @@ class OrToolsSolver:
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the nearest-first tour immediately, then better tours from searches for 1, 10 and all solutions.
+        """Yield the greedy tour immediately, then better tours from searches of increasing length.
 
-        Each search starts from scratch. The short ones take little time compared with the last.
+        The searches stop after 1, 10 and `limit.work` solutions. Each of them starts from scratch.
         """
         started = time.perf_counter()
         best = GreedySolver().solve(problem)
@@ -75,7 +75,7 @@ def _with_budget(limit: SolveLimit | None) -> SolveLimit:
 
 
 def best_of_all(problem: RoutingProblem, distances: NDArray[np.int64]) -> tuple[list[Visit], int]:
-    """Return the best tour and its length in integer distances, by trying all tours. Suitable only for few objects."""
+    """Try all tours, and return the shortest one and its integer length. Suitable only for a few objects."""
     best: list[Visit] = []
     best_length = math.inf
 
@@ -102,17 +102,17 @@ def _search(
     manager = pywrapcp.RoutingIndexManager(count, 1, 0)
     routing = pywrapcp.RoutingModel(manager)
     location = problem.stops(visit_of)
-    # Adding 1 to every leg changes no comparison, and lets guided local search penalize legs of length 0.
+    # Adding 1 to every leg does not change the best tour, but lets the search penalize legs of length 0.
     costs = distances[np.ix_(location, location)] + 1
     costs[:, 0] = 0
     routing.SetArcCostEvaluatorOfAllVehicles(routing.RegisterTransitMatrix(costs.tolist()))
     _constrain(problem, manager, routing)
     if limit.stop is not None:
-        # At each check of the limit, OR-Tools also releases the interpreter lock.
+        # OR-Tools also releases the interpreter lock each time it checks this limit.
         routing.AddSearchMonitor(routing.solver().CustomLimit(limit.stop.is_set))
     solution = routing.SolveWithParameters(_parameters(limit, started)) if count <= MAX_INSERTED else None
     if solution is None:
-        # Insertion fails if time runs out, or if the hands are full when it inserts pairs before single nodes.
+        # Insertion fails if time runs out. It can also fail if the tour starts with full hands.
         greedy = nearest_first(problem)
         node = {visit: k + 1 for k, visit in enumerate(visit_of)}
         first = routing.ReadAssignmentFromRoutes([[node[v] for v in greedy]], True)

@@ -1,4 +1,4 @@
-"""Plans, and certificates of their lower bounds."""
+"""Plans and the certificates that prove their lower bounds."""
 
 import enum
 import math
@@ -10,14 +10,14 @@ from planner.errors import ProblemError
 
 
 class Proof(enum.Enum):
-    """Type of proof of a lower bound.
+    """Methods that prove a lower bound.
 
-    EXHAUSTIVE: Every order of visits was tried, or was excluded because it cannot be shorter.
+    EXHAUSTIVE: All orders of visits were tried, except those that could not be shorter.
     FULL_TABLE: The cost-to-go was computed for every set of remaining objects.
-    RELAXATION: The cost-to-go was computed for a relaxed problem, which counts objects by group and puts a price on
-        each pick. If the plan's bound exceeds the relaxation's, a search excluded all states that cannot lead to a
-        shorter tour.
-    SPANNING_TREE: No tour is shorter than the minimum spanning tree of its locations.
+    RELAXATION: The cost-to-go was computed for a relaxed problem, which counts objects by group and assigns a
+        price to each pick. If the plan's bound is higher than that of the relaxation, a search has examined
+        all states that could lead to a tour shorter than the plan's bound.
+    SPANNING_TREE: The bound is the length of the minimum spanning tree of all locations of the tour.
     """
 
     EXHAUSTIVE = "exhaustive"
@@ -28,20 +28,20 @@ class Proof(enum.Enum):
 
 @dataclass(frozen=True)
 class Certificate:
-    """Proof of a lower bound on the shortest tour, in whole units of the rounded distances."""
+    """A certificate that proves a lower bound on the tour length. Lengths are in integer units."""
 
     proof: Proof
-    unit: float  # length of a unit in metres
-    # lower bound in units before any search: the optimum (full table, exhaustive), the relaxation's bound at the start,
-    # or the spanning tree's length. The plan's lower bound is higher if a search has raised it.
+    unit: float  # length of one unit in metres
+    # Lower bound in units before any search: the optimal length (full table, exhaustive), the bound of the
+    # relaxation, or the length of the spanning tree. A search may have raised the plan's lower bound further.
     root: int
-    # groups of shipments that the relaxation counts together; each shipment is in one group
+    # Groups of shipments. The relaxation only counts the remaining shipments of each group.
     groups: tuple[tuple[int, ...], ...] = ()
-    multipliers: tuple[int, ...] = ()  # price of picking up each shipment, in units
+    multipliers: tuple[int, ...] = ()  # price for picking up each shipment, in units
 
 
 class Status(enum.Enum):
-    """Quality of a plan."""
+    """Status of a plan: proven optimal, feasible, or infeasible."""
 
     OPTIMAL = "optimal"
     FEASIBLE = "feasible"
@@ -49,14 +49,14 @@ class Status(enum.Enum):
 
 
 class VisitKind(enum.StrEnum):
-    """Type of a visit."""
+    """The kind of a visit: picking up or placing an object."""
 
     PICK = "pick"
     PLACE = "place"
 
 
 class Visit(NamedTuple):
-    """One step of a task."""
+    """One step of a plan, in which an object is picked up or placed."""
 
     kind: VisitKind
     object: str  # name of the object
@@ -64,15 +64,15 @@ class Visit(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A feasible order of all remaining visits.
+    """A sequence of visits that completes the task.
 
     Attributes:
-        visits: Visits in order.
+        visits: All remaining visits in order.
         cost: Length of the open tour in metres.
-        lower_bound: Lower bound on all feasible tours in metres.
-        status: OPTIMAL if and only if cost equals lower_bound up to rounding.
-        seconds: Wall time of the search. It is not reproducible.
-        certificate: Proof of the lower bound, or None for a plan read from a record.
+        lower_bound: Lower bound on the length of any feasible tour in metres.
+        status: OPTIMAL if and only if `cost` equals `lower_bound` up to rounding.
+        seconds: Wall time of the search in seconds, which differs from run to run.
+        certificate: Proof of the lower bound, or None if it is not available.
 
     Raises:
         ProblemError: A value has the wrong type or is not finite.

@@ -1,4 +1,4 @@
-"""The routing problem of equation 1: capacitated pickup and delivery with an open tour."""
+"""Pickup and delivery problems with a limited capacity and an open tour (PAPER, equation 1)."""
 
 import math
 import time
@@ -14,13 +14,13 @@ from planner.errors import ProblemError
 from planner.integer_distances import TOLERANCE, IntegerDistances, integer_distances
 from planner.plan import Certificate, Plan, Status, Visit, VisitKind
 
-MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # range of the largest distance, in which all sums are normal floats
-ASYMMETRY = 1e-12  # maximum relative difference between the two directions of a distance, due to rounding
+MIN_LARGEST, MAX_LARGEST = 1e-250, 1e250  # limits of the largest distance that prevent overflow and underflow
+ASYMMETRY = 1e-12  # relative difference between d[i, j] and d[j, i] that is accepted as a rounding error
 
 
 @dataclass(frozen=True)
 class Shipment:
-    """An object to fetch. The pickup and the delivery are indices into the distance matrix."""
+    """An object to pick up and deliver. Both locations are indices into the distance matrix."""
 
     pickup: int
     delivery: int
@@ -28,25 +28,25 @@ class Shipment:
 
 @dataclass(frozen=True, eq=False)
 class RoutingProblem:
-    """The remaining part of a task, from any of its states (PAPER section 2).
+    """A routing problem for the rest of a task, which may already be in progress (PAPER section 2).
 
-    Objects are numbered: first the shipments, then the onboard objects.
+    Object numbers start with the shipments and continue with the objects already on board.
 
     Attributes:
         distances: Geodesic distances between locations in metres, shape (k, k), symmetric with a zero diagonal.
-        start: Index of the person's location.
-        shipments: Loose objects. Several may share a pickup or a delivery.
-        onboard: Index of the delivery location of each carried object.
+        start: Index of the location where the tour starts.
+        shipments: Objects still to be picked up. Several objects may share a pickup or a delivery location.
+        onboard: Index of the delivery location of each object that is already carried.
         capacity: Maximum number of objects that can be carried.
-        names: Unique names of the objects, in the order of their numbers. The default names are the numbers.
-        resolution: Precision in metres to which distances are rounded, or None if they are exact. With a resolution,
-            tours count as equal if they differ only by the rounding of their legs. Otherwise they count as equal if
-            they differ by at most 1e-9 of their length.
+        names: Unique names of the objects, in the order of their numbers, which are also the default names.
+        resolution: Rounding precision of the distances in metres, or None if the distances are exact. With a
+            resolution, two tours count as equal if rounding of their legs can explain the difference.
+            Otherwise, they count as equal if they differ by at most 1e-9 of their length.
 
     Raises:
-        ProblemError: The distances are not square, negative, not finite, too large, too small or asymmetric, an index
-            is out of range, more objects are onboard than the capacity allows, or names are not unique or not one per
-            object.
+        ProblemError: The distance matrix is not square or not symmetric, a distance is negative, not finite,
+            too large or too small, an index is out of range, more objects are on board than the capacity
+            allows, or the number of unique names differs from the number of objects.
 
     Example:
         >>> distances = np.array([[0.0, 3.0, 5.0], [3.0, 0.0, 4.0], [5.0, 4.0, 0.0]])
@@ -76,24 +76,24 @@ class RoutingProblem:
 
     @cached_property
     def used(self) -> list[int]:
-        """Indices of the locations that every tour visits, ascending."""
+        """Sorted indices of all locations that a tour must visit, including the start."""
         places = {self.start, *self.onboard}
         return sorted(places.union(*((s.pickup, s.delivery) for s in self.shipments)))
 
     @cached_property
     def integers(self) -> IntegerDistances:
-        """The distances, rounded to whole units."""
+        """The distances, rounded to integer multiples of a unit."""
         return integer_distances(self.distances, self.used, self.resolution)
 
     def tolerance(self, length: float) -> float:
-        """Return the maximum difference in metres at which tours of about this length count as equal."""
+        """Return the largest difference in metres at which two tours of about this length count as equal."""
         if self.resolution is None:
             return TOLERANCE * length
         return 2 * self.resolution * (len(self.shipments) + len(self.names))
 
     @cached_property
     def number(self) -> dict[str, int]:
-        """Number of each object, by name."""
+        """A mapping from object names to object numbers."""
         return {name: k for k, name in enumerate(self.names)}
 
     def pick(self, shipment: int) -> Visit:
@@ -101,11 +101,11 @@ class RoutingProblem:
         return Visit(VisitKind.PICK, self.names[shipment])
 
     def place(self, number: int) -> Visit:
-        """Return the visit that places a shipment or an onboard object."""
+        """Return the visit that delivers the object with this number."""
         return Visit(VisitKind.PLACE, self.names[number])
 
     def location(self, visit: Visit) -> int:
-        """Return the index of a visit's location."""
+        """Return the index of the location where a visit takes place."""
         number, n = self.number[visit.object], len(self.shipments)
         if number >= n:
             return self.onboard[number - n]
@@ -113,7 +113,7 @@ class RoutingProblem:
         return shipment.pickup if visit.kind is VisitKind.PICK else shipment.delivery
 
     def stops(self, visits: Iterable[Visit]) -> list[int]:
-        """Return the location indices of the start and of each visit."""
+        """Return the indices of the start location and of all visited locations, in order."""
         return [self.start, *map(self.location, visits)]
 
     def _check_distances(self) -> None:
@@ -167,7 +167,7 @@ class RoutingProblem:
 
 
 def possible_next(problem: RoutingProblem, visits: Sequence[Visit] = ()) -> Iterator[Visit]:
-    """Yield the next visits that capacity and precedence allow after the given visits."""
+    """Yield the visits that may follow the given visits, subject to capacity and precedence."""
     done, n = set(visits), len(problem.shipments)
     load = len(problem.onboard)
     for visit in visits:
@@ -188,16 +188,16 @@ def tour_length(
 ) -> float:
     """Return the length of an open tour.
 
-    `distances` of shape (k, k) replaces the problem's own matrix if given. For integers below 2^53, the result is
-    exact.
+    If `distances` is given, this matrix of shape (k, k) is used instead of the problem's own matrix. The
+    result is exact for integer lengths below 2^53.
     """
     stops = problem.stops(visits)
     return float((problem.distances if distances is None else distances)[stops[:-1], stops[1:]].sum())
 
 
 def spanning_bound(problem: RoutingProblem) -> int:
-    """Return the length in units of the minimum spanning tree of all visited locations, a lower bound on tours."""
-    from scipy.sparse.csgraph import minimum_spanning_tree  # imported late, because it is slow to import
+    """Return a lower bound on the tour length in units, which is the length of the minimum spanning tree."""
+    from scipy.sparse.csgraph import minimum_spanning_tree  # imported here because SciPy is slow to import
 
     used = problem.used
     if len(used) == 1:
@@ -215,15 +215,15 @@ def make_plan(
     started: float,
     certificate: Certificate,
 ) -> Plan:
-    """Make a plan from a tour that was found with integer distances.
+    """Create a plan from a tour that was found with integer distances.
 
-    `metric` contains these distances, shape (k, k), and `bound` is a lower bound on the tours in them. `started` is the
-    value of `time.perf_counter()` at the start of solving. The plan's lower bound also holds for the problem's own
-    distances. The plan is OPTIMAL if the tour meets the bound in the integer distances and, within the problem's
-    tolerance, in its own.
+    `metric` is the matrix of integer distances, of shape (k, k). `bound` is a lower bound on tours with these
+    distances. `started` is the value of `time.perf_counter()` when the solver started. The plan's lower bound
+    also holds for the original distances. The plan is OPTIMAL if the tour is as short as the bound, both in
+    integer distances and, within the problem's tolerance, in original distances.
     """
     integers, cost = problem.integers, tour_length(problem, visits)
-    lower = certificate.unit * (bound - integers.rounding * len(visits))  # legs may have been rounded up
+    lower = certificate.unit * (bound - integers.rounding * len(visits))  # a leg may have been rounded up
     met = tour_length(problem, visits, metric) <= bound + integers.tie
     rounding = (problem.resolution or 0.0) * len(visits) / 2
     optimal = met and cost - lower <= problem.tolerance(cost) + rounding

@@ -1,4 +1,4 @@
-"""Routing problems, plans and certificates as JSON, for `mjsim plan`."""
+"""Convert routing problems, plans and certificates to and from JSON, for `mjsim plan`."""
 
 import json
 from typing import Annotated, Any, Literal, TypeVar
@@ -13,7 +13,7 @@ from planner.plan import Certificate, Plan, Proof, Status, Visit, VisitKind
 from planner.problem import RoutingProblem, Shipment
 
 FORMAT = 2
-EXACT = 1 << 53  # all integers up to this one are exact as floats
+EXACT = 1 << 53  # every integer up to this value can be represented exactly as a float
 PROBLEM = (
     'a problem is {"distances": [[0, 3], [3, 0]], "shipments": [{"pickup": 0, "delivery": 1}]}, '
     'and if need be "start": 0, "onboard": [1], "capacity": 2'
@@ -77,7 +77,7 @@ def problem_from_json(text: str | bytes) -> RoutingProblem:
 
 
 def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
-    """Write a plan as JSON: visits as location indices, cost and lower bound in metres, status, and seconds."""
+    """Return a plan as a JSON string. Visits are location indices, and lengths are in metres."""
     return json.dumps(
         {
             "visits": [problem.location(visit) for visit in plan.visits],
@@ -90,10 +90,10 @@ def plan_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
-    """Write a plan and its certificate as JSON.
+    """Return a plan and its certificate as a JSON string.
 
     A visit is `["pick", k]` or `["place", k]` for shipment k, or `["place onboard", k]` for the object k that is
-    carried at the start. Both count from 0.
+    carried at the start. Both are numbered from 0.
     """
     fields = {name: getattr(plan, name) for name in ("cost", "lower_bound", "status", "certificate")}
     visits = [_action(problem, visit) for visit in plan.visits]
@@ -102,7 +102,7 @@ def claim_to_json(problem: RoutingProblem, plan: Plan) -> str:
 
 
 def claim_from_json(text: str | bytes, problem: RoutingProblem) -> Plan:
-    """Read a plan of this problem as written by `claim_to_json`, without checking its claims.
+    """Read a plan that `claim_to_json` has written, without checking whether its claims are true.
 
     Raises:
         ProblemError: The text is not JSON, a field is missing, unknown or of the wrong type, or a visit names an
@@ -124,7 +124,7 @@ def _decode(text: str | bytes, kind: type[T], hint: str) -> T:
         return found
     except UnicodeError as error:
         raise ProblemError(f"not UTF-8 ({error}); {hint}") from error
-    except ValueError as error:  # msgspec's message names the path and the type of the faulty value
+    except ValueError as error:  # the message contains the path and the type of the invalid value
         raise ProblemError(f"{error}; {hint}") from error
     except RecursionError as error:
         raise ProblemError(f"nested too deeply; {hint}") from error

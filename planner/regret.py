@@ -1,4 +1,4 @@
-"""Regrets: how much longer a tour gets if a possible next visit replaces the best one."""
+"""Compute the regrets of visits, which are the extra tour lengths compared with the best next visit."""
 
 import math
 from dataclasses import dataclass, replace
@@ -17,11 +17,11 @@ from planner.route import TaskState
 from planner.solvers import Deadline, SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
-RADIUS = 1.0  # default for the largest regret that is computed exactly, in metres
-MIN_RADIUS = 0.1  # radius below which no further pass is tried, in metres
-MAX_ROWS = 1 << 14  # maximum number of table rows of a pass's lower bound
-MAX_STATES = 3_000_000  # maximum number of states in a pass, about 200 MB
-SAME = 1e-6  # maximum difference between equal tour lengths, in metres
+RADIUS = 1.0  # default limit up to which regrets are computed exactly, in metres
+MIN_RADIUS = 0.1  # smallest radius of a pass in metres
+MAX_ROWS = 1 << 14  # maximum number of rows in the lower-bound table of a pass
+MAX_STATES = 3_000_000  # maximum number of states in a pass, which occupy about 200 MB
+SAME = 1e-6  # difference up to which two tour lengths count as equal, in metres
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,16 @@ class Regret:
 
     visit: Visit
     cost: float  # length of the remaining tour in metres if this visit is next
-    regret: float  # excess in metres over the cost of the best visit
-    proven: bool  # True if cost and regret are proven: exact, or lower bounds if `capped`
+    regret: float  # extra length in metres compared with the best visit
+    proven: bool  # True if cost and regret are proven values, or proven bounds if `capped`
     capped: bool = False  # True if cost and regret are only lower bounds
 
 
 class RegretEvaluator:
-    """Computes the regrets of possible and actual visits with the exact planner.
+    """An evaluator that computes the regrets of visits with the exact planner.
 
-    `limit` applies to each search with more than 18 remaining objects. If it is None, the planner's own budget applies.
-    Results are bit-identical unless it limits time. `all` computes regrets of up to `radius` metres exactly.
+    `limit` applies to searches with more than 18 remaining objects. By default, the solver's limit applies.
+    Results are reproducible unless time is limited. `all` computes regrets of up to `radius` metres exactly.
     """
 
     def __init__(
@@ -65,9 +65,9 @@ class RegretEvaluator:
         )
 
     def all(self, state: TaskState, plan: Plan | None = None) -> dict[Visit, Regret]:
-        """Return the regret of each possible next visit, the best visit first.
+        """Return the regret of each possible next visit, starting with the best visit.
 
-        `plan` is a plan for this state or an earlier one. If it is for this state and proven, the search is skipped.
+        `plan` is a plan for this state or for an earlier one. A proven plan for this state saves a search.
         Raises UnreachableError if objects cannot be fetched or delivered.
         """
         if self._last is None or not same_state(self._last[0], state):
@@ -82,7 +82,7 @@ class RegretEvaluator:
         return dict(self._last[1])
 
     def of(self, state: TaskState, visit: Visit, plan: Plan | None = None) -> float | None:
-        """Return the exact regret of a visit in metres, or None if the visit is impossible or its regret is unproven.
+        """Return the exact regret of a visit in metres, or None if no exact regret is available.
 
         `plan` is a plan for this state or an earlier one, or None. Raises UnreachableError if objects cannot be fetched
         or delivered.
@@ -108,7 +108,7 @@ class RegretEvaluator:
 
 
 def same_state(one: TaskState, other: TaskState) -> bool:
-    """Return True if the person and all objects are at the same places in both states."""
+    """Return True if the person and all objects are in the same places in both states."""
     return one is other or (one.position, one.carried, one.loose) == (
         other.position,
         other.carried,
@@ -117,7 +117,7 @@ def same_state(one: TaskState, other: TaskState) -> bool:
 
 
 def after(problem: RoutingProblem, visit: Visit) -> RoutingProblem:
-    """Return the rest of the task after a visit. Raises ProblemError if the visit is not possible."""
+    """Return the problem that remains after a visit. Raises ProblemError if the visit is not possible."""
     if visit not in possible_next(problem):
         raise ProblemError(f"{visit} is not possible now; choose one of possible_next")
     shipments, onboard = list(problem.shipments), list(problem.onboard)
@@ -142,19 +142,20 @@ def regrets(
     radius: float = RADIUS,
     plan: Plan | None = None,
 ) -> tuple[Regret, ...]:
-    """Return the regrets of all possible next visits, the best visit first.
+    """Return the regrets of all possible next visits, starting with the best visit.
 
-    The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and otherwise one pass
-    over all tours that are at most `radius` longer than the best. Regrets above the radius are lower bounds, marked as
-    `capped`. If the pass grows too large, the radius is halved, down to 0.1 m. If this is still too large, if the best
-    tour is not proven, or for other capacities and solvers, the remaining task is solved separately after each visit.
+    The exact planner evaluates all visits at once. It uses the full table for up to 18 objects, and otherwise
+    one pass over all tours that are at most `radius` longer than the best tour. Regrets above the radius are
+    lower bounds, marked as `capped`. If the pass is too large, the radius is halved, down to 0.1 m. The
+    remaining task is solved separately after each visit if the pass is still too large, if the best tour is
+    not proven optimal, or if the planner or the capacity does not allow a pass.
 
     Args:
-        problem: The remaining task.
+        problem: Routing problem of the remaining task.
         solver: Planner. With the exact one, regrets that are `proven` and not `capped` are exact.
         limit: Limit for each problem that the planner solves.
         radius: Largest regret that is computed exactly, in metres.
-        plan: Plan of this problem, or None. If it is proven, the search for it is skipped.
+        plan: Plan for this problem, or None. If the plan is proven optimal, the search for one is skipped.
 
     Raises:
         ProblemError: The radius is negative.
@@ -170,14 +171,14 @@ def regrets(
 def one_by_one(
     problem: RoutingProblem, solver: Solver, *, limit: SolveLimit | None = None
 ) -> tuple[Regret, ...]:
-    """Compute regrets with any solver, by solving the remaining task after each possible next visit."""
+    """Compute regrets with any solver by solving the remaining task after each possible next visit."""
     found = []
     for visit in possible_next(problem):
         plan = solver.solve(after(problem, visit), limit=limit)
         cost = float(problem.distances[problem.start, problem.location(visit)]) + plan.cost
         found.append((cost, visit, plan.status is Status.OPTIMAL))
     least = min((cost for cost, _, _ in found), default=0.0)
-    proven = all(proven for _, _, proven in found)  # any unproven cost makes every regret unproven
+    proven = all(proven for _, _, proven in found)  # a single unproven cost makes all regrets unproven
     found.sort(key=lambda entry: entry[0])
     return tuple(Regret(visit, cost, cost - least, proven) for cost, visit, _ in found)
 

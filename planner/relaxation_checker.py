@@ -1,4 +1,4 @@
-"""The relaxation behind certificates in NumPy, implemented independently of the solver."""
+"""A NumPy implementation of the relaxed problem, which verifies certificates independently of the solver."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from planner.errors import ProblemError
 from planner.problem import RoutingProblem
 
-MAX_PRICES = 100  # maximum sum of prices relative to the longest tour; rounding errors would matter above it
+MAX_PRICES = 100  # maximum sum of prices relative to the longest tour, which limits rounding errors
 
 Lengths = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -17,7 +17,7 @@ Field = NDArray[Any]
 
 
 def closed(problem: RoutingProblem) -> Lengths:
-    """Return the shortest distances between locations via locations of the tour, in metres, shape (k, k)."""
+    """Return the lengths of shortest paths via locations of the tour, in metres, shape (k, k)."""
     shortest: Lengths = np.minimum(problem.distances, problem.distances.T)
     for k in problem.used:
         shortest = np.minimum(shortest, shortest[:, k, None] + shortest[None, k, :])
@@ -25,25 +25,25 @@ def closed(problem: RoutingProblem) -> Lengths:
 
 
 class StateArrays(NamedTuple):
-    """States of a task, with one array entry per state."""
+    """States of a task. Each array contains one entry per state."""
 
-    left: Field  # remaining objects (bit mask)
-    place: Field  # b at bin b, m + i at object i that was just picked up, m + n at the start
+    left: Field  # bit mask of the remaining objects
+    place: Field  # current place: b at bin b, m + i at object i (just picked up), m + n at the start
     held: Field  # bin of the object in hand, or m for empty hands
-    cost: Field  # length so far plus the prices of picks, in metres
+    cost: Field  # length of the tour so far plus the prices of its picks, in metres
 
 
 class Relaxation:
-    """Cost-to-go of the relaxed problem from every state, for a capacity of one or two.
+    """A table of the cost-to-go of the relaxed problem, for a capacity of one or two.
 
-    Each table row corresponds to one combination of the numbers of remaining objects per group. Any object of a group
-    may be picked up, but not twice in a row, and each pick has a price. Every real tour is a relaxed tour that pays
-    each price once. An object is placed whenever its bin is reached, which is never worse in a metric.
+    Each table row stands for one combination of the numbers of remaining objects in each group. Any object of
+    a group may be picked up, even repeatedly, but not twice in a row. Each pick has a price. Every real tour
+    is also a relaxed tour that pays each price once. An object is placed as soon as its bin is reached.
 
     Attributes:
-        exact: True if the given distances satisfy the triangle inequality. Otherwise the table holds only for shortest
-            connections.
-        root: Lower bound on all tours in metres.
+        exact: True if the given distances satisfy the triangle inequality. Otherwise, the table uses the
+            lengths of shortest paths instead.
+        root: Lower bound on tour lengths in metres.
 
     Raises:
         ProblemError: The prices are so large that rounding errors could exceed 1e-9 of a tour.
@@ -65,7 +65,7 @@ class Relaxation:
         self._prices = prices
         size = np.bincount(group, minlength=1)
         strides = np.concatenate([[1], np.cumprod(size + 1)])
-        self._stride = strides[group]  # decrease of the row index when an object is picked up
+        self._stride = strides[group]  # amount by which the row index decreases when an object is picked up
         rows = np.arange(strides[-1])
         self._rest = self._filled(group, [rows // s % (k + 1) for s, k in zip(strides, size, strict=False)])
         here, after = self._begin()
@@ -73,9 +73,10 @@ class Relaxation:
         self.root = min(first) - float(prices.sum()) if places[:-1] else 0.0
 
     def _filled(self, group: Whole, left: list[Whole]) -> Lengths:
-        """Fill the table.
+        """Return the filled table.
 
-        Column b m + c is for bin b with an object for bin c in hand (c = b: none), and column m m + i for object i.
+        Column b * m + c stands for bin b with an object for bin c in hand, or with empty hands if c = b.
+        Column m * m + i stands for object i.
         """
         n, m, home, total = len(self._home), self._bins, self._home, np.sum(left, axis=0)
         leave, to_bin, between = self._d[:m, :m], self._d[m:-1, :m], self._d[m:-1, m:-1].copy()
@@ -106,10 +107,10 @@ class Relaxation:
         return table
 
     def shorter(self, limit: float, max_states: int) -> tuple[bool, int] | None:
-        """Return True if a tour shorter than a limit in metres exists, and the number of visited states.
+        """Look for a tour below `limit` metres. Return True if found, and the number of visited states.
 
-        All states whose cost plus bound is below the limit are visited. Return None if there are more than
-        `max_states`.
+        All states whose cost plus lower bound is below the limit are visited. The result is None if there are
+        more than `max_states` such states.
         """
         limit += float(self._prices.sum())
         here, after = self._begin()

@@ -18,11 +18,11 @@ class TaskState:
         position: Position of the person in metres.
         loose: Position in metres of each object that is neither carried nor delivered, by name.
         carried: Names of the carried objects.
-        deliveries: Position in metres where a person stands to deliver each loose or carried object, by name. Other
+        deliveries: Position in metres from which each loose or carried object is delivered, by name. Other
             names are ignored.
 
     Raises:
-        ProblemError: An object is both loose and carried, is carried twice, or has no delivery.
+        ProblemError: An object is both loose and carried, is carried twice, or has no delivery position.
     """
 
     position: XY
@@ -50,12 +50,12 @@ class Route:
 
     @property
     def next(self) -> Visit | None:
-        """The next visit, or None after the last one."""
+        """The next visit, or None after the last visit."""
         return self.visits[0] if self.visits else None
 
 
 def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | None:
-    """Return the visits that remain in a state, or None if the state cannot result from making them in order."""
+    """Return the remaining visits, or None if the current state does not match the order of the visits."""
     loose = {visit.object for visit in visits if visit.kind is VisitKind.PICK}
     carried = {visit.object for visit in visits} - loose
     done = 0
@@ -73,9 +73,9 @@ def remaining(visits: Sequence[Visit], state: TaskState) -> tuple[Visit, ...] | 
 
 
 class PlanSource(abc.ABC):
-    """A source of routes for the planner."""
+    """The base class of plan sources, which provide routes to the planner."""
 
-    # runs a search for better plans in the background; None if each plan is final
+    # Function that runs a search in the background, or None if plans are never improved
     start: Callable[[Callable[[], None]], object] | None = None
 
     @abc.abstractmethod
@@ -84,10 +84,10 @@ class PlanSource(abc.ABC):
 
     @abc.abstractmethod
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
-        """Return a new route for a state, given the previous one. `shown` is explained at `Planner.ask`."""
+        """Return a new route for a state. `route` is the previous one, and `Planner.ask` explains `shown`."""
 
     def check(self, state: TaskState) -> None:  # noqa: B027 - optional
-        """Raise UnreachableError, with the names of the objects, if objects cannot be fetched or delivered."""
+        """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""
 
     @property
     def pending(self) -> bool:
@@ -95,7 +95,7 @@ class PlanSource(abc.ABC):
         return False
 
     def better(self, state: TaskState, route: Route) -> Route | None:  # noqa: ARG002 - each plan is final
-        """Return a shorter route for the same task, or the same route with a better bound, or None."""
+        """Return a shorter route or the same route with a better bound, or None if nothing improved."""
         return None
 
     def close(self) -> None:  # noqa: B027 - optional

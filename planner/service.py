@@ -1,4 +1,4 @@
-"""The planner of a session, which runs in the caller's thread, in a background thread, or live in several threads."""
+"""A planner for sessions, which runs in the caller's thread or in background threads."""
 
 import contextlib
 import enum
@@ -16,32 +16,32 @@ from planner.route import PlanSource, Route, TaskState
 from planner.solvers import SolveLimit
 
 T = TypeVar("T")
-REGRET_SECONDS = 5.0  # maximum wall time for the regrets of one state in live mode, in seconds
+REGRET_SECONDS = 5.0  # time limit for the regrets of one state in live mode, in seconds
 
 
 class Mode(enum.Enum):
-    """Execution mode of a planner. The value is the maximum number of threads."""
+    """Execution modes of a planner. Each value is the maximum number of background threads."""
 
-    INLINE = 0  # plans in the caller's thread
-    THREAD = 1  # gives the same results from one background thread, in order
-    LIVE = 32  # returns a first plan immediately, and computes better plans and regrets in threads
+    INLINE = 0  # The planner runs in the caller's thread.
+    THREAD = 1  # One background thread handles requests in order, with the same results as INLINE.
+    LIVE = 32  # A first plan is returned immediately. Threads then compute better plans and regrets.
 
 
 class Planner:
-    """Plans the route of a task and computes the regrets of its alternatives.
+    """A planner that finds routes for a task and computes the regrets of possible visits.
 
-    A route is kept while the participant follows it and no object is pushed far. Otherwise a new plan is made (PAPER
-    section 2). In the modes `INLINE` and `THREAD`, results are reproducible because search budgets count work instead
-    of time. In `LIVE` mode, the caller never waits for a proof of optimality, and results depend on the machine's
-    speed.
+    The current route is kept as long as the participant follows it and no object is moved far. Otherwise, a
+    new plan is made (PAPER section 2). In the modes `INLINE` and `THREAD`, results are reproducible because
+    searches are limited by work instead of time. In `LIVE` mode, the caller never waits for a proof of
+    optimality, and results depend on the machine's speed.
 
     Args:
-        source: Source of the plans.
+        source: Plan source that provides the routes.
         evaluator: Evaluator that computes the regrets.
         mode: Execution mode.
 
     Attributes:
-        replans: Number of new plans made because the route no longer fitted.
+        replans: Number of times that a new plan replaced a route that no longer applied.
     """
 
     def __init__(self, source: PlanSource, evaluator: RegretEvaluator, mode: Mode = Mode.INLINE) -> None:
@@ -54,15 +54,15 @@ class Planner:
         self._task: tuple[TaskState, Plan] | None = None  # last requested state and its plan
         self._asked = False
         self._running: list[Future[Any]] = []
-        self._latest: Future[None] | None = None  # last job submitted to the thread
+        self._latest: Future[None] | None = None  # most recent job of the background thread
         self._regrets: Future[Mapping[Visit, Regret]] | None = None  # regrets of the last state, in live mode
-        self._stop = threading.Event()  # set to stop the search for these regrets
-        # visits whose regrets are computed after the task
+        self._stop = threading.Event()  # set to stop the computation of regrets
+        # label, state, visit and plan for each regret that is computed after the task
         self._late: list[tuple[Any, TaskState, Visit, Plan]] = []
         self.use(source)
 
     def use(self, source: PlanSource) -> None:
-        """Switch to another source of plans. The current route is kept."""
+        """Use another plan source from now on, but keep the current route."""
         self._source = source
         source.start = self._start if self.mode is Mode.LIVE else None
 
@@ -83,10 +83,10 @@ class Planner:
         return None if route is None else route.next
 
     def prepare(self, state: TaskState, *, seconds: float | None = None) -> None:
-        """Plan in advance for the state in which the task will start.
+        """Plan the route for the initial state before the task starts.
 
-        In live mode, wait up to `seconds` for the proof, then compute regrets once to load their kernels. Raises
-        UnreachableError or ProblemError if the task is impossible.
+        In live mode, wait up to `seconds` for a proof of optimality, then compute regrets once so that their
+        kernels are loaded. Raises UnreachableError or ProblemError if the task is impossible.
         """
         self._prepared = state
         self.do(lambda _: self._set_task(state, self._plan(state, shown=False).plan))
@@ -107,10 +107,10 @@ class Planner:
 
         Args:
             state: Current state of the task.
-            shown: True if the plan is shown to the participant. It then depends only on this state. A plan that is not
-                shown reuses earlier results, which is several times faster but may select another of several equally
-                short tours.
-            then: Function called with the route, and with True if the route has a new plan.
+            shown: True if the participant sees the plan. The plan then depends only on this state. Otherwise,
+                earlier results are reused, which is several times faster but may result in a different tour
+                of the same length.
+            then: Callback that receives the route, and True if the plan of the route is new.
 
         Raises:
             UnreachableError: Some objects cannot be fetched or delivered. `names` lists them.
@@ -120,7 +120,7 @@ class Planner:
         def answer(before: Route | None) -> None:
             first, self._asked = not self._asked, True
             if before is not None and first and state != self._prepared:
-                before = None  # the task starts in another state than the prepared one
+                before = None  # the task starts in a different state than the prepared one
             rest = None if before is None else self._source.rest(before, state)
             if before is None or rest is None:
                 self.replans += not first
@@ -131,13 +131,13 @@ class Planner:
             then(route, first or rest is None)
 
         if self.mode is Mode.THREAD:
-            self._source.check(state)  # an impossible task fails here, in the caller's thread
+            self._source.check(state)  # report an impossible task in the caller's thread
         self.do(answer)
 
     def do(self, job: Callable[[Route | None], None]) -> None:
-        """Call a function with the route for the last requested state, as soon as that route is available.
+        """Call a function with the current route as soon as that route is available.
 
-        Raises PlannerError if planning failed. In thread mode, the next request raises the error.
+        Raises PlannerError if planning failed. In thread mode, the error is raised by the next request.
         """
         before = self._latest
 
@@ -157,13 +157,13 @@ class Planner:
         return self._source.pending
 
     def improve(self, state: TaskState) -> Route | None:
-        """Return a shorter route for the same task, or the same route with a better bound, or None."""
+        """Return a shorter route or the same route with a better bound, or None if nothing improved."""
         better = None if self._route is None else self._source.better(state, self._route)
         self._route = better or self._route
         return better
 
     def regrets(self) -> Mapping[Visit, Regret]:
-        """Return the regrets of all possible next visits, smallest first. In live mode, the result may be empty."""
+        """Return the regrets of possible next visits, smallest first. They may be missing in live mode."""
         if self.route is None or self._task is None:
             return {}
         if self.mode is not Mode.LIVE:
@@ -174,13 +174,13 @@ class Planner:
         return self._regrets.result() if self._regrets.done() else {}
 
     def regret(self, visit: Visit) -> float | None:
-        """Return the exact regret of a visit in metres, or None if it is impossible or unproven."""
+        """Return the exact regret of a visit in metres, or None if no exact regret is available."""
         return None if self._task is None else self._evaluator.of(self._task[0], visit, self._task[1])
 
     def judge(self, visit: Visit, label: Any) -> float | None:
         """Return the regret of a completed visit in metres.
 
-        In live mode, return None. `finish` then returns the regret together with `label`.
+        In live mode, the result is None, and `finish` later returns the regret together with `label`.
         """
         if self.mode is not Mode.LIVE:
             return self.regret(visit)
@@ -189,7 +189,7 @@ class Planner:
         return None
 
     def finish(self) -> list[tuple[Any, float | None]]:
-        """End the task. Return the label and regret of each visit that `judge` postponed.
+        """End the task, and return the label and the regret of each visit that `judge` has postponed.
 
         Raises PlannerError if planning failed.
         """
@@ -200,13 +200,13 @@ class Planner:
         return [(label, self._evaluator.of(state, visit, plan)) for label, state, visit, plan in late]
 
     def settle(self) -> None:
-        """In thread mode, wait for all results and switch to inline mode."""
+        """Wait for all results and switch from thread mode to inline mode. Other modes do not change."""
         if self.mode is Mode.THREAD:
             self.wait()
             self.mode = Mode.INLINE
 
     def wait(self, seconds: float | None = None) -> None:
-        """Wait until all threads are idle, or for at most `seconds` if given."""
+        """Wait until all threads are idle, but not longer than `seconds` if this limit is given."""
         futures.wait(self._running, seconds)
 
     def close(self) -> None:
@@ -239,7 +239,7 @@ class Planner:
         self._regrets = None
 
     def _find_regrets(self, state: TaskState, plan: Plan, stop: threading.Event) -> Mapping[Visit, Regret]:
-        """Compute the regrets of a state. Planning errors are ignored, because `ask` raises them."""
+        """Compute the regrets of a state. Planning errors are suppressed because `ask` raises them."""
         with contextlib.suppress(PlannerError):
             found = self._evaluator.limited(SolveLimit(seconds=REGRET_SECONDS, stop=stop)).all(state, plan)
             return {} if stop.is_set() else found

@@ -1,4 +1,4 @@
-"""Routes from a solver, which a background search can improve."""
+"""A plan source that uses a solver and can improve its plans in the background."""
 
 import math
 import queue
@@ -16,8 +16,8 @@ from planner.route import XY, PlanSource, Route, TaskState, remaining
 from planner.solvers import SolveLimit, Solver
 from planner.task_problems import TaskProblems
 
-MOVED = 0.3  # maximum distance that an object may be pushed without a new plan, in metres
-TIE = 0.01  # difference below which tours count as equal, in metres; legs are rounded to 0.1 mm
+MOVED = 0.3  # displacement of an object beyond which a new plan is made, in metres
+TIE = 0.01  # difference in length below which two tours count as equal, in metres
 PROOF_LIMIT = SolveLimit(seconds=20.0)
 
 
@@ -39,7 +39,7 @@ class _BackgroundSearch:
             self.found.put(error)
 
     def drain(self) -> list[Plan]:
-        """Return the plans found since the last call, or raise the exception that ended the search."""
+        """Return the plans found since the last call. Raise the exception if the search has failed."""
         plans: list[Plan] = []
         while not self.found.empty():
             result = self.found.get()
@@ -49,7 +49,7 @@ class _BackgroundSearch:
         return plans
 
     def bounded(self, other: Plan) -> Plan:
-        """Return the shown visits as a plan, with the lower bound of another plan for the same problem."""
+        """Return a plan with the shown visits and the lower bound of another plan."""
         cost = tour_length(self.problem, self.shown)
         optimal = other.status is Status.OPTIMAL and cost <= other.lower_bound + self.problem.tolerance(cost)
         lower = cost if optimal else min(other.lower_bound, cost)
@@ -58,15 +58,15 @@ class _BackgroundSearch:
 
 
 class SolverSource(PlanSource):
-    """Plans each state of a task with a solver. Positions are snapped to the largest island of the navmesh.
+    """A plan source that calls a solver. Positions are snapped to the largest island of the navmesh.
 
-    With the exact planner, plans that are not shown reuse earlier results: the full table if it is small enough,
-    otherwise the multipliers of the lower bound. The same sequence of states always gives the same plans.
+    With the exact planner, plans that the participant does not see reuse earlier results. These are the full
+    table if it is small enough, or else the multipliers of the lower bound. The same sequence of states
+    always gives the same plans.
 
-    If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a better one,
-    which lasts up to 20 s by default. The search reuses the multipliers of earlier bounds and the order of objects in
-    the previous route. Results then depend on the machine's speed. Only the kernels of the exact planner release the
-    interpreter lock.
+    If `start` is set, `plan` returns a first plan within about 50 ms and starts a background search for a
+    better one, which takes up to 20 s by default. The search reuses the multipliers of earlier bounds and the
+    order of objects in the previous route. The results then depend on the machine's speed.
     """
 
     def __init__(
@@ -82,14 +82,14 @@ class SolverSource(PlanSource):
         self._solver, self._seed, self._limit = solver, seed, limit
         self._table = TaskTable(solver) if isinstance(solver, ExactSolver) else None
         self._warm = NOTHING_KNOWN
-        self._planned: dict[str, XY] = {}  # positions of the loose objects in the plan
+        self._planned: dict[str, XY] = {}  # positions of the loose objects when the plan was made
         self._search: _BackgroundSearch | None = None
 
     def check(self, state: TaskState) -> None:
         self.problems.check(state)
 
     def rest(self, route: Route, state: TaskState) -> tuple[Visit, ...] | None:
-        """Return the remaining visits of a route, or None if the participant left it or an object was pushed far."""
+        """Return the remaining visits, or None if the participant deviated or an object was moved far."""
         return None if self._moved(state, state.loose) else remaining(route.visits, state)
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:
@@ -103,7 +103,7 @@ class SolverSource(PlanSource):
         return self._follow(state, plan.visits, plan)
 
     def adopt(self, state: TaskState) -> None:
-        """Accept the current route, made by another source, as planned in this state."""
+        """Take over a route that another source has planned for this state."""
         self._planned = dict(state.loose)
 
     def _follow(self, state: TaskState, visits: tuple[Visit, ...], plan: Plan) -> Route:
@@ -116,10 +116,10 @@ class SolverSource(PlanSource):
         return self._search is not None and not self._search.found.empty()
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """Return a new route if it is shorter than the current one by more than rounding, from the person's position.
+        """Return an improved route from the background search, or None if there is no improvement.
 
-        Otherwise return the current route with a better bound, or None. This keeps the suggestion from alternating
-        between tours of equal length.
+        A new route must be shorter than the current one by more than `TIE`, so that suggestions do not
+        alternate between tours of equal length. Otherwise, the current route may get a better bound.
         """
         search = self._search
         plans = search.drain() if search is not None else []
@@ -130,7 +130,7 @@ class SolverSource(PlanSource):
             self._warm = self._warm.updated(search.problem, plan)
         best = plans[-1]
         new = remaining(best.visits, state)
-        if new is None:  # the participant made other visits than this plan, so search again
+        if new is None:  # the participant has deviated from this plan, so search again
             self._show(self._new_search(state, route), rest)
             return None
         if self.problems.length(state, new) < self.problems.length(state, rest) - TIE:
@@ -146,7 +146,6 @@ class SolverSource(PlanSource):
         self._search = None
 
     def _solve(self, problem: RoutingProblem, *, shown: bool) -> Plan:
-        """Solve a problem. A plan that is shown reuses no earlier results."""
         if shown or self._table is None:
             return self._solver.solve(problem, seed=self._seed, limit=self._limit)
         plan = self._table.plan(problem)
@@ -178,7 +177,6 @@ class SolverSource(PlanSource):
         return self._solver.improve(problem, seed=self._seed, limit=limit)
 
     def _moved(self, state: TaskState, names: Iterable[str]) -> set[str]:
-        """Return the loose objects that are new or were pushed farther than `MOVED` since the plan was made."""
         return {
             name
             for name in names

@@ -1,4 +1,4 @@
-"""Solver interface, search limits, and the registry of solvers by name."""
+"""The interface of solvers, their search limits, and a registry of solvers by name."""
 
 import importlib
 import math
@@ -22,7 +22,7 @@ SOLVERS = {
     "greedy": ("planner.greedy_solver", "GreedySolver"),
 }
 DEFAULT_SOLVER = "exact"
-PATIENT_WORK = 60_000_000  # maximum states of an exact search in offline use, about 30 s with 30 objects
+PATIENT_WORK = 60_000_000  # state limit of exact searches in offline use, about 30 s with 30 objects
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class SolveLimit:
     """Limits of a search. A limit of None does not apply.
 
     Attributes:
-        work: Maximum work, in a unit that the solver defines. Results are bit-identical on every machine.
+        work: Maximum amount of work, in units defined by the solver. Results are the same on every machine.
         seconds: Maximum wall time in seconds. Results depend on the machine's speed.
         stop: Event that another thread sets to end the search early.
     """
@@ -51,7 +51,7 @@ class SolveLimit:
 
 @dataclass(frozen=True)
 class Deadline:
-    """End of a search: at a value of `time.perf_counter()` (None: never), or when another thread sets `stop`."""
+    """The end of a search, when `time.perf_counter()` reaches `at` or another thread sets `stop`."""
 
     at: float | None
     stop: threading.Event | None = None
@@ -65,7 +65,7 @@ NEVER = Deadline(None)
 
 
 class Solver(Protocol):
-    """Interface of a planner for routing problems."""
+    """The interface of planners for routing problems."""
 
     @property
     def name(self) -> str:
@@ -85,7 +85,7 @@ class Solver(Protocol):
 
 
 def solver(name: str) -> Solver:
-    """Create a planner from its name, or by calling a `package.module:attribute` without arguments.
+    """Create a planner by name, or by calling the object `package.module:attribute` without arguments.
 
     Raises:
         PlannerError: No planner has this name, or creating it failed.

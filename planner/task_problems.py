@@ -1,4 +1,4 @@
-"""Routing problems for the states of a task, with positions snapped to the navmesh."""
+"""Create routing problems for the states of a task, with positions snapped to the navmesh."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ RESOLUTION = 1e-4  # precision of geodesic distances, in metres
 
 
 class TaskProblems:
-    """Creates the routing problems for successive states of a task, and caches distances."""
+    """A factory of routing problems for successive states of a task, with a cache of distances."""
 
     def __init__(self, geodesics: Geodesics, capacity: int = 2) -> None:
         self._geodesics = geodesics
@@ -26,7 +26,7 @@ class TaskProblems:
         self._distances: NDArray[np.float64] = np.zeros((0, 0))
 
     def problem(self, state: TaskState) -> RoutingProblem:
-        """Return the routing problem of a state. The order of objects is that of `loose`, then of `carried`.
+        """Return the routing problem of a state. Loose objects come first, followed by carried objects.
 
         Raises UnreachableError if objects cannot be fetched or delivered, and ProblemError if more objects are carried
         than the capacity allows.
@@ -53,11 +53,11 @@ class TaskProblems:
         )
 
     def check(self, state: TaskState) -> None:
-        """Raise UnreachableError, with the names of the objects, if objects cannot be fetched or delivered."""
+        """Raise UnreachableError if objects cannot be fetched or delivered. The error lists their names."""
         self._places(state)
 
     def length(self, state: TaskState, visits: Sequence[Visit]) -> float:
-        """Return the length of an open tour from the person's position in metres.
+        """Return the length in metres of an open tour that starts at the person's position.
 
         Raises UnreachableError if objects cannot be fetched or delivered.
         """
@@ -93,7 +93,6 @@ class TaskProblems:
         return places
 
     def _between(self, places: list[XY]) -> NDArray[np.float64]:
-        """Return the distances between places. Only those of new places are computed."""
         old = [p for p in places if p in self._row]
         new = [p for p in places if p not in self._row]
         order = {p: k for k, p in enumerate([*old, *new])}

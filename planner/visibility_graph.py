@@ -1,7 +1,7 @@
-"""Visibility graph over the reflex vertices of free space, and shortest paths in it.
+"""Build visibility graphs and find the shortest paths in them.
 
-A shortest path among polygons bends only at reflex vertices of free space and is tangent to the obstacle at
-each, so only tangent sight lines are edges (de Berg et al., Computational Geometry, chapter 15).
+A shortest path around polygons bends only at reflex vertices of the free space, where it is a tangent to an
+obstacle. The graph therefore contains only tangents (de Berg et al., Computational Geometry, chapter 15).
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from planner.grid import SegmentGrid, is_visible
 from planner.navmesh import TOLERANCE, NavMesh
 
 SLACK = 1e-9  # upper bound on rounding errors of path lengths, in metres
-REPEATED = 1e-9  # distance below which two corners count as one, in metres
+REPEATED = 1e-9  # distance below which two corners of a path are merged, in metres
 
 
 class Edges(NamedTuple):
@@ -32,7 +32,7 @@ class Edges(NamedTuple):
 
 
 class Views(NamedTuple):
-    """Vertices that are visible from each of m points, in compressed sparse row format."""
+    """The vertices that are visible from each of m points, in compressed sparse row format."""
 
     starts: NDArray[np.int32]  # index of each point's first entry in the other arrays, shape (m + 1,)
     seen: NDArray[np.int32]  # visible vertices, grouped by point, shape (k,)
@@ -40,7 +40,7 @@ class Views(NamedTuple):
 
 
 class Paths(NamedTuple):
-    """Shortest known distance to each vertex in metres, and its predecessor or -1. Both have shape (v,)."""
+    """The shortest known distance to each vertex in metres, and the previous vertex or -1, shape (v,)."""
 
     over: NDArray[np.float64]
     before: NDArray[np.int32]
@@ -48,13 +48,13 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class VisibilityGraph:
-    """Visibility graph of a navmesh, built once."""
+    """The visibility graph of a navmesh."""
 
     # x and y of each reflex vertex, and of its two neighbours on the ring, in metres, shape (v, 6)
     vertices: NDArray[np.float64]
     island: NDArray[np.int64]  # island of each vertex, shape (v,)
     walls: SegmentGrid  # edges of the obstacles
-    edges: Edges  # edges between vertices that see each other
+    edges: Edges  # edges between vertices that are visible from each other
 
     @classmethod
     def build(cls, navmesh: NavMesh) -> "VisibilityGraph":
@@ -77,7 +77,6 @@ class VisibilityGraph:
 
 
 def _rings(geometry: shapely.Geometry) -> list[NDArray[np.float64]]:
-    """Return the rings of all polygons without the repeated last vertex. The polygon is to the left of each ring."""
     rings = []
     for polygon in map(orient, shapely.get_parts(geometry)):
         for ring in (polygon.exterior, *polygon.interiors):
@@ -114,7 +113,7 @@ def is_tangent(x: float, y: float, vertex: NDArray[np.float64], slack: float) ->
 def vertex_pairs(
     vertices: NDArray[np.float64], island: NDArray[np.int64], walls: SegmentGrid, slack: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the indices i < j of vertices that see each other along a line that is tangent at both.
+    """Return the indices i < j of vertices that are connected by an unobstructed line, tangent at both ends.
 
     `vertices` and `island` are those of `VisibilityGraph`. `slack` is the tolerance of the tangent test in metres.
     """
@@ -141,7 +140,7 @@ def visible_vertices(
     walls: SegmentGrid,
     slack: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the usable vertices that a point sees along tangents, and their distances in metres."""
+    """Return the usable vertices visible from a point along tangents, and their distances in metres."""
     found, lengths = [0], [0.0]
     for j in range(vertices.shape[0]):
         q = vertices[j]
@@ -155,7 +154,7 @@ def visible_vertices(
 def direct_distances(
     a: NDArray[np.float64], b: NDArray[np.float64], walls: SegmentGrid
 ) -> NDArray[np.float64]:
-    """Return the straight distances from points `a` to points `b`, infinite if a wall is between, shape (s, t)."""
+    """Return the straight-line distances from points `a` to points `b`, infinite if blocked, shape (s, t)."""
     result = np.full((a.shape[0], b.shape[0]), np.inf)
     for i in range(a.shape[0]):
         for j in range(b.shape[0]):
@@ -168,17 +167,17 @@ def direct_distances(
 def search_from(
     graph: Edges, views: Views, point: int, goal: NDArray[np.float64], rest: NDArray[np.float64]
 ) -> tuple[Paths, int]:
-    """Find shortest paths from a point with A* (Hart, Nilsson and Raphael 1968).
+    """Find the shortest paths from a point with the A* algorithm (Hart, Nilsson and Raphael 1968).
 
-    Among equally short paths, it selects the same one as Dijkstra's algorithm. `point` is the index of the start in
-    `views`. `goal` has shape (2,), or is empty to find the paths to all vertices. `rest` is the straight distance from
-    each vertex to the goal in metres, infinite if the goal is not visible, shape (v,). Return the paths, and the last
-    vertex of the shortest path to the goal, or -1.
+    Among equally short paths, it selects the same one as Dijkstra's algorithm. `point` is the index of the
+    start in `views`. `goal` has shape (2,), or is empty to find the paths to all vertices. `rest` is the
+    straight-line distance from each vertex to the goal in metres, infinite if the goal is not visible, shape
+    (v,). Return the paths, and the last vertex of the shortest path to the goal, or -1 if there is none.
     """
     size = len(graph.vertices)
     paths = Paths(np.full(size, np.inf), np.full(size, np.int32(-1), np.int32))
     last, best = -1, np.inf
-    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); a sentinel stays last
+    heap: list[tuple[float, Any]] = [(np.inf, np.int32(-1))]  # (key, vertex); the sentinel is always last
     for k in range(views.starts[point], views.starts[point + 1]):
         vertex = views.seen[k]
         paths.over[vertex] = views.lengths[k]
@@ -216,7 +215,7 @@ def at_least(graph: Edges, vertex: int, goal: NDArray[np.float64]) -> float:
 
 @kernel
 def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tuple[float, NDArray[np.float64]]:
-    """Return the length and the points of the shortest path over vertices between two points, in metres.
+    """Return the length and the points of the shortest path via vertices between two points, in metres.
 
     `ends` has shape (2, 2), and `views` contains the views of both ends. The length is infinite if there is no path.
     """
@@ -243,7 +242,7 @@ def shortest_path(graph: Edges, ends: NDArray[np.float64], views: Views) -> tupl
 
 @kernel
 def distances(graph: Edges, sources: Views, targets: Views) -> NDArray[np.float64]:
-    """Return the shortest distances between points via vertices, in metres, infinite without a path, shape (s, t)."""
+    """Return the lengths of shortest paths via vertices in metres, infinite without a path, shape (s, t)."""
     count, points = len(sources.starts) - 1, len(targets.starts) - 1
     result = np.full((count, points), np.inf)
     nowhere, rest = np.empty(0), np.full(len(graph.vertices), np.inf)

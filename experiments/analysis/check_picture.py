@@ -1,4 +1,4 @@
-"""Figures for `mjsim check` and `mjsim import episodes`."""
+"""Draw the figures of the commands `mjsim check` and `mjsim import episodes`."""
 
 import textwrap
 from collections import Counter
@@ -16,14 +16,14 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.views import Drawing
 from mjsim.support.files import replacing
 
-SIDE = 9.0  # longest side of the figure, in inches
-MAX_LINES = 100  # maximum number of findings in the list; many image viewers cannot open taller images
+SIDE = 9.0  # width of a figure with a single view, in inches
+MAX_LINES = 100  # maximum number of listed findings, because image viewers cannot open very tall images
 LETTERS_PER_INCH = 13.0
 COLOURS = {"error": "#D55E00", "warning": "#E69F00"}
 
 
 def draw_check(path: Path, report: CheckReport) -> None:
-    """Write a PNG that shows a report's views and lists its numbered findings."""
+    """Draw the views of a check report with a list of its findings, and save the figure as a PNG file."""
     views = report.views or (Drawing("nothing could be compiled", (0, 1), ()),)
     listed = [f"{n}. {f}" for n, f in enumerate(report.findings[:MAX_LINES], 1)]
     if len(report.findings) > MAX_LINES:
@@ -74,12 +74,12 @@ def _within(axes: Axes, x: float, y: float) -> tuple[float, float]:
     return float(np.clip(x, *axes.get_xlim())), float(np.clip(y, *axes.get_ylim()))
 
 
-_KINDS = 15  # maximum number of bars in a chart
+_KINDS = 15  # maximum number of object types in the bar chart
 _BLUE = "#0072B2"
 
 
 def draw_disorder(path: Path, disorder: Disorder, kinds: Mapping[str, int]) -> None:
-    """Write a PNG with charts of the disorder in a set of episodes. `kinds` counts misplaced objects by type."""
+    """Save charts of the misplaced objects in a set of episodes as a PNG. `kinds` counts them by type."""
     figure = Figure(figsize=(11, 3.4), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     many, far, which = figure.subplots(1, 3)

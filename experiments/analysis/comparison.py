@@ -1,8 +1,8 @@
-"""Compare the assistance conditions of a batch on pairs of trials that are otherwise identical.
+"""Compare assistance conditions using pairs of trials that differ only in the condition.
 
-The effect size d_z is the mean of the paired differences divided by their standard deviation. Its confidence interval
-inverts the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002). The interval of the mean
-difference is Student's.
+The effect size d_z is the mean of the paired differences divided by their standard deviation. Its interval
+is computed from the noncentral t distribution (Cumming and Finch 2001, doi:10.1177/0013164401614002), and the
+interval of the mean difference from Student's t distribution.
 """
 
 import itertools
@@ -37,7 +37,7 @@ CIRCUMSTANCES = (
 )
 CONFIDENCE = 0.95
 SHOWN_SEEDS = 5
-HUGE = 1e12  # largest valid metric, far above realistic values
+HUGE = 1e12  # largest accepted value of a metric, far above any realistic value
 
 Row = Mapping[str, Any]
 Interval = tuple[float, float] | None
@@ -45,7 +45,7 @@ Interval = tuple[float, float] | None
 
 @dataclass(frozen=True)
 class Block:
-    """Trials with the same settings. `rows` holds them by condition, then by seeds and person parameters."""
+    """A group of trials with equal settings. `rows` maps conditions to trials, keyed by seeds and person."""
 
     label: str
     rows: Mapping[str, Mapping[tuple[Any, ...], Row]]
@@ -53,13 +53,13 @@ class Block:
 
 @dataclass(frozen=True)
 class Difference:
-    """A comparison of two conditions in one metric.
+    """The difference between two conditions in one metric.
 
     Attributes:
         means: Mean of the metric in each condition, over all pairs.
         difference: Mean of the second condition minus mean of the first.
         interval: 95 % confidence interval of the difference, or None for fewer than two pairs.
-        effect: Effect size d_z. It is None if all differences are equal, and so are its interval and p-value.
+        effect: Effect size d_z. If all differences are equal, `effect`, `effect_interval` and `p` are None.
         p: Two-sided p-value of the paired t test.
     """
 
@@ -76,7 +76,7 @@ class Difference:
 
 
 def read_blocks(folder: Path) -> list[Block]:
-    """Read a batch with at least two conditions. Return its trials grouped by settings, in table order."""
+    """Read the trials of a batch with at least two conditions, and group them by their settings."""
     path = folder / f"{NAME}.parquet"
     rows = read_rows(path)
     missing = [name for name in ("assistance", *SEEDS, *CIRCUMSTANCES) if rows and name not in rows[0]]
@@ -86,12 +86,12 @@ def read_blocks(folder: Path) -> list[Block]:
         raise RecordError(f"{path}: assistance is not a name in every row; correct it")
     if len({row["assistance"] for row in rows}) < 2:
         raise ConfigError(f"{folder} has fewer than two assistance conditions; there is nothing to compare")
-    # Trials with the same seed but different persons do not form a pair.
+    # Two trials form a pair only if they have the same seeds and the same person.
     identity = (*SEEDS, *(name for name in rows[0] if name.startswith("person_") and name not in SEEDS))
     varying = [name for name in CIRCUMSTANCES if len({row[name] for row in rows}) > 1]
     blocks: dict[str, dict[str, dict[tuple[Any, ...], Row]]] = defaultdict(lambda: defaultdict(dict))
     for row in rows:
-        # Leave out the time limit if the number of objects varies, because the default limit depends on that number.
+        # The default time limit depends on the number of objects, so omit the limit if that number varies.
         label = ", ".join(f"{n} {row[n]}" for n in varying if n != "time_limit" or "objects" not in varying)
         person = tuple(row[name] for name in identity)
         if blocks[label][row["assistance"]].setdefault(person, row) is not row:
@@ -108,7 +108,7 @@ def batch_origin(blocks: Sequence[Block]) -> str:
 
 
 def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
-    """Yield a message for each pair of conditions whose trials cannot all be paired."""
+    """Yield a message for each pair of conditions in which some trials have no counterpart."""
     conditions = list(dict.fromkeys(name for block in blocks for name in block.rows))
     for block in blocks:
         where = f"{block.label}: " if block.label else ""
@@ -127,7 +127,7 @@ def missing_pairs(blocks: Sequence[Block]) -> Iterator[str]:
 def unknown_metrics(
     blocks: Sequence[Block], metrics: Sequence[str], differences: Sequence[Difference]
 ) -> Iterator[str]:
-    """Yield a message for each metric that is missing in some or all pairs of trials."""
+    """Yield a message for each metric that could not be compared in every pair of trials."""
     shown = {(d.block, d.metric, d.conditions) for d in differences}
     for d in differences:
         block = next(block for block in blocks if block.label == d.block)
@@ -144,7 +144,7 @@ def unknown_metrics(
 
 
 def compare(blocks: Sequence[Block], metrics: Sequence[str]) -> list[Difference]:
-    """Compare every pair of conditions in every metric. Pairs of trials with a missing value are left out."""
+    """Compare all pairs of conditions in the given metrics. Trials with missing values are skipped."""
     rows = [row for block in blocks for found in block.rows.values() for row in found.values()]
     known = [name for name in rows[0] if all(_is_number(row[name]) for row in rows)]
     for name in metrics:
@@ -175,7 +175,7 @@ def _compare(block: Block, metric: str, conditions: tuple[str, str]) -> Differen
     values = np.array(
         [(one[key][metric], other[key][metric]) for key in _common(block, conditions)], float
     ).reshape(-1, 2)
-    values = values[np.isfinite(values).all(axis=1)]  # missing metrics are null in the file and NaN here
+    values = values[np.isfinite(values).all(axis=1)]  # skip pairs with a missing value (NaN)
     if not len(values):
         return None
     gaps = values[:, 1] - values[:, 0]
@@ -198,7 +198,7 @@ def _common(block: Block, conditions: tuple[str, str]) -> list[tuple[Any, ...]]:
 
 
 def mean_interval(values: NDArray[np.float64]) -> Interval:
-    """Return Student's 95 % confidence interval of the mean of values, shape (n,), or None for fewer than two."""
+    """Return the 95 % t interval of the mean of values, shape (n,), or None if there are fewer than two."""
     if len(values) < 2:
         return None
     half = float(t.ppf(0.5 + CONFIDENCE / 2, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))

@@ -1,4 +1,4 @@
-"""Plot the paired trials of a comparison as lines, and the mean of each condition with its confidence interval."""
+"""Plot paired trials as lines, and the mean of each condition with its confidence interval."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ CAPTION = "grey: a person under each condition; blue: mean and 95 % confidence i
 
 
 def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str]) -> None:
-    """Write a figure with a row of panels per block and a column per metric. The suffix of `path` sets the format."""
+    """Plot a grid of panels with a row per block and a column per metric. The file suffix sets the format."""
     size = PANEL[0] * len(metrics), PANEL[1] * len(blocks) + 0.5
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
@@ -33,7 +33,7 @@ def draw_comparison(path: Path, blocks: Sequence[Block], metrics: Sequence[str])
     figure.supxlabel(CAPTION, fontsize=7)
     mark_origin(figure, batch_origin(blocks))
     with replacing(path) as temporary:
-        # Leave out the dates so that equal batches give identical files.
+        # Omit the creation date so that the same data always give the same file.
         metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
         figure.savefig(temporary, dpi=150, metadata=metadata)
 
@@ -74,5 +74,5 @@ def _draw_panel(axes: Axes, block: Block, metric: str) -> None:
 
 
 def mark_origin(figure: Figure, origin: str) -> None:
-    """Print the origin of the data above a figure, for example "Simulated"."""
+    """Add a line at the top of a figure that states the origin of the data, such as "Simulated"."""
     figure.suptitle(origin, fontsize=8, x=0.99, ha="right", color="#B00020")

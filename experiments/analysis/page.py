@@ -1,4 +1,4 @@
-"""Self-contained HTML pages with text, tables and inline figures, but no scripts. The template is `page.html.j2`."""
+"""Create self-contained HTML pages with text, tables and figures from the template `page.html.j2`."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,14 +19,14 @@ class Paragraph(NamedTuple):
 
 
 class TableBlock(NamedTuple):
-    """A table. Its numbers are rounded to three significant digits."""
+    """A table whose numbers are shown with three significant digits."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[object]]
 
 
 class FigureBlock(NamedTuple):
-    """A figure with its caption. The page numbers the figures."""
+    """A figure with a caption. Its number is assigned by the page."""
 
     drawing: Markup
     caption: str
@@ -36,9 +36,9 @@ Block = Paragraph | TableBlock | FigureBlock
 
 
 def page(title: str, origin: str, sections: Iterable[tuple[str, Iterable[Block]]]) -> str:
-    """Return an HTML page, without empty tables and empty sections.
+    """Return an HTML page with a title and sections. Empty tables and empty sections are omitted.
 
-    `origin` states whether the participants were simulated. It appears in the title and under every heading.
+    `origin` states whether the participants were simulated. It is shown in the title and below every heading.
     """
     shown_blocks = (
         (heading, [block for block in blocks if not isinstance(block, TableBlock) or block.rows])
@@ -70,7 +70,7 @@ def shown(value: object) -> str:
 
 
 def p_value(p: float | None) -> str:
-    """Format a p-value with three decimals, or as '< .001'."""
+    """Format a p-value with three decimals. Smaller values are shown as '< .001'."""
     return "-" if p is None else "< .001" if p < 0.001 else f"{p:.3f}".lstrip("0")
 
 

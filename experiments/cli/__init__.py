@@ -1,1 +1,1 @@
-"""The subcommands of `mjsim`, one module each. They import most code only when they run, so that `--help` is fast."""
+"""Subcommands of `mjsim`. Each module delays slow imports until the command runs, to keep `--help` fast."""

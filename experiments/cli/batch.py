@@ -1,4 +1,4 @@
-"""`mjsim batch`: run the trials of a design."""
+"""`mjsim batch`: run all trials of an experimental design."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Options, progress bars and shards for commands that run the trials of a design (docs/batches.md)."""
+"""Options, progress bars and sharding for commands that run batches of trials (docs/batches.md)."""
 
 import argparse
 import os
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from experiments.trials.trial_reader import OnRead
 
-MAX_SHARDS_SHOWN = 100  # maximum number of shards that a message lists for a rerun
+MAX_SHARDS_SHOWN = 100  # maximum number of shards listed in the message about missing trials
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +53,7 @@ def run_with_progress(
     what: str = "trials",
     shard: Shard | None = None,
 ) -> tuple[list[Mapping[str, Any]], int]:
-    """Run the unfinished trials of a design. Return all rows of the batch and the number of failed trials."""
+    """Run all unfinished trials of a design. Return the rows of all trials and the number of failures."""
     from experiments.trials.batch import BatchProgress, run_batch
 
     failed = 0
@@ -124,7 +124,7 @@ def _shard(text: str) -> Shard:
 
 
 def run_share(design: Design, arguments: argparse.Namespace, what: str = "trials") -> int | None:
-    """Run a shard or merge shards, depending on the options. Return the exit code, or None without these options."""
+    """Run one shard or merge shards, as requested. Return the exit code, or None if neither was requested."""
     from experiments.cli.terminal import error_console
 
     out: Path = arguments.out

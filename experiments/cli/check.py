@@ -1,4 +1,4 @@
-"""`mjsim check`: check a house, an object or an episode."""
+"""`mjsim check`: check a house, object or episode for errors."""
 
 import argparse
 import dataclasses
@@ -12,7 +12,7 @@ from experiments.cli.options import add_command, add_force
 if TYPE_CHECKING:
     from mjsim.house.check import CheckReport
 
-UNUSABLE = 2  # exit code for an unusable input
+UNUSABLE = 2  # exit code if the checked input cannot be used
 
 DESCRIPTION = """\
 Check a house, an object, a receptacle or an episode against all conventions of docs/models.md, and list what to change.
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def as_json(report: "CheckReport") -> dict[str, Any]:
-    """Return the report as JSON values, without its drawings."""
+    """Convert a report to a dictionary for JSON output. Its drawings are left out."""
     return {
         "path": report.path,
         "kind": report.kind,

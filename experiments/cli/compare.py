@@ -1,4 +1,4 @@
-"""`mjsim compare`: compare the assistance conditions of a batch, paired by seed."""
+"""`mjsim compare`: compare assistance conditions between the trials of a batch, which are paired by seed."""
 
 import argparse
 import csv
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from experiments.analysis.comparison import Difference, Interval
 
 METRICS = ("completion_time_s", "task_distance_m", "ipl_locations", "nd_feasible", "total_regret_m")
-FORMATS = (".png", ".svg", ".pdf")  # file formats for figures
-WIDTH = 160  # output width in characters if there is no terminal
+FORMATS = (".png", ".svg", ".pdf")  # supported file formats for figures
+WIDTH = 160  # width of the output in characters if it is not written to a terminal
 
 DESCRIPTION = """\
 Compare each pair of assistance conditions in a batch. Two trials form a pair if they differ only in the assistance:

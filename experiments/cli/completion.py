@@ -1,4 +1,4 @@
-"""`mjsim completion`: print a completion script for a shell."""
+"""`mjsim completion`: print a shell completion script."""
 
 import argparse
 import re
@@ -18,7 +18,7 @@ examples:
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "completion",
-        help=None,  # without this argument, the completion script would omit the command
+        help=None,  # completion scripts omit commands that have no `help` argument
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -30,7 +30,7 @@ def add_parser(commands: Any) -> None:
 def run(arguments: argparse.Namespace) -> int:
     import shtab
 
-    from experiments.cli.main import COMMANDS, parser  # imported late, because `main` imports this module
+    from experiments.cli.main import COMMANDS, parser  # imported here because `main` imports this module
 
     top = parser(*COMMANDS)
     _complete_files(top, shtab.FILE)
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    for action in parser._actions:  # argparse has no public list of its actions
+    for action in parser._actions:  # argparse has no public attribute for a parser's actions
         if action.type is Path or re.search(r"\.[a-z]", str(action.metavar)):
             action.complete = files  # type: ignore[attr-defined]
         elif isinstance(action, argparse._SubParsersAction):

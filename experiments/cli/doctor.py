@@ -1,4 +1,4 @@
-"""`mjsim doctor`, and checks for packages that a command needs in addition to the base installation."""
+"""The `mjsim doctor` command, and checks for the optional dependencies of other commands."""
 
 import argparse
 import importlib
@@ -12,7 +12,7 @@ Show versions, the EGL vendor, the GL renderer, and whether rendering happens in
 to install it, and other installed packages that are also named planner, hud or experiments. The exit code is 1 if
 frames cannot be rendered, software is missing, or Python imports another package in place of one of ours."""
 
-# Modules that each extra installs
+# Modules that are installed by each optional extra of the package
 EXTRAS = {
     "study": ("matplotlib", "statsmodels"),
     "people": ("argon2", "httpx", "prometheus_client"),
@@ -22,7 +22,7 @@ EXTRAS = {
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "doctor",
-        help=None,  # without this argument, the completion script would omit the command
+        help=None,  # completion scripts omit commands that have no `help` argument
         description=DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -45,16 +45,16 @@ def require_extra(extra: str) -> None:
 
 
 def add_checkout_command(commands: Any, name: str, module: str) -> None:
-    """Add a subcommand that exists only in the source checkout.
+    """Add a subcommand that is only available in a source checkout.
 
-    If the module of the subcommand is missing, calling the subcommand reports this.
+    In an installed package, add a placeholder that raises a `ConfigError` when it is called.
     """
     try:
         importlib.import_module(module).add_parser(commands)
     except ModuleNotFoundError as error:
         if not module.startswith(str(error.name)):
             raise
-        # No argument starts with a null character, so the parser accepts options as positional arguments.
+        # No argument can start with a null character, so the parser treats options as positional arguments.
         parser = commands.add_parser(
             name, help="needs the source checkout", add_help=False, prefix_chars="\0"
         )

@@ -1,4 +1,4 @@
-"""Errors of commands: a one-line message, an exit code and, for faults in mjsim or custom code, a report."""
+"""Error handling for commands: one-line error messages, exit codes and crash reports."""
 
 import os
 import platform
@@ -13,19 +13,19 @@ from pathlib import Path
 
 FAILED = 1
 USAGE_ERROR = 2
-INTERNAL_ERROR = 70  # EX_SOFTWARE of sysexits.h
-# Python's messages for a path with a null character
+INTERNAL_ERROR = 70  # the value of EX_SOFTWARE in sysexits.h
+# Error messages of Python for a path that contains a null character
 _NULL = ("embedded null byte", "embedded null character")
-BROKEN_PIPE = 141  # exit code that shells use for a program ended by SIGPIPE
+BROKEN_PIPE = 141  # exit code that shells report for a process killed by SIGPIPE
 
 DISTRIBUTIONS = ("mjsim", "mujoco", "numpy", "numba", "ortools", "opencv-python-headless", "pyarrow")
 _SECRET = re.compile(r"(--?[\w-]*(?:token|password|secret|key)[\w-]*)(=|\x00)[^\x00]+", re.IGNORECASE)
 
 
 def end_with(error: Exception, words: Sequence[str]) -> int:
-    """Print an error in one line to standard error, and return the exit code.
+    """Print a one-line error message to standard error, and return the exit code.
 
-    A report includes the command line `words`.
+    For a bug in mjsim or in user code, write a report that includes the command line `words`.
     """
     if isinstance(error, BrokenPipeError):
         drop_output()
@@ -45,14 +45,14 @@ def end_with(error: Exception, words: Sequence[str]) -> int:
 
 
 def exit_code(error: Exception) -> int | None:
-    """Return the exit code of an error whose message suffices for the user, or None for a bug in mjsim."""
-    # Imported only after an error, so that `mjsim plan` starts fast.
+    """Return the exit code for an expected error, or None if the error is a bug in mjsim."""
+    # These modules are imported here so that `mjsim plan` starts fast.
     from experiments.errors import ExperimentError, ReplayError, UserCodeError
     from hud.errors import HudError
     from mjsim.values.errors import MjsimError, PhysicsError, RenderError
     from planner.errors import PlannerError
 
-    # Errors that other arguments would not avoid, such as a full disk or a missing driver
+    # Errors that are not caused by the arguments, such as a full disk or a missing driver
     failures = (PhysicsError, RenderError, ReplayError, UserCodeError, OSError, MemoryError, ImportError)
     if isinstance(error, failures):
         return FAILED

@@ -1,4 +1,4 @@
-"""`mjsim flythrough`: film the rooms and bins of a house."""
+"""`mjsim flythrough`: record a video of the rooms and bins of a house."""
 
 import argparse
 from pathlib import Path
@@ -56,7 +56,7 @@ def film_house(
     seconds: float | None = None,
     language: str = "en",
 ) -> str:
-    """Film a house and show a progress bar. Return the SHA-256 of the frames."""
+    """Record a video of a house and show a progress bar. Return the SHA-256 of the frames."""
     from experiments.cli.terminal import counting_bars
     from experiments.house import House
     from experiments.session.film import write_flythrough
@@ -65,7 +65,7 @@ def film_house(
     with counting_bars("frames of the film") as bars:
         bar = bars.add_task("frames", total=None)
         return write_flythrough(
-            house.in_language(language, house.texts),  # captions contain labels, but no texts of the HUD
+            house.in_language(language, house.texts),  # captions contain no HUD texts
             path,
             film or FilmConfig(),
             seconds=seconds,

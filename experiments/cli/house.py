@@ -1,4 +1,4 @@
-"""`mjsim house`: write a disorganized house, generate or export a house, or make a gallery."""
+"""`mjsim house`: generate or export a house, write a house with misplaced objects, or create a gallery."""
 
 import argparse
 import os

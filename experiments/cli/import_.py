@@ -47,7 +47,7 @@ and about as far from their bins as in the episodes that were read (docs/import.
 
 
 def add_parser(commands: Any) -> None:
-    # Without `help`, the completion script would omit the command. `mjsim --help` has its own summary.
+    # `help=None` is needed because completion scripts omit commands that have no `help` argument.
     top = commands.add_parser(
         "import", help=None, description="Import objects, houses and episodes from files of other software."
     )

@@ -1,4 +1,4 @@
-"""The `mjsim` command. It loads only the module of the requested subcommand."""
+"""Entry point of the `mjsim` command, which only imports the module of the requested subcommand."""
 
 import argparse
 import faulthandler
@@ -36,8 +36,8 @@ COMMANDS = {
     "doctor": "show versions and check that rendering works",
     "completion": "print a completion script for a shell",
 }
-MODULES = {"import": "import_"}  # subcommands whose name is a Python keyword
-# Subcommands that the wheel does not include
+MODULES = {"import": "import_"}  # module names for subcommands that are named like a Python keyword
+# Modules of subcommands that are only available in a source checkout
 CHECKOUT = {"gallery": "tools.gallery_command", "bench": "benchmarks._command"}
 
 DESCRIPTION = """\
@@ -71,7 +71,7 @@ examples:
 
 
 def parser(*loaded: str) -> argparse.ArgumentParser:
-    """Return the parser with the options of the `loaded` commands. Without any, it only lists the commands."""
+    """Create an argument parser for the `loaded` commands. If none are given, it only lists all commands."""
     top = Parser(
         prog="mjsim",
         description=DESCRIPTION,
@@ -92,7 +92,7 @@ def parser(*loaded: str) -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is slow to look up and therefore looked up only on request."""
+    """An action that prints the version. The version is only looked up when the user requests it."""
 
     def __init__(self, option_strings: Sequence[str], dest: str) -> None:
         super().__init__(option_strings, dest, nargs=0, help="show the version and exit")
@@ -105,23 +105,26 @@ class _Version(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that reports errors in one line."""
+    """An argument parser that prints errors on a single line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(USAGE_ERROR, f"mjsim: {brief(message)}; `{self.prog} --help` lists the options\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line. Exit codes: 0 success, 1 failure, 2 bad input, 70 a bug in mjsim, 128 + n signal n."""
+    """Run a command and return its exit code.
+
+    The code is 0 for success, 1 for a failure, 2 for bad input, 70 for a bug, and 128 + n for signal n.
+    """
     words = sys.argv[1:] if argv is None else list(argv)
     if argv is None and not sys.warnoptions:
-        warnings.simplefilter("ignore")  # library warnings are not meant for users
+        warnings.simplefilter("ignore")  # users should not see warnings from libraries
     postpone_gl()
-    if sys.stderr is None:  # if the stream is closed, `print` would write to standard output
+    if sys.stderr is None:  # `print(file=None)` would write to standard output
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - as long as the process
     if argv is None:
-        faulthandler.enable(all_threads=False)  # prints file and line if the process crashes
-    if sys.stdout is None:  # if the stream is closed, writing must fail
+        faulthandler.enable(all_threads=False)  # prints a Python traceback if the process crashes
+    if sys.stdout is None:  # writing to a closed standard output must raise an error
         os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
         sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as long as the process
     with signals_raised():
@@ -131,7 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _stopped(stop)
         except Exception as error:
             if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
-                return _stopped(error.__cause__)  # the signal arrived while compiled code returned
+                return _stopped(error.__cause__)  # the signal arrived while compiled code was returning
             return end_with(error, words)
 
 
@@ -148,10 +151,10 @@ def _run(words: list[str]) -> int:
     except FileNotFoundError as error:
         raise OSError(error.errno, "the current folder was removed; change to another one") from error
     if here not in sys.path:
-        sys.path.append(here)  # makes custom modules in the current folder importable
+        sys.path.append(here)  # lets users import their own modules from the current folder
     commands = parser(*known)
     if bad := next((word for word in words if word.startswith("--") and word.endswith("=--")), None):
-        commands.error(f"{bad} has no value")  # argparse would parse the missing value as an empty list
+        commands.error(f"{bad} has no value")  # argparse would turn the missing value into an empty list
     try:
         arguments = commands.parse_args(words)
     except SystemExit:

@@ -1,4 +1,4 @@
-"""Option types and options shared by subcommands. This module does not load the simulator, so that `--help` is fast."""
+"""Options and argument types of several commands. The simulator is not imported, to keep `--help` fast."""
 
 import argparse
 import math
@@ -20,15 +20,15 @@ from mjsim.render.profiles import FAST, MAX_SIDE, PROFILES
 from mjsim.values.person_parameters import RANGES, PersonParameters
 from planner.solvers import SOLVERS
 
-PERSON_VALUES = {  # the most common parameters of a person, each with its own option
+PERSON_VALUES = {  # frequently used person parameters, each of which has its own option
     "walking_speed": "preferred walking speed",
     "turning_speed": "fastest turn of the body",
     "reach": "largest distance, from the body's axis, for picking and placing",
     "field_of_view": "horizontal field of view of the picture and of the participant's perception",
     "reading_time": "how long the participant stands and reads before each visit",
 }
-PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings that only sessions in a browser use
-# Settings shared by run, batch and play
+PAGE_SETTINGS = ("draw", "field_of_view_range")  # settings that only apply to sessions in a browser
+# Settings that are options of `run`, `batch` and `play`
 TRIAL_OPTIONS = tuple(
     name
     for name in SETTINGS
@@ -38,7 +38,7 @@ _TYPES = typing.get_type_hints(TrialConfig)
 
 
 def int_list(text: str) -> list[int]:
-    """Parse integers: `6,12`, `0:10` (where the end is excluded), or a mix of both."""
+    """Parse a list of integers and ranges, such as `6,12` or `0:10`. The end of a range is excluded."""
     try:
         return numbers(text)
     except ConfigError as error:
@@ -50,7 +50,7 @@ def text_list(text: str) -> list[str]:
 
 
 def frame_size(text: str) -> tuple[int, int]:
-    """Parse a frame size such as `640x480`. Both numbers must be even, as H.264 requires."""
+    """Parse a frame size such as `640x480`. Width and height must be even, as H.264 requires."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form WIDTHxHEIGHT, such as 640x480")
@@ -63,7 +63,7 @@ def frame_size(text: str) -> tuple[int, int]:
 
 
 def seconds(text: str) -> float:
-    """Parse a finite time in seconds, at least 0."""
+    """Parse a finite, non-negative number of seconds."""
     try:
         value = float(text)
     except ValueError:
@@ -74,7 +74,7 @@ def seconds(text: str) -> float:
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefaultsHelpFormatter):
-    """Keeps line breaks in descriptions and shows the default of each option that has one."""
+    """A help formatter that keeps line breaks in descriptions and shows the default values of options."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         has_default = action.option_strings and action.default is not None and action.nargs != 0
@@ -89,7 +89,7 @@ def add_command(
     description: str,
     summary: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a subcommand. `summary` describes it in its parent's help. The help of `mjsim` uses `COMMANDS` instead."""
+    """Add a subcommand and return its parser. `summary` is its entry in the help of the parent command."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name, help=summary, description=description, formatter_class=HelpFormatter
     )
@@ -113,14 +113,14 @@ def add_call_limit(parser: argparse.ArgumentParser) -> None:
 
 
 class _CallLimit(argparse.Action):
-    """Passes the limit to workers in an environment variable, because it is not a setting of a trial."""
+    """An action that stores the limit in an environment variable, which worker processes inherit."""
 
     def __call__(self, _parser: Any, _namespace: Any, value: Any, _option: Any = None) -> None:
         os.environ[CALL_LIMIT] = str(value)
 
 
 def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> None:
-    """Add the option of a setting, with its description in `TrialConfig`. Its value is None if it is not given."""
+    """Add an option for a setting of `TrialConfig`. It defaults to None unless `changes` has a default."""
     extra, option = dict(SETTINGS[name].extra or {}), f"--{name.replace('_', '-')}"
     text = f"{str(SETTINGS[name].description).replace('`', '').rstrip('.')}{NAMES.get(name, str)()}"
     named = isinstance(DEFAULTS[name], str | int) and _TYPES[name] is not bool and "(default" not in text
@@ -135,7 +135,7 @@ def add_setting(parser: argparse.ArgumentParser, name: str, **changes: Any) -> N
     parser.add_argument(option, **{**arguments, **changes})
 
 
-NAMES: dict[str, Callable[[], str]] = {  # for each setting, lists its possible values for the help
+NAMES: dict[str, Callable[[], str]] = {  # functions that list the possible values of a setting in the help
     "user": lambda: (
         f": {', '.join(participant_names())}, or package.module:attribute; follower uses the guidance shown, in any "
         "condition; boltzmann:T chooses a visit that costs r metres more with odds exp(-r/T)"
@@ -165,7 +165,7 @@ def add_task_options(parser: argparse.ArgumentParser, objects: int) -> None:
 
 
 def add_trial_options(parser: argparse.ArgumentParser, **defaults: str) -> None:
-    """Add the settings shared by run, batch and play. An option without a default is None if it is not given."""
+    """Add the options that `run`, `batch` and `play` share, with optional `defaults` instead of None."""
     for name in TRIAL_OPTIONS:
         add_setting(parser, name, **({"default": defaults[name]} if name in defaults else {}))
     usual = PersonParameters()
@@ -184,10 +184,10 @@ def given_options(arguments: argparse.Namespace, names: Sequence[str]) -> dict[s
 
 
 def trial_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `add_trial_options` that the user gave, as arguments of `TrialConfig`.
+    """Convert the options of `add_trial_options` that the user has set to arguments of `TrialConfig`.
 
     Raises:
-        ConfigError: An option contradicts the episode, or the person's parameters are impossible.
+        ConfigError: An option contradicts the episode, or the person's parameters are not valid.
         EpisodeError: The episode cannot be read.
     """
     options = given_options(arguments, tuple(name for name in TRIAL_OPTIONS if name != "person"))
@@ -211,7 +211,7 @@ def add_frame(
     profile: str = FAST.name,
     otherwise: str = "",
 ) -> None:
-    """Add `--size` and `--profile` with these defaults. `otherwise` is appended to the help of `--size`."""
+    """Add the options `--size` and `--profile`. The text `otherwise` is appended to the help of `--size`."""
     default = f"{size[0]}x{size[1]}" if size else None
     parser.add_argument(
         "--size", type=frame_size, default=default, metavar="WxH", help=f"frame size, px{otherwise}"

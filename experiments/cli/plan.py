@@ -20,7 +20,7 @@ from planner.problem_json import claim_from_json, claim_to_json, plan_to_json, p
 from planner.solvers import DEFAULT_SOLVER, PATIENT_WORK, SOLVERS, SolveLimit, Solver, solver
 
 T = TypeVar("T")
-GRACE_S = 0.15  # how long a planner may take to stop after the time limit
+GRACE_S = 0.15  # maximum time that a planner may take to stop after its time limit
 REPORT_PERIOD_S = 5.0  # interval between progress reports
 
 DESCRIPTION = """\
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise ConfigError("--check plans nothing; leave out --time-limit")
         return _check(arguments.file, arguments.check)
     if arguments.certificate is not None:
-        from experiments.record.run_directory import check_file  # imported late for a fast start
+        from experiments.record.run_directory import check_file  # imported here to speed up the start
 
         check_file(arguments.certificate, replace=arguments.force)
     started, seconds = time.perf_counter(), arguments.time_limit
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise
     finally:
         search.end()
-        gc.freeze()  # saves 0.2 s at exit, because Python then skips the garbage of numba
+        gc.freeze()  # saves 0.2 s at exit, because numba's objects are not garbage-collected
     if not search.answered:
         print(
             f"mjsim: {arguments.planner} gave no plan in time; this tour always visits the nearest place next",
@@ -126,10 +126,10 @@ def _planner(name: str) -> Solver:
 
 
 class _PlanningThread(threading.Thread):
-    """A thread that runs the planner, so that time limits and signals can take effect while it computes.
+    """A thread that runs the planner while the main thread handles time limits and signals.
 
     Attributes:
-        best: The last plan, or None.
+        best: The most recent plan, or None if there is none yet.
         answered: True if the planner itself returned a plan in time.
     """
 
@@ -141,7 +141,7 @@ class _PlanningThread(threading.Thread):
         self.answered = False
         self._error: BaseException | None = None
         self._stop_planning = threading.Event()
-        self._over = threading.Event()  # used instead of `join`, which a signal would interrupt
+        self._over = threading.Event()  # used instead of `join`, because signals interrupt `join`
         self._planner, self._problem = planner, problem
         self._since, self._seconds = started, seconds
 
@@ -150,9 +150,9 @@ class _PlanningThread(threading.Thread):
             for plan in self._plans():
                 self.answered = (
                     self.best is not None or self._seconds is None
-                )  # with a time limit, the first plan comes from a greedy heuristic
+                )  # if there is a time limit, the first plan comes from a greedy heuristic
                 self.best = plan
-        except BaseException as error:  # custom planners can raise any error
+        except BaseException as error:  # custom planners may raise any exception
             self._error = error
         finally:
             self._over.set()
@@ -172,7 +172,7 @@ class _PlanningThread(threading.Thread):
             yield self._planner.solve(self._problem, limit=limit)
 
     def wait(self) -> Plan:
-        """Return the best plan when the search has ended or timed out. Raises the error of a failed planner."""
+        """Return the best plan once the search has ended or timed out. Raises any error of the planner."""
         self.start()
         ends = float("inf") if self._seconds is None else self._since + self._seconds + GRACE_S
         report = self._since + REPORT_PERIOD_S

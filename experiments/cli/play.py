@@ -1,4 +1,4 @@
-"""`mjsim play`: tidy the apartment yourself, in a browser."""
+"""`mjsim play`: let a person tidy an apartment in a browser."""
 
 import argparse
 import asyncio
@@ -131,7 +131,7 @@ def task_of(arguments: argparse.Namespace) -> TrialConfig:
     )
     condition(task.assistance)
     condition(task.training_assistance)
-    if task.planner not in SOLVERS:  # a built-in planner is loaded only in the workers
+    if task.planner not in SOLVERS:  # built-in planners are only loaded in the worker processes
         solver(task.planner)
     return task
 
@@ -143,7 +143,7 @@ def _serve(
 
     prepare_process()
     pool = WorkerPool(task.house)
-    pool.warm_up()  # workers start while the modules below are imported
+    pool.warm_up()  # the fork server starts while the modules below are imported
     asyncio.run(_serve_visits(arguments, task, questions, pool, listener))
 
 
@@ -180,14 +180,14 @@ def _minimum(text: str) -> dict[str, float]:
 
 
 def shown_phases(arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Return the phases of a visit. Without a film, the fly-through is skipped."""
+    """Return the names of the phases to show. The fly-through is left out if there is no video for it."""
     return tuple(
         name for name in phases_of(arguments.phases) if name != FLYTHROUGH or arguments.film is not None
     )
 
 
 def questions_of(arguments: argparse.Namespace) -> tuple[Item, ...]:
-    """Read the file of --questions, which has tables [[question]] with `text`, `choices` and `answer`."""
+    """Read questions from `[[question]]` tables with `text`, `choices` and `answer` in a TOML file."""
     path: Path | None = arguments.questions
     named = {**arguments.minimum, **({STORY: 0.0} if path else {})}
     if missing := [name for name in named if name not in shown_phases(arguments)]:

@@ -1,4 +1,4 @@
-"""The plan of a visit to `mjsim play`: a minimal study with an open link and without payments."""
+"""The study plan of `mjsim play`, which is a minimal study with an open link and no payments."""
 
 import argparse
 import math
@@ -19,11 +19,11 @@ from experiments.visit.store import Assignment, CellQuota
 from experiments.visit.texts import Section, read_texts, story_file
 from experiments.visit.texts.items import Item
 
-NAME = "play"  # name of the study in the database of `mjsim play`
+NAME = "play"  # name under which `mjsim play` stores its study in the database
 MINUTES = 15.0
 DAY_S = 86400.0
 MAX_VISITS = 1_000_000
-PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # placeholders in the texts of studies
+PLACEHOLDERS = ("title", "institution", "contact", "minutes")  # names of placeholders in study texts
 _NOTHING = Section({})
 
 
@@ -64,9 +64,9 @@ def plan_of_play(
     again = task.episode is None
 
     def trials(place: Assignment) -> Mapping[str, dict[str, Any]]:
-        """Return the settings of a visit's trials.
+        """Return the settings of a participant's trials.
 
-        Each visit has its own order seed, so that task lists differ in order.
+        Each participant has a different order seed and therefore sees the task list in a different order.
         """
         order, house = task.order_seed + place.person_id - 1, place.house_seed
         seeds = {"order_seed": order % (MAX_SEED + 1), "house_seed": house % (MAX_SEED + 1)}

@@ -1,4 +1,4 @@
-"""`mjsim replay`: replay and verify a recorded run, or film it from another view."""
+"""`mjsim replay`: replay and verify a recorded run, or record a video of it from another camera."""
 
 import argparse
 import math
@@ -77,7 +77,7 @@ def add_parser(commands: Any) -> None:
 
 
 def point(text: str) -> tuple[float, float, float]:
-    """Parse a point such as `1.5,2,8`."""
+    """Parse the coordinates of a point, such as `1.5,2,8`."""
     try:
         x, y, z = (float(part) for part in text.split(","))
         if not all(map(math.isfinite, (x, y, z))):
@@ -134,7 +134,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def run_of(arguments: argparse.Namespace) -> Iterator[Path]:
-    """Yield the run directory of a command. It is temporary for a packed trial or an unfinished session."""
+    """Yield the run directory to use. Create a temporary one for a packed trial or an unfinished session."""
     from experiments.house import House
     from experiments.record.archive import opened_run
     from experiments.record.run_directory import is_run

@@ -1,4 +1,4 @@
-"""`mjsim run`: run one trial and film it."""
+"""`mjsim run`: run a single trial and record a video of it."""
 
 import argparse
 import signal
@@ -42,7 +42,7 @@ SHOWN_METRICS = (
 )
 
 OBJECTS = 6
-PROGRESS_PERIOD_S = 1.0  # simulated time between updates of the progress bar
+PROGRESS_PERIOD_S = 1.0  # simulated time between two updates of the progress bar
 
 DESCRIPTION = """\
 Run one trial: a simulated participant tidies a disorganized apartment under an assistance condition. Write to --out:
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
             **trial_options(arguments),
         },
     )
-    film = film_config(arguments)  # an invalid profile is an error even if nothing is filmed
+    film = film_config(arguments)  # raises an error for an invalid profile even if no video is recorded
     console = error_console()
     warnings: list[str] = []
     columns = (

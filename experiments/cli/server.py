@@ -1,4 +1,4 @@
-"""Options, sockets, locks and logs of the commands that run a server."""
+"""Options, sockets, locks and logging for commands that run a server."""
 
 import argparse
 import asyncio
@@ -56,22 +56,22 @@ async def serve(
     arguments: argparse.Namespace,
     others: Sequence[tuple[Any, socket.socket]] = (),
 ) -> None:
-    """Print the URL of an ASGI application, open it, and serve it and `others` until a signal arrives.
+    """Serve an ASGI application and `others` until a signal arrives.
 
-    The URLs of `others` are printed one per line. The applications stop in the reverse order.
+    The URLs are printed one per line, and a browser opens the first. The applications stop in reverse order.
     """
     begin_logging(as_json=arguments.log_json)
     url = arguments.public_url or url_of(listener)
     print(url, *(url_of(at) for _, at in others), sep="\n", flush=True)
     if not arguments.no_open:
         threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
-    # The server started last handles a signal first. Each server then passes it to the one started before.
+    # The most recently started server handles a signal first and then passes it to the previous server.
     await asyncio.gather(*(http_server(one).serve([at]) for one, at in ((app, listener), *others)))
 
 
 def http_server(app: Any) -> Any:
-    """Return an HTTP server for an ASGI application, with the limits that all servers of mjsim use."""
-    import uvicorn  # imported late for a fast start
+    """Create an HTTP server for an ASGI application, with the limits that all servers of mjsim share."""
+    import uvicorn  # imported here so that commands start fast
 
     from experiments.web.protocol import MAX_TEXT
     from experiments.web.server.guards import TimedConnection
@@ -80,10 +80,10 @@ def http_server(app: Any) -> Any:
         uvicorn.Config(
             app,
             log_config=None,
-            access_log=False,  # URL paths contain tokens
+            access_log=False,  # URL paths contain secret tokens, which must not be logged
             log_level="warning",
             server_header=False,
-            proxy_headers=False,  # our middleware handles these headers and trusts only named proxies
+            proxy_headers=False,  # the `Guards` middleware handles these headers instead
             http=TimedConnection,
             ws="websockets-sansio",
             ws_max_size=MAX_TEXT,
@@ -109,7 +109,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, so that no other server can use it."""
+    """Lock a folder so that no other server can use it."""
     folder.mkdir(parents=True, exist_ok=True)
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -122,7 +122,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def check_public_url(url: str | None) -> None:
-    """Raise a `ConfigError` if a public URL is not of the form `https://play.example.org`."""
+    """Raise ConfigError unless the public URL has the form `https://play.example.org` or is None."""
     if url is None:
         return
     parts = urlsplit(url)
@@ -131,7 +131,7 @@ def check_public_url(url: str | None) -> None:
 
 
 def url_of(listener: socket.socket) -> str:
-    """Return the URL at which this machine can reach a listening socket."""
+    """Return the local URL of a listening socket."""
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"
@@ -145,7 +145,7 @@ def _networks(text: str) -> tuple[IPv4Network | IPv6Network, ...]:
 
 
 def number(smallest: int, largest: int) -> Callable[[str], int]:
-    """Return a parser for integers in a range."""
+    """Return a function that parses an integer between the given limits."""
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not smallest <= int(text) <= largest:
@@ -156,7 +156,7 @@ def number(smallest: int, largest: int) -> Callable[[str], int]:
 
 
 class JsonLines(logging.Formatter):
-    """Formats log records as JSON objects with time, level, logger and message.
+    """A log formatter that writes each record as a JSON object with time, level, logger and message.
 
     Only the type and traceback of an exception are logged, because its message may contain personal data.
     """

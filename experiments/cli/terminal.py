@@ -1,4 +1,4 @@
-"""Progress bars and consoles on standard error."""
+"""Consoles and progress bars that write to standard error."""
 
 import contextlib
 import os
@@ -28,7 +28,7 @@ class _TolerantStream:
 
 
 def error_console() -> "Console":
-    """Return a console on standard error whose output never fails, even if the stream is closed."""
+    """Create a console for standard error. Writing to it never fails, even if the stream is closed."""
     from rich.console import Console
 
     stream = open(os.devnull, "w") if sys.stderr is None else sys.stderr  # noqa: PTH123, SIM115 - as long as the process
@@ -36,14 +36,14 @@ def error_console() -> "Console":
 
 
 def progress_bars(console: "Console", *columns: "str | ProgressColumn") -> "Progress":
-    """Return progress bars, which are hidden unless the console is a terminal."""
+    """Create progress bars that are hidden unless the console is a terminal."""
     from rich.progress import Progress
 
     return Progress(*columns, console=console, disable=not console.is_terminal)
 
 
 def counting_bars(label: str, *columns: "str | ProgressColumn") -> "Progress":
-    """Return progress bars with a label, a count, the elapsed and remaining time, and further columns."""
+    """Create progress bars that show a label, a count, the elapsed and remaining time, and extra columns."""
     from rich.progress import BarColumn, MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
 
     counting = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), "left", TimeRemainingColumn())

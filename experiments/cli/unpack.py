@@ -1,4 +1,4 @@
-"""`mjsim unpack`: turn packed trials into run directories."""
+"""`mjsim unpack`: extract run directories from packed trials."""
 
 import argparse
 import sys

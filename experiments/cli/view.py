@@ -1,4 +1,4 @@
-"""`mjsim view`: view a recorded run in the browser."""
+"""`mjsim view`: show a recorded run in a web browser."""
 
 import argparse
 import tempfile

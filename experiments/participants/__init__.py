@@ -1,6 +1,6 @@
 """Simulated participants.
 
-Each module that defines `build` can be selected with `--user`.
+A module that defines `build` can be selected with the option `--user`.
 """
 
 import lazy_loader

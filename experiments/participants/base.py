@@ -1,4 +1,4 @@
-"""Interface of simulated participants, their percepts, and shared helpers."""
+"""The interface of participants, their percepts, and helper functions for them."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,17 +27,17 @@ Point = NDArray[np.float64]
 NEARBY = 1.3  # distance within which an object is noticed without looking at it, in metres
 DEFAULT_PERSON = PersonParameters()
 FAR = 1e6  # distance in metres that is used if there is no path
-TURNING = 0.8  # turning speed while looking around, as a share of the person's maximum
-LOOK_GAIN = 4.0  # pitch rate while levelling the gaze, divided by the pitch, in 1/s
+TURNING = 0.8  # turning speed while looking around, relative to the person's maximum speed
+LOOK_GAIN = 4.0  # ratio of the pitch rate to the pitch while the gaze is being levelled, in 1/s
 FULL_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Guidance:
-    """Step that the HUD currently shows.
+    """The step that the HUD currently shows.
 
     Attributes:
-        visit: Pick or place to make.
+        visit: Visit in which an object is picked up or placed.
         path: Floor points of the path that the breadcrumbs mark, in metres, shape (k, 2).
         goal: Position of the object or the receptacle, in metres, shape (2,).
         tolerance: Distance from the path beyond which a new path is shown, in metres.
@@ -51,14 +51,14 @@ class Guidance:
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """Possible next visit and its regret.
+    """A possible next visit and its regret.
 
     Attributes:
-        visit: Pick or place to make.
+        visit: Visit in which an object is picked up or placed.
         goal: Position of the object or the receptacle, in metres, shape (2,).
-        regret: Length by which the visit extends the rest of the task, in metres, computed after the last visit.
+        regret: Extra length of the remaining tour in metres. It is computed after the previous visit.
         capped: True if `regret` is only a lower bound.
-        find_exact: Returns the exact regret in metres, or None if none is proven. Takes about 0.1 s.
+        find_exact: Function that returns the exact regret in metres or None. It takes about 0.1 s.
     """
 
     visit: Visit
@@ -69,10 +69,9 @@ class Choice:
 
 
 class Percept:
-    """A participant's knowledge at one control step.
+    """The information that a participant receives at one control step.
 
-    This class describes a participant without assistance. Sessions use a subclass that adds the objects in view and the
-    HUD.
+    This base class contains neither the objects in view nor the HUD. Sessions use a subclass that adds both.
 
     Attributes:
         time: Simulated time in seconds.
@@ -82,9 +81,9 @@ class Percept:
         hands: Objects in the left and the right hand.
         hands_full: True if no other object can be carried.
         busy: True if a pick or place is in progress.
-        targets: Receptacle key of each object, by instance name. The HUD lists them.
-        answer: Result of the previous action, if that was a pick or place.
-        blocked: True if the walk makes no progress. It stays True until the person has backed off.
+        targets: Key of each object's receptacle, by object name. The HUD lists all objects and receptacles.
+        answer: Result of the previous action if that action was a pick or place, otherwise None.
+        blocked: True if the person makes no progress. It stays True until the person steps back.
         person: Parameters of the participant's body.
     """
 
@@ -108,30 +107,30 @@ class Percept:
 
     @property
     def carried(self) -> tuple[str, ...]:
-        """Instance names of the objects in the hands."""
+        """Names of the objects in the person's hands."""
         return self._seen.carried
 
     @cached_property
     def nearby(self) -> Mapping[str, Point]:
-        """Floor positions of misplaced objects within 1.3 m, in metres, shape (2,), by name."""
+        """Floor positions of misplaced objects within 1.3 m of the person, in metres, by object name."""
         loose = positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
         return {n: p for n, p in loose.items() if math.dist(p, self.position) < NEARBY}
 
     def look(self) -> Mapping[str, Point]:
-        """Return the floor positions of the misplaced objects in view, in metres, by name."""
+        """Return the floor positions of the misplaced objects in view, in metres, by object name."""
         return {}
 
     def look_for(self, receptacles: Mapping[str, "ReceptacleGeometry"]) -> frozenset[str]:  # noqa: ARG002 - overridden
-        """Return the keys of the receptacles in view."""
+        """Return the keys of those receptacles that are in view."""
         return frozenset()
 
     @property
     def visible_shares(self) -> Mapping[str, float]:
-        """Visible share (0 to 1) of each misplaced object in view."""
+        """Visible fraction (0 to 1) of each misplaced object in view, by object name."""
         return {}
 
     def hud(self) -> HudState | None:
-        """Return the HUD state, or None without a HUD."""
+        """Return the HUD state, or None if there is no HUD."""
         return None
 
     @property
@@ -146,26 +145,26 @@ class Percept:
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Floor positions of the flagpoles in view, even behind walls, in metres, by object."""
+        """Floor positions of the flagpoles in view, in metres, by object. They are visible through walls."""
         return {}
 
     @property
     def choices(self) -> Sequence[Choice]:
-        """All possible next visits with their regrets, the best first.
+        """All possible next visits with their regrets, starting with the best visit.
 
-        No condition shows them. They are meant for models of compliance. The list is empty if the task is finished, and
-        in live planning until the regrets have been computed.
+        The choices are never shown to participants. They are intended for models of compliance. The sequence
+        is empty if the task is finished and, in live planning, until the regrets have been computed.
         """
         return ()
 
 
 def positions_of(seen: Observation, names: Iterable[str]) -> dict[str, Point]:
-    """Return the floor positions of objects in metres, by name."""
+    """Return the floor positions of objects in metres, by object name."""
     return {name: seen.object_positions[seen.object_names.index(name), :2] for name in names}
 
 
 class Participant(Protocol):
-    """A simulated or real participant, who receives a percept and returns an action at each decision.
+    """The interface of participants, who receive a percept and return an action at each decision.
 
     Attributes:
         needs: Roles of the markers that the participant requires (`breadcrumb`, `flagpole`). Sessions whose condition
@@ -177,14 +176,14 @@ class Participant(Protocol):
     def act(self, percept: Percept) -> Action:
         """Choose the next action.
 
-        A path or a wait lasts for many control steps. In a filmed session, however, `act` is called after each step. It
-        must therefore return the same action as long as nothing happens.
+        Walking along a path or waiting takes many control steps. In a filmed session, however, `act` is
+        called after each control step. It must therefore return the same action until something happens.
         """
         ...
 
 
 class ParticipantFactory(Protocol):
-    """Function that creates a participant for one session. The generator must be its only source of randomness."""
+    """A function that creates a participant for one session. All random numbers must come from `rng`."""
 
     def __call__(self, house: "House", rng: np.random.Generator) -> Participant:
         """Create a participant who has been familiarized with the house."""
@@ -200,7 +199,7 @@ def estimated_distance(house: "House", start: Point, goal: Point) -> float:
 
 
 def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) -> list[float]:
-    """Return the walking distances in metres from one point to several points, or `FAR` if there is no path."""
+    """Return the walking distances in metres from a point to several goals, or `FAR` if there is no path."""
     try:
         return [float(gap) for gap in house.geodesics.distances_from(start, np.array(goals))]
     except PlannerError:  # at least one goal is unreachable
@@ -208,9 +207,9 @@ def estimated_distances(house: "House", start: Point, goals: Sequence[Point]) ->
 
 
 class FullTurn:
-    """A full turn on the spot, which starts at a given heading in radians.
+    """A full turn on the spot, starting at the given heading in radians.
 
-    With `level`, the gaze is also levelled. Otherwise, the pitch does not change.
+    If `level` is set, the gaze becomes horizontal during the turn. Otherwise, the pitch does not change.
     """
 
     def __init__(self, heading: float, *, level: bool = False) -> None:

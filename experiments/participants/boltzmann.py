@@ -1,8 +1,8 @@
-"""A model of compliance that chooses visits at random, and prefers visits of low regret.
+"""A participant who chooses visits at random, but prefers visits with a low regret.
 
-A visit that makes the rest of the task r metres longer is chosen with probability proportional to
-exp(-r / temperature). The temperature in metres is part of the name, as in `--user boltzmann:0.5`. With 0 the visits
-are optimal, and above about 10 m they are almost random. This participant works in all conditions.
+The probability of a visit that makes the remaining task r metres longer is proportional to
+exp(-r / temperature). The temperature in metres is part of the name, as in `--user boltzmann:0.5`. With a
+temperature of 0 m, all visits are optimal. Above about 10 m, they are almost random.
 """
 
 import math
@@ -21,10 +21,10 @@ TEMPERATURE = 0.5  # default temperature in metres
 
 
 def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator) -> Choice:
-    """Draw a choice with probability proportional to exp(-regret / temperature), or the best one at temperature 0.
+    """Draw a choice with probability proportional to exp(-regret / temperature).
 
-    A capped regret is only a lower bound. If such a choice is drawn, its exact regret is computed, and the draw is
-    rejected with the probability that compensates for the bound, so that the distribution stays exact.
+    At temperature 0, the best choice is returned. If the regret of a drawn choice is capped, the exact one is
+    computed, and the choice is rejected with a probability that makes the distribution exact.
     """
     if temperature <= 0:
         return min(choices, key=lambda choice: choice.regret)
@@ -43,7 +43,7 @@ def draw(choices: Sequence[Choice], temperature: float, rng: np.random.Generator
 
 
 class Boltzmann:
-    """Draws a visit at random, and pursues it until it is finished or impossible."""
+    """A participant who draws a visit at random and pursues it until it is finished or impossible."""
 
     needs: frozenset[str] = frozenset()
 
@@ -66,7 +66,7 @@ class Boltzmann:
 
 
 def with_parameter(text: str) -> ParticipantFactory:
-    """Return a factory of participants with this temperature. Raises ConfigError for an invalid number."""
+    """Return a factory of participants with the given temperature. Raises ConfigError if it is invalid."""
     try:
         temperature = float(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Distributions of parameters over participants. Examples in TOML:
+"""Distributions of parameter values over participants. Examples in TOML:
 
 walking_speed = {normal = [1.2, 0.2], min = 0.8}    # mean and standard deviation
 reading_time = {lognormal = [1.35, 0.35]}           # median, and standard deviation of the logarithm
@@ -33,10 +33,10 @@ _NonNegative = Annotated[float, msgspec.Meta(ge=0)]
 
 
 class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Distribution of a number, truncated at `min` and `max`.
+    """A distribution of a number, truncated at `min` and `max`.
 
     Raises:
-        ConfigError: There is not exactly one shape, a number is invalid, or no value is between `min` and `max`.
+        ConfigError: There is no shape or more than one, a number is invalid, or `min` is larger than `max`.
     """
 
     constant: float | None = None  # the same value for each participant
@@ -90,7 +90,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return {self.shape: kinds or self._numbers, **limits}
 
     def quantile(self, share: float, lowest: float = -math.inf, highest: float = math.inf) -> float:
-        """Return the quantile for a share from 0 to 1, after truncating the distribution to [`lowest`, `highest`].
+        """Return the quantile at `share` (0 to 1) of the distribution, truncated to [`lowest`, `highest`].
 
         In a mixture, the share selects both a component and a value of that component.
         """
@@ -106,7 +106,7 @@ class Distribution(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
         return min(high, max(low, self._value(below + share * (above - below))))
 
     def _kind(self, share: float) -> "tuple[float | Distribution, float]":
-        """Return the mixture component that a share (0 to 1) selects, and the share rescaled within the component."""
+        """Return the mixture component that a share (0 to 1) selects, and the share within that component."""
         kinds = [(weight, kind) for weight, kind in self.mixture or () if weight > 0]
         left = share * sum(weight for weight, _ in kinds)
         for weight, kind in kinds[:-1]:
@@ -159,14 +159,14 @@ def converted(given: object) -> Distribution:
 
 
 class Distributions(Mapping[str, Distribution]):
-    """Distributions by parameter name, sorted. Names of grouped parameters contain a dot: `motion.reach_time`."""
+    """A mapping from parameter names, such as `walking_speed` or `motion.reach_time`, to distributions."""
 
     def __init__(self, values: Mapping[str, Distribution] | None = None) -> None:
         self._values = dict(sorted((values or {}).items()))
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> "Distributions":
-        """Create distributions from a TOML table. A subtable such as `[compliance]` holds a group of parameters."""
+        """Create distributions from a TOML table. A subtable such as `[compliance]` is a parameter group."""
         if not isinstance(values, Mapping):
             raise ConfigError(f"{shown(values)} is not a table of values such as {{ walking_speed = 1.2 }}")
         found: dict[str, Distribution] = {}
@@ -181,7 +181,7 @@ class Distributions(Mapping[str, Distribution]):
 
     @classmethod
     def parse(cls, text: str) -> "Distributions":
-        """Parse the path of a TOML file, or an inline TOML table. Raises ConfigError if that fails."""
+        """Read distributions from an inline TOML table or a TOML file. Raises ConfigError if this fails."""
         try:
             if text.lstrip().startswith("{"):
                 return cls.of(tomllib.loads(f"person = {text}")["person"])
@@ -195,11 +195,11 @@ class Distributions(Mapping[str, Distribution]):
             raise ConfigError(f"{text!r} is not a description of people in TOML: {error}") from error
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the table from which `of` creates these distributions."""
+        """Return a table from which `of` creates the same distributions."""
         return {name: described.as_value() for name, described in self.items()}
 
     def updated(self, other: "Distributions") -> "Distributions":
-        """Return a copy in which the distributions of `other` are added or replaced."""
+        """Return a copy with the distributions of `other`, which replace those of the same name."""
         return Distributions({**self, **other})
 
     def __getitem__(self, name: str) -> Distribution:
@@ -222,14 +222,14 @@ class Distributions(Mapping[str, Distribution]):
 class Parameter:
     """A parameter that differs between participants."""
 
-    usual: float | Mapping[str, Any]  # default distribution, as in TOML
+    usual: float | Mapping[str, Any]  # default distribution as a TOML value
     lowest: float  # smallest valid value
     highest: float  # largest valid value
-    unit: str  # unit, empty for a plain number, `probability` for a number from 0 to 1
+    unit: str  # unit of the values, empty for plain numbers, `probability` for 0 to 1
 
     @functools.cached_property
     def spread(self) -> Distribution:
-        """The default distribution, cached."""
+        """The default distribution."""
         return converted(self.usual)
 
     def check(self, name: str, value: float) -> None:
@@ -244,8 +244,8 @@ def draw(
 ) -> dict[str, float]:
     """Draw a participant's parameter values, by name.
 
-    Each value depends only on its own random number. `described` overrides default distributions. `of` is the owner of
-    the parameters in error messages.
+    Each value depends only on its own random number. `described` overrides default distributions. `of` names
+    the owner of the parameters in error messages.
     """
     return quantiles(parameters, described, rng.random(len(parameters)).tolist(), of)
 
@@ -253,7 +253,7 @@ def draw(
 def quantiles(
     parameters: Mapping[str, Parameter], described: Distributions, shares: Sequence[float], of: str
 ) -> dict[str, float]:
-    """Return a participant's parameter values, by name, where each is the quantile at a given share (0 to 1)."""
+    """Return a participant's parameter values by name. Each value is the quantile at its share (0 to 1)."""
     for name in described:
         if name not in parameters:
             has = f"it has {', '.join(parameters)}" if parameters else "it has no parameters"

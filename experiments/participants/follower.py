@@ -1,4 +1,4 @@
-"""Participant that follows breadcrumbs if they are shown, and otherwise behaves like `nearest` or `searcher`."""
+"""A participant who follows breadcrumbs if shown, and otherwise acts like `nearest` or `searcher`."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from mjsim.values.actions import WAIT, Action
 
 
 class BreadcrumbFollower:
-    """Walks along the breadcrumbs, and picks or places at their end."""
+    """A participant who walks along the breadcrumbs and picks up or places an object at their end."""
 
     needs = frozenset({"breadcrumb"})
 
@@ -25,7 +25,7 @@ class BreadcrumbFollower:
 
 
 class Follower:
-    """Uses the best available guidance: breadcrumbs, flagpoles, or only its own sight."""
+    """A participant who uses breadcrumbs or flagpoles if they are shown, and otherwise searches the rooms."""
 
     needs: frozenset[str] = frozenset()
 

@@ -1,4 +1,4 @@
-"""Viewpoints from which a participant still has to search the rooms."""
+"""Keep track of the viewpoints from which a participant has not searched the rooms yet."""
 
 import math
 from dataclasses import dataclass
@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 from experiments.house import House
 from experiments.participants.base import Percept, Point, estimated_distances
 
-SHIFT = 0.15  # standard deviation in metres of random shifts of the viewpoints, which reveal hidden objects
+SHIFT = 0.15  # standard deviation of random shifts of viewpoints, which reveal hidden objects, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class SearchPlace:
-    """Viewpoint from which a room is searched."""
+    """A viewpoint from which a room is searched."""
 
     room: str  # room key
     point: Point  # floor position in metres, shape (2,)
 
 
 class Frontier:
-    """Viewpoints that have not been searched.
+    """The viewpoints from which a participant has not searched yet.
 
-    When all have been searched, a new round begins in which the participant looks more closely.
+    When no viewpoints are left, a new round begins, in which the participant looks more closely.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
@@ -31,7 +31,7 @@ class Frontier:
         self._left, self._round = self._all(), 1
 
     def places(self) -> list[SearchPlace]:
-        """Return the remaining viewpoints, at least one."""
+        """Return the remaining viewpoints. There is always at least one."""
         if not self._left:
             self._left, self._round = self._all(), self._round + 1
         return self._left
@@ -58,7 +58,7 @@ class Frontier:
         self._left = [other for other in self._left if other is not place]
 
     def mark_seen(self, percept: Percept, room: str, within: float) -> None:
-        """Mark those viewpoints of `room` as searched that are in view and closer than `within` metres."""
+        """Mark all viewpoints of a room that are in view and closer than `within` metres as searched."""
         within /= self._round  # the participant looks more closely in each new round
         walls = self._house.navmesh.outline
         self._left = [
@@ -76,9 +76,9 @@ def _sees(percept: Percept, point: Point, within: float, walls: NDArray[np.float
 
 
 def free_length(walls: NDArray[np.float64], start: Point, goal: Point) -> float:
-    """Return the length in metres of the straight line from `start` to `goal` or the first wall.
+    """Return the distance in metres from `start` to `goal`, or to the first wall on the way.
 
-    Each row of `walls`, shape (e, 4), contains both ends of a wall: x, y, x, y.
+    Each row of `walls`, of shape (e, 4), contains x and y of both ends of a wall.
     """
     way, along, offset = goal - start, walls[:, 2:] - walls[:, :2], walls[:, :2] - start
     cross = way[0] * along[:, 1] - way[1] * along[:, 0]

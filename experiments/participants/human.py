@@ -1,4 +1,4 @@
-"""Participant at the keyboard, available only in `mjsim play`."""
+"""The human participant at the keyboard, who is available only in `mjsim play`."""
 
 from typing import Never
 

@@ -1,4 +1,4 @@
-"""Participant that goes to the nearest flagpole while a hand is free, and otherwise to the nearest bin."""
+"""A participant who always makes the nearest possible visit, and who finds objects by their flagpoles."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from planner.plan import Visit, VisitKind
 
 
 class Nearest:
-    """Chooses the nearest possible visit, and pursues it until it is finished or impossible.
+    """A participant who chooses the nearest possible visit and pursues it until it is finished or impossible.
 
-    The participant turns around at the start to find all flagpoles, and again if it knows of none.
+    The participant makes a full turn at the start to find the flagpoles, and again when no objects are known.
     """
 
     needs = frozenset({"flagpole"})
@@ -39,7 +39,6 @@ class Nearest:
         return self._visit(percept)
 
     def _look(self, percept: Percept) -> None:
-        """Remember visible flagpoles. Forget those of carried or moved objects."""
         self._executor.look_for_bins(percept)
         for name in percept.carried:
             self._known.pop(name, None)

@@ -26,7 +26,7 @@ def participant_names() -> tuple[str, ...]:
 
 
 def participant(name: str) -> "ParticipantFactory":
-    """Return a participant's factory by its name, or by `package.module:attribute`.
+    """Return the factory of a participant, given a name or `package.module:attribute`.
 
     If a module defines `with_parameter(text)`, a parameter may follow the name after a colon. Raises ConfigError if the
     participant is unknown, cannot be loaded or called, or accepts no parameter.

@@ -1,4 +1,4 @@
-"""Participant of `mjsim study rehearse`, available only through a study server."""
+"""The participant of `mjsim study rehearse`, who is available only through a study server."""
 
 from typing import Never
 

@@ -1,4 +1,4 @@
-"""Participant that searches the house room by room, and tidies the objects that it finds."""
+"""A participant who searches the house room by room and tidies up the objects found."""
 
 import numpy as np
 
@@ -14,9 +14,9 @@ GONE = 1.2  # distance in metres within which a remembered object that is not in
 
 
 class Searcher:
-    """Picks objects that it has seen, and places them when its hands are full or it knows of no other objects.
+    """A participant who collects objects, and places them when the hands are full or no others are known.
 
-    It finishes the current room before it goes to the nearest viewpoint elsewhere.
+    The participant finishes the current room before going to the nearest viewpoint in another room.
     """
 
     needs: frozenset[str] = frozenset()

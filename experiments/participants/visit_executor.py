@@ -1,4 +1,4 @@
-"""Execution of visits by simulated participants: walking, picking, placing, and searching for bins."""
+"""Carry out the visits of simulated participants by walking, searching for bins, picking and placing."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -13,17 +13,18 @@ from planner.plan import Visit, VisitKind
 
 STOP_SHARE = 0.72  # stopping distance relative to the reach, large enough not to kick the object
 CLOSER = 0.12  # reduction of the stopping distance after a refused pick or place, in metres
-MIN_STOP_DISTANCE = 0.30  # minimum distance from the goal at the end of a walk, in metres
+MIN_STOP_DISTANCE = 0.30  # minimum distance between the person and the goal at the end of a walk, in metres
 ARRIVED = 0.5  # distance from a viewpoint at which the participant starts to look around, in metres
 
 WalkTo = Callable[[Percept, Point, float], Action]
 
 
 class VisitExecutor:
-    """Executes visits.
+    """An executor that carries out visits for a participant.
 
-    After a refused pick or place, the participant stops closer to the goal. If blocked, the participant takes another
-    path. A bin that has not been seen yet is searched for first.
+    After a refused pick or place, the participant stops closer to the goal. A blocked participant takes
+    another path. If the participant has not seen the bin of a visit yet, the visit begins with a search for
+    the bin.
     """
 
     def __init__(self, house: House) -> None:
@@ -40,7 +41,7 @@ class VisitExecutor:
     ) -> Action:
         """Walk the shortest known path to the goal of a visit, and pick or place there.
 
-        `objects` are remembered positions. `until` is the simulated time of the next decision in seconds.
+        `objects` contains remembered positions. `until` is the time of the next decision in seconds.
         """
         if percept.busy:
             return WAIT
@@ -55,7 +56,7 @@ class VisitExecutor:
         return FollowPath(path, goal, self._stop_distance, _action(visit), self._bins.until(until))
 
     def follow(self, percept: Percept, guidance: Guidance, *, until: float | None = None) -> Action:
-        """Walk along the shown path, and pick or place at its end. `until` is the time of the next decision."""
+        """Walk along the shown path, then pick or place. `until` is the next decision time in seconds."""
         if percept.busy:
             return WAIT
         self._take_up(percept, guidance.visit)
@@ -82,7 +83,7 @@ class VisitExecutor:
         self._bins.look(percept)
 
     def nearest_visit(self, percept: Percept, visits: Sequence[Visit], objects: Mapping[str, Point]) -> Visit:
-        """Return the visit with the shortest path. `objects` are remembered positions in metres, shape (2,)."""
+        """Return the visit with the shortest path. `objects` contains remembered positions in metres."""
         stands = [self._likely_stand(percept, visit, objects) for visit in visits]
         distances = estimated_distances(self._house, percept.position, stands)
         ranked = zip(distances, visits, strict=True)
@@ -108,7 +109,6 @@ class VisitExecutor:
         return percept.time < self._read_until - TIME_TOLERANCE
 
     def _path_to(self, percept: Percept, goal: Point) -> NDArray[np.float64]:
-        """Return the current path. Replan if the goal has changed, or if the path was blocked or left."""
         path = self._path
         if path is None or percept.blocked or not _same(path[-1], goal) or _is_off(path, percept):
             self._path = path = np.vstack(
@@ -130,7 +130,7 @@ class VisitExecutor:
 
 
 def places(house: House, percept: Percept, visit: Visit, objects: Mapping[str, Point]) -> tuple[Point, Point]:
-    """Return the goal of a visit and the end of the path to it, in metres, both of shape (2,)."""
+    """Return the goal of a visit and the end of the path to the goal, both in metres, shape (2,)."""
     if visit.kind is VisitKind.PICK:
         goal = objects[visit.object]
         return goal, house.navmesh.snap(goal)
@@ -151,7 +151,7 @@ def _is_off(path: NDArray[np.float64], percept: Percept) -> bool:
 
 
 class BinSearch:
-    """Search for the bins that the participant has not seen yet."""
+    """A search for the bins that the participant has not seen yet."""
 
     def __init__(self, house: House) -> None:
         self._house = house
@@ -175,13 +175,13 @@ class BinSearch:
             del self._unknown[key]
 
     def until(self, time: float | None) -> float | None:
-        """Return the earlier of `time` and the time of the next look in seconds, or None if both are unset."""
+        """Return `time` or the time of the next look, whichever is earlier, or None if both are unset."""
         if not self._unknown:
             return time
         return self._next_look if time is None else min(time, self._next_look)
 
     def likely_place(self, position: Point, key: str) -> Point:
-        """Return the start of the search for a bin, which is the nearest viewpoint of its room."""
+        """Return the point where the search for a bin starts: the nearest viewpoint of the bin's room."""
         points = self._viewpoints(key)
         return points[self._nearest(position, points)]
 
@@ -213,7 +213,6 @@ class BinSearch:
         return [*self._house.viewpoints.get(room, ()), self._house.approaches[key]]
 
     def _nearest(self, position: Point, points: list[Point]) -> int:
-        """Return the index of the nearest point. The last one, next to the bin, is chosen only if no other is left."""
         candidates = points[:-1] or points
         return int(np.argmin(estimated_distances(self._house, position, candidates)))
 

@@ -1,1 +1,1 @@
-"""Records of sessions: writing, export, reading, verification and metrics."""
+"""Write, read and verify the records of sessions, and compute metrics from them."""

@@ -1,7 +1,7 @@
-"""Packed trials: SQLite archives of run directories, with the schema that `sqlite3 -A` reads.
+"""Store run directories in SQLite archives, which can be read with `sqlite3 -A`.
 
-Each worker process writes its own archive under a hidden name and holds SQLite's exclusive lock until it ends. An
-archive without a lock is finished, and `adopt` renames it to its final name.
+Each worker process writes its own archive under a hidden name, and holds an exclusive SQLite lock until it
+ends. An archive that is no longer locked is finished, and `adopt` renames it to its final name.
 """
 
 import itertools
@@ -25,7 +25,7 @@ from mjsim.support.files import MAX_INPUT, read_bytes, work_folder
 WAIT_S = 60.0  # how long to wait for another process that is writing to the archive
 _SCHEMA = "CREATE TABLE IF NOT EXISTS sqlar(name TEXT PRIMARY KEY, mode INT, mtime INT, sz INT, data BLOB)"
 _DAMAGED = "if it is damaged, move it away: its trials are run again"
-_OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # in ASCII, 0 is the character after the slash
+_OF_RUN = "WHERE name >= ? || '/' AND name < ? || '0'"  # "0" follows "/" in ASCII
 
 
 def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
@@ -34,17 +34,17 @@ def new_archive(folder: Path, prefix: str) -> sqlite3.Connection:
         host = re.sub(r"[^\w.-]", "", socket.gethostname(), flags=re.ASCII)
         path = folder / f".{prefix}-{host}-{os.getpid()}-{secrets.token_hex(4)}{PACKED}"
         database = _connect(path, "rwc")
-        # The journal is synced and kept, not deleted, so that a committed run survives a power failure.
+        # SQLite's journal is synced and never deleted, so a committed run survives a power failure.
         database.executescript(
             f"PRAGMA auto_vacuum=FULL; PRAGMA locking_mode=EXCLUSIVE; PRAGMA synchronous=FULL; {_SCHEMA};"
         )
-        if path.exists():  # otherwise another process renamed it before it was locked
+        if path.exists():  # false if another process renamed it before it was locked
             return database
         database.close()
 
 
 def pack(run: Path, database: sqlite3.Connection) -> None:
-    """Add a run directory to an archive in one transaction. Raises a `RecordError` if the archive cannot be written."""
+    """Add a run directory to an archive in one transaction. Raises `RecordError` if this is not possible."""
     rows = []
     for path in sorted(path for path in run.rglob("*") if path.is_file()):
         content, status = path.read_bytes(), path.stat()
@@ -59,9 +59,9 @@ def pack(run: Path, database: sqlite3.Connection) -> None:
 
 
 def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
-    """Rename each finished archive to its final name. Return the number of archives that are still open for writing.
+    """Rename all finished archives to their final names. Return the number of archives still being written.
 
-    A run that a killed writer did not commit is rolled back.
+    Runs that were not committed before their writer was killed are rolled back.
     """
     busy = 0
     for path in sorted(folder.glob(f".{prefix}*{PACKED}")):
@@ -70,7 +70,7 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
                 database.execute(_SCHEMA)
                 database.execute("BEGIN EXCLUSIVE")
                 empty = database.execute("SELECT 1 FROM sqlar").fetchone() is None
-                if path.exists():  # otherwise another process renamed it first
+                if path.exists():  # false if another process renamed it first
                     path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
                     path.unlink() if empty else path.rename(path.with_name(path.name[1:]))
         except sqlite3.Error as error:
@@ -82,10 +82,10 @@ def adopt(folder: Path, prefix: str = "", wait_s: float = 0.0) -> int:
 
 
 def run_paths(folder: Path, prefix: str = "") -> list[Path]:
-    """List the runs in a batch's `trials` folder by name: `FOLDER/NAME`, or `FOLDER/ARCHIVE/NAME` if packed.
+    """Return the paths of all runs in the `trials` folder of a batch, sorted by name.
 
-    A run directory takes precedence over a packed run with the same name. Only archives whose names begin with `prefix`
-    are read.
+    The path of a packed run is `FOLDER/ARCHIVE/NAME`. A run directory takes precedence over a packed run with
+    the same name. Only archives whose names begin with `prefix` are read.
 
     Raises:
         RecordError: An archive is damaged.
@@ -104,10 +104,7 @@ def packed_names(archive: Path) -> set[str]:
 
 @contextmanager
 def opened_run(path: Path) -> Iterator[Path]:
-    """Yield a run directory. A packed run is unpacked to a temporary folder.
-
-    Raises `RecordError` if the run cannot be unpacked.
-    """
+    """Yield the directory of a run. A packed run is unpacked first, which can raise `RecordError`."""
     archive = None if is_run(path) else archive_of(path)
     if archive is None:
         yield path
@@ -118,7 +115,7 @@ def opened_run(path: Path) -> Iterator[Path]:
 
 
 def unpack(archive: Path, name: str, folder: Path) -> None:
-    """Write a packed run to `folder/name`, and verify the checksums of its files."""
+    """Unpack a run from an archive to `folder/name`, and verify the checksums of its files."""
     directories = set[Path]()
     with _opened(archive) as database:
         members = f"SELECT name, mtime, sz, data FROM sqlar {_OF_RUN}"  # nosec B608 - a constant
@@ -141,7 +138,7 @@ def unpack(archive: Path, name: str, folder: Path) -> None:
 
 
 def read_file(path: Path, file: str) -> bytes:
-    """Read a file of a run, packed or not, without verifying it. Raises `OSError` or `RecordError`."""
+    """Read a file from a run directory or a packed run. The checksum of the file is not verified."""
     if path.parent.suffix != PACKED:
         return read_bytes(path / file)
     member = f"{path.name}/{file}"
@@ -151,7 +148,7 @@ def read_file(path: Path, file: str) -> bytes:
 
 
 def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None]:
-    """Replace packed runs in `folder` by run directories. Yield None for each run, or a message if it is damaged."""
+    """Unpack runs in a batch folder. For each run, yield None or, if the run is damaged, an error message."""
     for archive, paths in itertools.groupby(sorted(runs), lambda path: path.parent):
         done = set()
         for path in paths:
@@ -170,7 +167,7 @@ def unpack_in_place(folder: Path, runs: Collection[Path]) -> Iterator[str | None
 
 
 def discard(folder: Path, names: Collection[str], target: Path | None = None, prefix: str = "") -> None:
-    """Remove packed runs from the archives in `folder`, or move them to archives in `target`."""
+    """Delete packed runs from the archives in `folder`. If `target` is given, move them there instead."""
     for archive in _archives(folder, prefix):
         held = packed_names(archive)
         if held <= set(names):
@@ -181,7 +178,7 @@ def discard(folder: Path, names: Collection[str], target: Path | None = None, pr
                     new = target / f"{archive.stem}-{secrets.token_hex(4)}{PACKED}"
                     database.execute("ATTACH ? AS target", (f"{new.absolute().as_uri()}?mode=rwc",))
                     database.execute(_SCHEMA.replace("sqlar", "target.sqlar", 1))
-                with database:  # a single transaction for both archives
+                with database:  # one transaction that covers both archives
                     if target is not None:
                         insert = f"INSERT INTO target.sqlar SELECT * FROM main.sqlar {_OF_RUN}"  # nosec B608
                         database.executemany(insert, gone)

@@ -1,4 +1,4 @@
-"""The columns of a record: those of `trajectory.npz`, with a row per control step, and those of `recording.npz`."""
+"""Names, types and shapes of the arrays in `trajectory.npz` and `recording.npz`."""
 
 import hashlib
 import math
@@ -17,7 +17,7 @@ from mjsim.world.state import WorldState
 
 OBJECTS = -1  # placeholder for the number of objects in the shapes below
 
-# Type and shape of each column in a row. Row t contains the state before action t.
+# Data type and shape of each column. Row t contains the state before action t.
 TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "time": ("f8", ()),  # simulated time in seconds
     "position": ("f8", (2,)),  # position of the person in metres
@@ -27,24 +27,24 @@ TRAJECTORY_COLUMNS: dict[str, tuple[str, tuple[int, ...]]] = {
     "object_position": ("f8", (OBJECTS, 3)),  # positions of the objects in metres
     "object_quaternion": ("f8", (OBJECTS, 4)),  # quaternions in the order w, x, y, z
     "object_status": ("i1", (OBJECTS,)),  # status of each object as an index into STATUSES
-    # Type of action (0 move, 1 pick, 2 place), object index or -1, speeds forward and to the left (m/s), and angular
-    # speeds of turning and looking (rad/s). With n objects, index n + i refers to entry i of `unknown_objects`, which
-    # lists the names in actions that match no object.
+    # Type of the action (0 move, 1 pick, 2 place), index of the object or -1, forward and leftward speeds
+    # (m/s), and turning and looking speeds (rad/s). If there are n objects, index n + i refers to entry i of
+    # `unknown_objects`, a list of the names in actions that do not match any object.
     "action": ("f8", (6,)),
-    # Fields of `HealthSample`, NaN if not measured
+    # The fields of `HealthSample`, with NaN for quantities that were not measured
     "penetration_m": ("f8", ()),
     "trunk_penetration_m": ("f8", ()),
     "weld_error_m": ("f8", (2,)),
     "weld_error_rad": ("f8", (2,)),
     "settle_s": ("f8", ()),
 }
-# Columns needed only while a record is written: state hash, and number of log entries before the control step
+# Columns that are needed only while a record is being written
 _WRITTEN = {"state_hash": ("u8", ()), "logged": ("i8", ())}
 HEALTH = ("penetration_m", "trunk_penetration_m", "weld_error_m", "weld_error_rad", "settle_s")
 STATUSES = (ObjectStatus.LOOSE, ObjectStatus.CARRIED, ObjectStatus.DELIVERED)
 
-# Arrays of `recording.npz`. `state_hash` and `action_hash` have one row per control step. `log_size` and `log_hash`
-# describe the log before each control step, and have one more row for its end.
+# The arrays of `recording.npz`. `state_hash` and `action_hash` have one row per control step. `log_size` and
+# `log_hash` describe the log before each control step and have an additional row for the complete log.
 RECORDING_LAYOUT: dict[str, Layout] = {
     "state_hash": ("u8", (None,)),
     "action_hash": ("u8", (None,)),
@@ -58,7 +58,7 @@ RECORDING_LAYOUT: dict[str, Layout] = {
 
 
 def trajectory_layout(objects: int) -> dict[str, Layout]:
-    """Return the type and the shape of each array in `trajectory.npz`."""
+    """Return the data type and the shape of each array in `trajectory.npz`."""
     rows: dict[str, Layout] = {
         name: (kind, (None, *row_shape(row, objects))) for name, (kind, row) in TRAJECTORY_COLUMNS.items()
     }
@@ -75,7 +75,7 @@ def row_type(objects: int) -> np.dtype[Any]:
 
 
 def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the name and the values, shape (n, ...), of each column that is computed from states."""
+    """Yield the name and the values, shape (n, ...), of each trajectory column that describes states."""
     columns = states._asdict()
     health = columns.pop("health")
     yield from columns.items()
@@ -88,7 +88,7 @@ def state_columns(states: StepStates) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """Return `hash64` of each row of `actions`, which has shape (T, 6)."""
+    """Return a 64-bit hash of each row of `actions`, which has shape (T, 6)."""
     content, size, sha1 = actions.tobytes(), actions.itemsize * 6, hashlib.sha1
     rows = (content[i : i + size] for i in range(0, len(content), size))
     digests = [sha1(row, usedforsecurity=False).digest()[:8] for row in rows]
@@ -96,7 +96,7 @@ def action_hashes(actions: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArray[Any]]:
-    """Return the checkpoint arrays of `recording.npz`. `checkpoints` maps control steps to states."""
+    """Convert checkpoints, a map from control steps to states, to the arrays stored in `recording.npz`."""
     states = list(checkpoints.values())
     return {
         "checkpoint_step": np.array(list(checkpoints), np.int64),
@@ -107,10 +107,10 @@ def checkpoint_arrays(checkpoints: Mapping[int, WorldState]) -> dict[str, NDArra
 
 
 def decode_action(row: NDArray[Any], names: Sequence[str]) -> StepAction:
-    """Decode a row of the action column, shape (6,).
+    """Decode an action from a row of the `action` column.
 
     Args:
-        row: The row.
+        row: The row, shape (6,).
         names: Names of the objects, followed by the `unknown_objects`.
 
     Raises:

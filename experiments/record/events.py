@@ -1,6 +1,6 @@
-"""Types of task events, and `check_event`, which validates the lines of `events.jsonl`.
+"""Types of the events that are logged during a task.
 
-docs/data.md is generated from the types in this module and `session_events`.
+The file docs/data.md is generated from the types in this module and in `session_events`.
 """
 
 from typing import Annotated, Union
@@ -17,16 +17,16 @@ VisitPair = tuple[VisitKind, str]
 
 
 class PlanEvent(LoggedEvent, frozen=True):
-    """The assistant made a plan: the first plan, a plan after a deviation, or an improvement of the current plan.
+    """The assistant made a plan. This is the first plan, a plan after a deviation, or an improved plan.
 
     Attributes:
-        cost_m: Length of the planned tour in metres, from the person's position along the locations of its visits.
-        lower_bound_m: Lower bound in metres on the length of any tour along these locations.
-        status: `optimal` if the planner proved it, else `feasible`.
-        visits: The tour as pairs of action and object.
+        cost_m: Length of the planned tour in metres, from the person's position to all visited locations.
+        lower_bound_m: Lower bound in metres on the length of any tour to these locations.
+        status: `optimal` if the planner has proved that no tour is shorter, otherwise `feasible`.
+        visits: The visits of the tour, as pairs of action and object.
         improved: True if this plan replaces a longer one for the same state of the task.
-        reach_bound_m: Only in the first plan: lower bound in metres on the walking distance at maximum reach
-            (docs/metrics.md).
+        reach_bound_m: Lower bound in metres on the walking distance at maximum reach (docs/metrics.md).
+            Present only in the first plan.
     """
 
     cost_m: Metres
@@ -54,21 +54,21 @@ class AttemptEvent(LoggedEvent, frozen=True):
 
 
 class VisitEvent(LoggedEvent, frozen=True):
-    """A pick or place succeeded.
+    """The person picked up or placed an object successfully.
 
     Attributes:
         kind: `pick` or `place`.
         object: The object.
-        suggested: The suggested visit, or null.
+        suggested: The suggested visit, or null if there was none.
         deviated: True if the visit differs from the suggested one.
         alternatives: Number of other feasible visits.
         tied_alternatives: Number of alternatives that place another object into the suggested visit's bin.
-        tied: True if the visit deviates only in which object goes into that bin first.
+        tied: True if the visit differs from the suggested one only in which object goes into that bin first.
         position: Position of the person in metres.
-        geodesic_m: Shortest walk in metres from the person's position at the previous visit.
-        location_m: Planner's distance in metres between the locations of the previous visit and this one.
-        regret_m: Extra length of the remaining task in metres compared with the best visit; null if unknown, absent in
-            trials without regrets.
+        geodesic_m: Length in metres of the shortest walk from the person's position at the previous visit.
+        location_m: Planner's distance in metres between the locations of the previous visit and this visit.
+        regret_m: Extra length of the remaining task in metres compared with the best visit. It is null if
+            unknown, and absent in trials without regrets.
         suggested_regret_m: Regret of the suggested visit in metres.
     """
 
@@ -87,10 +87,10 @@ class VisitEvent(LoggedEvent, frozen=True):
 
 
 class RegretEvent(LoggedEvent, frozen=True):
-    """Regrets of a visit that were computed after the task.
+    """The regrets of a visit were computed after the task.
 
     Attributes:
-        visit: Number of the visit, from 0.
+        visit: Number of the visit, counted from 0.
         regret_m: As in `visit`.
         suggested_regret_m: As in `visit`.
     """
@@ -104,13 +104,13 @@ class ScrollEvent(LoggedEvent, frozen=True):
     """The person scrolled the task list.
 
     Attributes:
-        rows: Number of rows, positive towards the end of the list.
+        rows: Number of rows, which is positive when scrolling towards the end of the list.
     """
 
     rows: int
 
 
-TYPES = tuple(LoggedEvent.__subclasses__())  # excludes `OutcomeEvent`, defined below, and its subtypes
+TYPES = tuple(LoggedEvent.__subclasses__())  # all types above, but not `OutcomeEvent` and its subtypes
 
 
 class OutcomeEvent(LoggedEvent, frozen=True):
@@ -118,7 +118,7 @@ class OutcomeEvent(LoggedEvent, frozen=True):
 
     Attributes:
         object: The object.
-        receptacle: The receptacle concerned, or null.
+        receptacle: The receptacle, or null if none is involved.
     """
 
     object: str
@@ -143,7 +143,7 @@ _DECODER: msgspec.json.Decoder[LoggedEvent] = msgspec.json.Decoder(Union[(*TYPES
 
 
 def check_event(line: bytes) -> None:
-    """Raise a `RecordError` if a line of a log is not an event with the fields of its type."""
+    """Raise `RecordError` if a log line is not a valid event."""
     try:
         _DECODER.decode(line)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

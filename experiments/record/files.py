@@ -1,4 +1,4 @@
-"""Reads and atomically writes arrays, JSON and checksums. Errors name the file."""
+"""Read and atomically write files with arrays, JSON and checksums."""
 
 import hashlib
 import json
@@ -15,7 +15,7 @@ from experiments.errors import RecordError
 from mjsim.support.files import check_input, read_bytes, read_text, replacing, write_text_atomically
 from mjsim.support.files import read_json as strict_json
 
-# Data type (a NumPy name or `TEXT`) and shape of an array. A dimension that is None can have any length.
+# The data type (a NumPy name or `TEXT`) and the shape of an array. A dimension of None allows any length.
 Layout = tuple[str, tuple[int | None, ...]]
 TEXT = "U"
 _LEVEL = 3
@@ -24,11 +24,11 @@ _LEVEL = 3
 def read_arrays(
     path: Path, layouts: Mapping[str, Layout] | None = None, *, only: Collection[str] | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Read arrays from an NPZ file. Return them by name.
+    """Read arrays from an NPZ file, and return them by name.
 
     Args:
         path: The file.
-        layouts: Type and shape of each required array, or None for no check.
+        layouts: Data type and shape of each required array, or None to skip the check.
         only: Names of the arrays to read, or None for all.
 
     Raises:
@@ -40,7 +40,7 @@ def read_arrays(
             arrays = {name: archive[name] for name in only or archive.files}
     except FileNotFoundError as error:
         raise RecordError(f"cannot read {path}: {error.strerror}") from error
-    except Exception as error:  # zipfile and NumPy raise a dozen error types for damaged files
+    except Exception as error:  # zipfile and NumPy raise many different exceptions for damaged files
         raise RecordError(f"{path} is truncated or damaged: {error}") from error
     bad = sorted(
         n for n, layout in (layouts or {}).items() if n not in arrays or not _fits(arrays[n], layout)
@@ -61,10 +61,10 @@ def _fits(array: NDArray[Any], layout: Layout) -> bool:
 
 
 def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool = False) -> None:
-    """Write arrays to a compressed NPZ file, atomically.
+    """Atomically write arrays to a compressed NPZ file.
 
-    Compared with `np.savez_compressed`, writing takes half the time, but files are a tenth larger. With `small`, LZMA
-    makes files a quarter smaller, but writing takes ten times as long.
+    This is twice as fast as `np.savez_compressed`, but the files are a tenth larger. If `small` is true, LZMA
+    makes the files a quarter smaller, but writing takes ten times as long.
     """
     method = zipfile.ZIP_LZMA if small else zipfile.ZIP_DEFLATED
     with (
@@ -77,12 +77,12 @@ def save_arrays(path: Path, arrays: Mapping[str, NDArray[Any]], *, small: bool =
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a value as indented JSON, atomically."""
+    """Atomically write a value to a file as indented JSON."""
     write_text_atomically(path, json.dumps(value, indent=2) + "\n")
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file. Raises a `RecordError` if the file is missing or not JSON."""
+    """Read a JSON file. Raises `RecordError` if the file is missing or is not valid JSON."""
     try:
         return strict_json(read_text(path))
     except OSError as error:
@@ -96,7 +96,7 @@ _LINE = re.compile(r"([0-9a-f]{64})  ([^/\\]+)")
 
 
 def write_checksums(folder: Path, names: Iterable[str]) -> None:
-    """Write `SHA256SUMS`, readable by `sha256sum -c`, for those of the files that exist."""
+    """Write the checksums of all existing files in `names` to `SHA256SUMS`, in the `sha256sum` format."""
     found = sorted(name for name in names if (folder / name).is_file())
     write_text_atomically(
         folder / CHECKSUMS, "".join(f"{sha256_of(folder / name)}  {name}\n" for name in found)
@@ -104,7 +104,7 @@ def write_checksums(folder: Path, names: Iterable[str]) -> None:
 
 
 def read_checksums(folder: Path) -> dict[str, str]:
-    """Read `SHA256SUMS` as a map from file names to hashes. Raises a `RecordError` if it is missing or damaged."""
+    """Read the hash of each file from `SHA256SUMS`. Raises `RecordError` if it is missing or damaged."""
     path = folder / CHECKSUMS
     try:
         lines = read_bytes(path).decode("ascii").split("\n")

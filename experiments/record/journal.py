@@ -1,7 +1,7 @@
-"""The journal of a session: its record, appended to a file while the session runs.
+"""Write the record of a running session to an append-only file, which is called the journal.
 
-The file has a header and entries, each with its length and checksum. After `sync`, the entries survive a crash of the
-process or the machine. An incomplete last entry is dropped when the journal is opened again.
+A journal consists of a header and entries, each with its length and checksum. After `sync`, entries survive a
+crash of the process or machine. An incomplete last entry is dropped when the journal is opened again.
 """
 
 import errno
@@ -18,7 +18,7 @@ import msgspec
 
 from experiments.errors import RecordError
 
-JOURNAL = "journal.bin"  # name of the journal in the folder of a session
+JOURNAL = "journal.bin"  # file name of the journal in a session's folder
 MAGIC = b"mjsim journal 2\n"
 MAX_ENTRY = 64 * 1024 * 1024  # maximum size of an entry in bytes
 LOCK_TIMEOUT_S = 10.0  # how long to wait for another process to close the journal
@@ -27,7 +27,7 @@ _HEAD = struct.Struct("<II")  # length in bytes and CRC-32 of the next entry
 
 
 class Header(msgspec.Struct, frozen=True, tag="Header"):
-    """First entry of a journal.
+    """The first entry of a journal.
 
     Attributes:
         settings: Settings of the trial.
@@ -39,7 +39,7 @@ class Header(msgspec.Struct, frozen=True, tag="Header"):
 
 
 class Checkpoint(msgspec.Struct, frozen=True):
-    """A state from which to continue: the next control step, the physics state (float64), and other state as JSON."""
+    """A state from which a session can be resumed, with float64 physics and other details as JSON."""
 
     step: int
     physics: bytes
@@ -47,12 +47,12 @@ class Checkpoint(msgspec.Struct, frozen=True):
 
 
 class JournalEntry(msgspec.Struct, frozen=True, tag="Entry"):
-    """Part of a record, added after the previous entry.
+    """The part of a record that was added since the previous entry.
 
     Attributes:
         rows: Control steps, of type `columns.row_type`.
         events: New lines of the log.
-        unknown: Names used in actions so far that match no object.
+        unknown: All names in actions so far that do not match an object.
         checkpoints: New checkpoints.
         participant: State of the participant.
     """
@@ -69,10 +69,10 @@ _DECODER: msgspec.msgpack.Decoder[Header | JournalEntry] = msgspec.msgpack.Decod
 
 
 class Journal:
-    """A journal file open for appending by one process at a time. A missing file is created.
+    """A journal file, created if it is missing, which only one process can have open at a time.
 
     Attributes:
-        entries: The entries that were in the file when it was opened. Readers may clear this list to free memory.
+        entries: The entries that were in the file when it was opened. Clear this list to free memory.
 
     Raises:
         RecordError: The file is not a journal, or another process keeps it open.
@@ -97,7 +97,7 @@ class Journal:
             raise
 
     def append(self, entry: Header | JournalEntry) -> None:
-        """Append an entry, which is durable once `sync` returns. After an OSError the file is unchanged."""
+        """Append an entry, which is durable only after `sync`. An OSError leaves the file unchanged."""
         end, content = self.size, _encode(entry)
         try:
             _write(self._file, _HEAD.pack(len(content), zlib.crc32(content)) + content)
@@ -129,7 +129,7 @@ def read_entries(path: Path) -> tuple[Header | JournalEntry, ...]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a file to disk or, for a folder, the names of its files."""
+    """Flush a file, or the directory entries of a folder, to disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -157,7 +157,7 @@ def _intact(content: bytes, path: Path) -> tuple[tuple[Header | JournalEntry, ..
 
 
 def _lock(file: int, path: Path) -> None:
-    """Lock the file. Wait if another process has it open, such as a worker that is still shutting down."""
+    """Lock a journal file, and wait if another process still has it open."""
     until = time.monotonic() + LOCK_TIMEOUT_S
     while True:
         try:

@@ -1,4 +1,4 @@
-"""Objective measures of a trial, computed from its event log and trajectory (PAPER section 6, docs/metrics.md)."""
+"""Compute the objective measures of a trial from its event log and trajectory (PAPER section 6)."""
 
 import statistics
 from collections.abc import Mapping, Sequence
@@ -14,14 +14,14 @@ from experiments.record.records import PARTICIPANT, PHASE_ENDED, Event
 from mjsim.values.actions import EventKind
 from mjsim.values.motion_parameters import GROUPS
 
-REGRETFUL_M = 0.01  # a smaller regret counts as a tie
-COSTLY_M = 0.1  # `nd_regret_10cm` counts deviations with a larger regret
-# Fields of the start event that describe the record rather than the settings of the trial
+REGRETFUL_M = 0.01  # smallest regret that does not count as a tie
+COSTLY_M = 0.1  # regret above which `nd_regret_10cm` counts a deviation
+# Fields of the start event that are not settings of the trial
 PROVENANCE = {"t", "event", "format", "versions", "model", "world", "inputs", "episode_sha256", "order"}
 PROVENANCE |= {"person", "behaviour"}
-# Fields of `metrics.json` that log and trajectory do not determine. Only the checksum of the file protects them.
+# Fields of `metrics.json` that cannot be recomputed. Only the checksum of the file protects them.
 CIRCUMSTANCES = ("frames_sha256", "renderer", "wall_s")
-# Type of event that each metric counts
+# The type of event that each metric counts
 COUNTED = {
     "ejections": EventKind.EJECTED,
     "tunnellings": EventKind.TUNNELLED,
@@ -31,26 +31,26 @@ COUNTED = {
 
 @dataclass(frozen=True)
 class Metrics:
-    """Objective measures of one trial, defined in docs/metrics.md.
+    """The objective measures of a trial, which are defined in docs/metrics.md.
 
     Attributes:
         ended: Reason why the trial ended.
         delivered: Number of objects in their receptacle at the end.
         visits: Number of successful picks and places.
-        nd_strict_2n: Visits that differ from the suggested one, over twice the number of objects; None, as are the
-            other deviations and inverse path lengths, if no visit was made.
-        nd_feasible: Visits that differ from the suggested one, over the visits with a feasible alternative; 0 if there
-            was never a choice.
-        nd_bin_tied: As `nd_feasible`, but not counting which of two objects goes into the same bin first.
-        nd_regret_10cm: As `nd_feasible`, but counting only deviations with a regret above 0.1 m, over the visits with a
+        nd_strict_2n: Visits that differ from the suggested one, divided by twice the number of objects. Like
+            the other deviations and inverse path lengths, it is None if no visit was made.
+        nd_feasible: Visits that differ from the suggested one, divided by the number of visits with a
+            feasible alternative. It is 0 if there was never a choice.
+        nd_bin_tied: As `nd_feasible`, but the order in which objects go into the same bin is ignored.
+        nd_regret_10cm: Number of deviations with a regret above 0.1 m, divided by the number of visits with a
             known regret; None if no regret is known.
-        ipl_locations: The paper's inverse path length: distances between the locations (objects and bins) of
-            consecutive visits over the distance walked. It can exceed 1.
-        ipl_stand: Shortest walks between the positions at consecutive visits over the distance walked; at most 1.
+        ipl_locations: The paper's inverse path length, which can exceed 1. It is the total distance between
+            the locations (objects and bins) of consecutive visits, divided by the distance walked.
+        ipl_stand: Shortest walks between the positions at consecutive visits, divided by the distance walked.
         task_distance_m: Distance walked in metres.
         completion_time_s: Time in seconds until the last delivery, or until the end if objects are left.
-        completion_over_familiarisation: Completion time over the duration of the fly-through; None without a
-            fly-through.
+        completion_over_familiarisation: Completion time divided by the duration of the fly-through; None if
+            there was no fly-through.
         planned_distance_m: Length of the first plan in metres, from location to location. Reaching for objects makes
             the walk shorter.
         reach_bound_m: Lower bound in metres on the walking distance at maximum reach; None if nothing was planned.
@@ -62,7 +62,7 @@ class Metrics:
         total_regret_m: Sum of these regrets in metres, which is the extra walk caused by the order of visits; None if
             no regret is known.
         regretful_visits: Visits with a regret above 1 cm; None if no regret is known. The others are optimal or tied.
-        unjudged_visits: Visits with unknown regret, because the planner could not prove it or it was not computed.
+        unjudged_visits: Visits whose regret is unknown because it was not computed or could not be proved.
         mean_suggestion_gap_m: Mean regret of the suggested visits in metres; None if none is known. It measures the
             planner as `mean_regret_m` measures the person.
         max_suggestion_gap_m: Largest regret of a suggested visit in metres; None if none is known.
@@ -94,7 +94,7 @@ class Metrics:
 
 
 def measure(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    """Return the rows of `metrics.json` that follow from log and trajectory: settings, metrics, health of the physics.
+    """Return the part of `metrics.json` that can be computed from the event log and the trajectory.
 
     Args:
         events: The event log in order, from `start` to `end`.
@@ -118,7 +118,7 @@ def compute_metrics(events: Sequence[Event], positions: NDArray[np.float64]) -> 
     """Compute the metrics of a trial.
 
     Args:
-        events: The event log in order. If the last delivery ended the trial, its `end` has the time of the delivery.
+        events: The event log in order. If the last delivery ended the trial, `end` has the same time.
         positions: Floor position in metres at every control step, shape (T, 2).
     """
     visits = [e for e in events if e["event"] == "visit"]
@@ -206,17 +206,17 @@ def _regrets(events: Sequence[Event], visits: Sequence[Event], name: str) -> dic
 
 
 def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]) -> dict[str, float | int]:
-    """Summarize the health of the physics in a trial (docs/metrics.md).
+    """Summarize the errors of the physics simulation in a trial (docs/metrics.md).
 
-    Weld errors are sampled while a hand carries something, settling times once per release, and penetration at every
-    control step. A value without samples is 0.
+    Weld errors are sampled while a hand carries an object, settling times once per release, and penetration
+    at every control step. A value without samples is 0.
 
     Args:
         events: The event log.
         arrays: The trajectory, with the columns in `TRAJECTORY_COLUMNS`.
 
     Returns:
-        Rows of `metrics.json`: maximum, 99th percentile and mean of each quantity, and the number of faults.
+        The maximum, the 99th percentile and the mean of each quantity, and the number of faults, by name.
     """
     summary: dict[str, float | int] = {}
     for name in HEALTH:
@@ -235,10 +235,10 @@ def summarise_health(events: Sequence[Event], arrays: Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Displays:
-    """Quality of the display during a trial: medians over its `display` events, which are logged every 5 s.
+    """The display quality of a trial, as medians over its `display` events, which are logged every 5 s.
 
     Attributes:
-        drawn_by_browser: Share of these events in which the browser drew the view. Otherwise it showed server frames.
+        drawn_by_browser: Share of events in which the browser, and not the server, drew the view.
         display_renderer: Most frequent renderer.
         display_width: Width of the view in CSS pixels.
         display_height: Height of the view in CSS pixels.
@@ -263,7 +263,7 @@ class Displays:
 
 
 def displays(events: Sequence[Event]) -> dict[str, Any]:
-    """Return the columns of `Displays` for an event log, or an empty dictionary if it has no `display` events."""
+    """Return the display quality of a trial, or an empty dictionary if it was not logged."""
     reports = [event for event in events if event["event"] == "display"]
     if not reports:
         return {}

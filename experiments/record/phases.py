@@ -1,18 +1,18 @@
-"""Names of phases, origins of recorded runs, and reasons why a session ended."""
+"""Constants for the phases of a visit, the origin of a run, and the reason why a session ended."""
 
 from collections.abc import Iterable
 
 from experiments.errors import ConfigError
 
 STORY, FLYTHROUGH, TRAINING, TASK = PHASES = ("story", "flythrough", "training", "task")
-HUMAN = "human"  # name that stands for any human participant
-REHEARSAL = "rehearsal"  # name of the simulated participants in `mjsim study rehearse`
+HUMAN = "human"  # participant name that all humans have
+REHEARSAL = "rehearsal"  # name of all simulated participants in `mjsim study rehearse`
 REHEARSED = "Rehearsed, with answers drawn at random"
 SIMULATED, PARTLY_SIMULATED, RECORDED = "Simulated", "Partly simulated", "Recorded from people"
 
 
 def phases_of(text: str) -> tuple[str, ...]:
-    """Parse a list of phases in order, including the task, such as `flythrough,task`."""
+    """Parse a comma-separated list of phases that ends with the task, such as `flythrough,task`."""
     names = tuple(part.strip() for part in text.split(","))
     unknown = [name for name in names if name not in PHASES]
     if unknown:
@@ -30,7 +30,7 @@ def is_simulated(user: object) -> bool:
 
 
 def origin_of(users: Iterable[object]) -> str:
-    """Return the origin of trials by these participants, such as `Simulated` or `Recorded from people`."""
+    """Return a label for the origin of trials, such as `Simulated` or `Recorded from people`."""
     users = set(users)
     if users == {REHEARSAL}:
         return REHEARSED
@@ -45,8 +45,8 @@ PHYSICS_ERROR = "physics error"
 ERROR = "error"  # any other error, for example in a custom participant
 
 COMPLETE = (ALL_DELIVERED, TIME_LIMIT)
-BROKEN_OFF = (INTERRUPTED, ERROR)  # the last recorded control step may be incomplete
+BROKEN_OFF = (INTERRUPTED, ERROR)  # reasons that can leave the last control step incomplete
 
 
-class LeaveSession(BaseException):  # not an Exception, so that error handlers do not catch it
+class LeaveSession(BaseException):  # not an Exception, so error handlers do not catch it
     """Raised by a participant or a viewer to leave a session early. This is not a failure."""

@@ -1,4 +1,4 @@
-"""Reads the record of a session from a run directory or a journal."""
+"""Read the record of a session from a run directory or a journal."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -37,7 +37,7 @@ from mjsim.world.state import WorldState
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """The record of a session: the four files of a run directory from which all others can be computed.
+    """The record of a session, from which all other files of a run directory can be computed.
 
     Attributes:
         log: Content of `events.jsonl`.
@@ -58,7 +58,7 @@ class Record:
 
     @cached_property
     def steps_of_events(self) -> list[int]:
-        """Control step at which each event was logged."""
+        """The control step at which each event was logged."""
         steps = np.searchsorted(self.recording["log_size"][:-1], self._offsets, side="right") - 1
         return [int(step) for step in np.maximum(0, steps)]
 
@@ -89,7 +89,7 @@ class Record:
 
     @cached_property
     def person(self) -> PersonParameters:
-        """Parameters of the participant's body, including drawn values."""
+        """The parameters of the participant's body, including randomly drawn values."""
         try:
             logged = next(event for event in self.events if event["event"] == records.PARTICIPANT)
             return PersonParameters.from_dict(logged["person"])
@@ -99,12 +99,12 @@ class Record:
 
     @property
     def steps(self) -> int:
-        """Number of recorded control steps, plus one for the final state."""
+        """The number of recorded control steps, plus one for the final state."""
         return len(self.recording["state_hash"])
 
     @property
     def reason(self) -> str | None:
-        """Reason why the session ended, or None if it has not ended."""
+        """The reason why the session ended, or None if it has not ended."""
         return str(self.end.get("reason")) if self.end["event"] == "end" else None
 
     @cached_property
@@ -112,12 +112,12 @@ class Record:
         return tuple(placed.name for placed in self.episode.objects)
 
     def action(self, step: int) -> StepAction:
-        """Return the action of a control step. Raises `RecordError` if its row is invalid."""
+        """Return the action in a control step. Raises `RecordError` if the recorded action is invalid."""
         unknown = map(str, self.trajectory["unknown_objects"])
         return decode_action(self.trajectory["action"][step], [*self.names, *unknown])
 
     def observation(self, step: int) -> Observation:
-        """Return the state before a control step.
+        """Return the observation before a control step.
 
         Eye height and velocity are not recorded and have nominal values. The assistant does not use them.
         """
@@ -140,23 +140,23 @@ class Record:
 
     @property
     def checkpoint_steps(self) -> list[int]:
-        """Control steps before which there is a checkpoint, in ascending order."""
+        """The control steps at which a checkpoint was taken, in ascending order."""
         return [int(step) for step in self.recording["checkpoint_step"]]
 
     def checkpoint(self, step: int) -> WorldState:
-        """Return the checkpoint before a control step."""
+        """Return the checkpoint that was taken before the given control step."""
         number = self.checkpoint_steps.index(step)
         physics, details = (self.recording[f"checkpoint_{part}"][number] for part in ("physics", "details"))
         return WorldState.from_json(physics, str(details))
 
     def checkpoint_before(self, time: float) -> int | None:
-        """Return the control step of the last checkpoint at or before a time in seconds, or None."""
+        """Return the control step of the last checkpoint up to a time in seconds, or None if none exists."""
         times = self.trajectory["time"]
         return max((step for step in self.checkpoint_steps if times[step] <= time + 1e-9), default=None)
 
 
 def same_record(one: Record, other: Record) -> bool:
-    """Compare two records bit for bit, except for the state of the participant."""
+    """Return True if two records are identical bit for bit, apart from the state of the participant."""
 
     def content(record: Record) -> list[Any]:
         arrays = [*record.trajectory.items(), *record.recording.items()]
@@ -174,7 +174,7 @@ def assemble(
     checkpoints: Mapping[int, WorldState],
     participant: Any = None,
 ) -> Record:
-    """Build a record. `rows` have type `columns.row_type`. `unknown` lists names in actions that match no object."""
+    """Build a record from its parts. `rows` is an array of type `columns.row_type`."""
     trajectory = {name: np.ascontiguousarray(rows[name]) for name in TRAJECTORY_COLUMNS}
     log_size, log_hash = log.at([*rows["logged"], log.entries])
     recording = {
@@ -182,7 +182,7 @@ def assemble(
         "action_hash": action_hashes(trajectory["action"]),
         "log_size": log_size,
         "log_hash": log_hash,
-        # An interrupted session can have a checkpoint whose control step was not recorded.
+        # If a session was interrupted, it can have a checkpoint at a control step that was not recorded.
         **checkpoint_arrays({step: state for step, state in checkpoints.items() if step < len(rows)}),
     }
     names = {"unknown_objects": np.array(unknown, np.str_)}
@@ -190,7 +190,7 @@ def assemble(
 
 
 def read_journal(entries: Sequence[Header | JournalEntry]) -> Record:
-    """Build a record from a journal. The session may be unfinished, but the journal must not be empty."""
+    """Build a record from the entries of a journal. The session may be unfinished."""
     if not entries or not isinstance(entries[0], Header):
         raise RecordError("the journal is empty")
     episode, log = Episode.from_json(entries[0].episode), EventLog()
@@ -207,7 +207,7 @@ def read_journal(entries: Sequence[Header | JournalEntry]) -> Record:
 
 
 def read_run(directory: Path) -> Record:
-    """Read the record of a run directory without verifying it (see `verify`).
+    """Read the record in a run directory without verifying it.
 
     Raises:
         RecordError: The folder is not a run directory.
@@ -225,7 +225,7 @@ def read_run(directory: Path) -> Record:
 
 
 def read_log(directory: Path) -> bytes:
-    """Read the log of a run directory.
+    """Read the event log of a run directory.
 
     Raises:
         RecordError: The folder is not a run directory.

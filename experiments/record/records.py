@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import RecordError
 from mjsim.support.files import read_text
 
-# Log format 2 added state hashes, 3 the health of the physics, 4 typed checkpoints, 5 distances between visits, ties
-# and suggestion gaps, 6 the participant, and 7 groups of person parameters.
+# Additions by version: 2 state hashes, 3 physics errors, 4 typed checkpoints, 5 distances between visits,
+# ties and suggestion gaps, 6 the participant, 7 groups of person parameters
 LOG_FORMAT = 7
 FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = (
     "episode.json",
@@ -26,28 +26,25 @@ FILES = EPISODE, EVENTS, TRAJECTORY, RECORDING, METRICS, PLAN, TOPDOWN, VIDEO = 
     "video.mp4",
 )
 PARTICIPANT = "participant"  # event with the parameters of the participant's body
-PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events of phases before the task
-TRAINING = "training"  # run directory of the training, inside that of the task
+PHASE_BEGUN, PHASE_ENDED = "phase_begun", "phase_ended"  # events that mark the phases before the task
+TRAINING = "training"  # name of the training's run directory within the task's
 
 
 Event = Mapping[str, Any]
 
 
 class EventLog:
-    """The events of a session, in order."""
+    """The events of a session, in the order in which they occurred."""
 
     def __init__(self) -> None:
         self._lines: list[dict[str, Any]] = []
 
     def append(self, time: float, event: str, **fields: Any) -> None:
-        """Log an event at a simulated time in seconds. The fields must be JSON values.
-
-        Raises a `RecordError` if a field is not valid JSON, such as NaN.
-        """
+        """Log an event at a simulated time in seconds. Raises `RecordError` if a field is not valid JSON."""
         self.fill(self.reserve(), time, event, **fields)
 
     def fill(self, line: dict[str, Any], time: float, event: str, **fields: Any) -> None:
-        """Fill in a reserved line. Raises a `RecordError` if a field is not valid JSON, such as NaN."""
+        """Write an event to a reserved line. Raises `RecordError` if a field is not valid JSON."""
         entry = {"t": round(time, 6), "event": event, **fields}
         try:
             json.dumps(entry, allow_nan=False)
@@ -56,7 +53,7 @@ class EventLog:
         line.update(entry)
 
     def reserve(self) -> dict[str, Any]:
-        """Reserve a line for an event that is filled in later. A line that remains empty is not written."""
+        """Reserve a line for an event that is added later. A line that stays empty is not written."""
         self._lines.append({})
         return self._lines[-1]
 
@@ -66,23 +63,23 @@ class EventLog:
 
     @property
     def content(self) -> bytes:
-        """All filled-in lines as JSON, encoded in ASCII."""
+        """The log as JSON lines in ASCII, without empty lines."""
         return b"".join(map(_encoded, self._lines))
 
     @property
     def entries(self) -> int:
-        """Number of lines, including reserved ones."""
+        """The number of lines, including reserved lines."""
         return len(self._lines)
 
     @property
     def event_counts(self) -> NDArray[np.int64]:
-        """Number of filled-in lines among the first k lines, for each k from 0 to `entries`, shape (entries + 1,)."""
+        """The number of events in the first k lines, for each k from 0 to `entries`, shape (entries + 1,)."""
         return np.cumsum([0, *map(bool, self._lines)])
 
     def at(self, entries: list[int]) -> tuple[NDArray[np.int64], NDArray[np.uint64]]:
-        """Return the size in bytes and the hash of the log after each number of lines in `entries`, both of shape (n,).
+        """Return the size in bytes and the hash of the first k lines of the log, for each k in `entries`.
 
-        The hash is the first 64 bits of SHA-1.
+        Both arrays have shape (n,). The hash consists of the first 64 bits of SHA-1.
         """
         texts = [b"", *map(_encoded, self._lines)]
         digest, hashes = hashlib.sha1(usedforsecurity=False), list[bytes]()
@@ -101,7 +98,7 @@ def _encoded(line: Event) -> bytes:
 
 
 def read_events(path: Path) -> list[Event]:
-    """Read an event log. Raises a `RecordError` if the file is missing or a line is not JSON."""
+    """Read an event log. Raises `RecordError` if the file is missing or a line is not valid JSON."""
     try:
         lines = read_text(path).splitlines()
     except OSError as error:

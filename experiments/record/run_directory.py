@@ -1,4 +1,4 @@
-"""Output paths of commands. Existing files are kept, and a run directory is either complete or absent."""
+"""Check the output paths of commands, and create run directories atomically."""
 
 import os
 import shutil
@@ -12,13 +12,13 @@ from experiments.record import records
 from experiments.record.files import CHECKSUMS, write_checksums
 from mjsim.support.files import exchange, work_folder
 
-SHOWN_NAMES = 3  # maximum number of existing files named in an error
-# Number of folders inspected in a batch, because inspecting all is slow on a network file system
+SHOWN_NAMES = 3  # maximum number of existing files that are named in an error
+# Maximum number of folders that are inspected in a batch, because network file systems are slow
 SAMPLE = 100
-TRIALS = "trials"  # subfolder of a batch that contains its runs
-PACKED = ".sqlar"  # suffix of an archive of runs
-VISIT = "visit.json"  # name of a file in the folder of each visit to `mjsim play`
-JOURNALS = "journals"  # subfolder of a visit that contains its journals
+TRIALS = "trials"  # name of the subfolder of a batch that contains the runs
+PACKED = ".sqlar"  # file suffix of an archive that contains runs
+VISIT = "visit.json"  # name of the file that describes a visit to `mjsim play`
+JOURNALS = "journals"  # name of the subfolder of a visit that contains the journals
 
 
 def is_run(directory: Path) -> bool:
@@ -32,7 +32,7 @@ def is_batch(directory: Path) -> bool:
         return False
     with os.scandir(trials) as entries:
         inside = [entry for entry in entries if PACKED in entry.name or not entry.name.startswith(".")]
-    if not inside:  # a batch that was killed during its first trials has no table
+    if not inside:  # a batch that was killed during its first trials has no tables
         return not list(directory.glob(f"{TRIALS}.*"))
     folders = [entry for entry in inside if PACKED not in entry.name]
     sample = (Path(entry) for entry in folders[:SAMPLE])
@@ -40,21 +40,21 @@ def is_batch(directory: Path) -> bool:
 
 
 def visit_folders(directory: Path) -> list[Path]:
-    """List the visits in a folder of `mjsim play`, or in several such folders, by name."""
+    """Return the folders of all visits in one or several output folders of `mjsim play`, sorted by name."""
     found = (path for depth in ("*", "*/*") for path in directory.glob(f"{depth}/{VISIT}"))
     return sorted(path.parent for path in found)
 
 
 def check_run_directory(path: Path, *, replace: bool = False) -> Path:
-    """Check that a run may be written to `path`. Return the path with links resolved.
+    """Check that a run may be written to a path. Return the path with symbolic links resolved.
 
     Args:
         path: The path.
-        replace: Allow an earlier run in `path`.
+        replace: True if an earlier run may be replaced.
 
     Raises:
-        RecordError: `path` contains something else. The message explains what to do.
-        OSError: The path cannot be used: it is too long, below a file, or not readable.
+        RecordError: The path contains other files. The message explains what to do.
+        OSError: The path cannot be used because it is too long, below a file, or not readable.
     """
     place = _place(path)
     if not place.exists():
@@ -81,10 +81,10 @@ def check_run_directory(path: Path, *, replace: bool = False) -> Path:
 
 
 def check_batch_folder(path: Path) -> None:
-    """Check that a batch may be written to `path`, or added to an existing one.
+    """Check that a batch may be written to a folder, which may already contain an earlier batch.
 
     Raises:
-        RecordError: `path` contains something else.
+        RecordError: The folder contains other files.
         OSError: The folder cannot be written.
     """
     place = _place(path)
@@ -99,7 +99,7 @@ def check_batch_folder(path: Path) -> None:
 
 
 def check_file(path: Path, *, replace: bool = False) -> None:
-    """Check that a file may be written to `path`.
+    """Check that a file may be written to a path.
 
     Raises:
         RecordError: `path` exists and cannot be replaced.
@@ -115,14 +115,14 @@ def check_file(path: Path, *, replace: bool = False) -> None:
 
 @contextmanager
 def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = None) -> Iterator[Path]:
-    """Yield a working folder that is moved to `path` at the end of the block, even after an error.
+    """Yield a temporary folder that becomes the run directory at the end of the block, even after an error.
 
-    A folder without metrics is deleted instead.
+    The folder is deleted instead if it contains no metrics.
 
     Args:
         path: Path of the run directory.
-        replace: Allow an earlier run in `path`, which is replaced.
-        scratch: Parent of the working folder (default: that of `path`).
+        replace: True if an earlier run may be replaced.
+        scratch: Parent of the temporary folder (default: the parent of `path`).
 
     Raises:
         RecordError: `path` exists and cannot be replaced. If it appeared during the run, the run is saved next to it.
@@ -139,9 +139,9 @@ def run_directory(path: Path, *, replace: bool = False, scratch: Path | None = N
 
 
 def add_files(folder: Path, path: Path) -> None:
-    """Atomically add the files of a working folder to a run directory, and update its checksums.
+    """Atomically add the files of a temporary folder to a run directory, and update its checksums.
 
-    Afterwards the working folder contains the previous run directory.
+    Afterwards, the temporary folder contains the previous version of the run directory.
     """
     place = Path(os.path.realpath(path))
     shutil.copytree(place, folder, copy_function=link_or_copy, dirs_exist_ok=True)
@@ -150,7 +150,7 @@ def add_files(folder: Path, path: Path) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """Return `path` or, if it exists, `path` followed by the first free number."""
+    """Return `path`, or if it exists, `path` followed by the first free number."""
     number, free = 1, path
     while os.path.lexists(free):
         number += 1
@@ -181,7 +181,7 @@ def link_or_copy(source: str, target: str) -> None:
 
 @contextmanager
 def _folder(folder: Path) -> Iterator[None]:
-    """Create `folder` and its parents. Afterwards, remove those that are empty."""
+    """Create a folder and its parents, and remove those that are still empty at the end of the block."""
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
@@ -198,7 +198,7 @@ def _place(path: Path) -> Path:
         raise RecordError(f"{path} is a dangling symbolic link; remove it or choose another --out")
     place = Path(os.path.realpath(path))
     with suppress(FileNotFoundError, NotADirectoryError):
-        place.stat()  # from Python 3.14 on, `exists` returns False for a name that is too long
+        place.stat()  # since Python 3.14, `exists` returns False for names that are too long
     return place
 
 
@@ -210,7 +210,7 @@ def _existing(folder: Path) -> Path:
 
 def _check_writable(folder: Path) -> None:
     try:
-        with tempfile.TemporaryFile(dir=folder):  # a temporary file without a name cannot be left behind
+        with tempfile.TemporaryFile(dir=folder):  # an unnamed file is never left behind
             pass
     except OSError as error:
         raise OSError(error.errno, f"cannot be written to ({error.strerror})", str(folder)) from error

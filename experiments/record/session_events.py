@@ -1,4 +1,4 @@
-"""Types of session events: start and end, phases, clock and display."""
+"""Types of the events that concern a whole session, such as its start, its phases and its display."""
 
 from typing import Annotated, Literal
 
@@ -15,7 +15,7 @@ def _tag(class_name: str) -> str:
 class LoggedEvent(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="event", tag=_tag, kw_only=True
 ):
-    """A line of the log.
+    """A line of the event log.
 
     Attributes:
         t: Simulated time in seconds.
@@ -25,23 +25,23 @@ class LoggedEvent(
 
 
 class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
-    """First line of the log. It also contains the settings of the trial, as in `metrics.json`.
+    """The first line of the log. It also contains all settings of the trial, as in `metrics.json`.
 
     Attributes:
         format: Version of the log format.
         versions: Versions of mjsim, its physics code, MuJoCo and NumPy, and the machine's architecture.
-        model: Fingerprint of the compiled house with its objects, without purely visual parts.
-        world: Options of the world: timestep, capacity, grip, fidelity.
+        model: Fingerprint of the compiled model of the house and its objects, without purely visual parts.
+        world: Options of the simulated world: timestep, capacity, grip and fidelity.
         fingerprint: Hash of the settings and of `inputs`.
-        inputs: Hashes or versions of the trial's other dependencies: house, code, libraries.
+        inputs: Hashes or versions of the trial's other dependencies: the house, the code and libraries.
         episode_sha256: SHA-256 of `episode.json`.
-        order: Object names in the participant's random order.
+        order: Names of the objects in the participant's random order.
         objects: Number of misplaced objects.
         assistance: Assistance condition.
         house: House name, or path of its catalogue.
         time_limit: Simulated time in seconds after which the trial ends.
-        rooms: Number of rooms; None in older records.
-        area_m2: Floor area of the rooms in square metres; None in older records.
+        rooms: Number of rooms, or None in older records.
+        area_m2: Floor area of the rooms in square metres, or None in older records.
     """
 
     format: int
@@ -61,13 +61,13 @@ class StartEvent(LoggedEvent, frozen=True, forbid_unknown_fields=False):
 
 
 class ParticipantEvent(LoggedEvent, frozen=True):
-    """Second line of the log, which describes the participant.
+    """The second line of the log, which describes the participant.
 
     Attributes:
         user: Name of the participant model.
-        person: Parameters of the person, drawn values included, by name. Those of the hands are grouped under `motion`
-            (docs/participants.md).
-        behaviour: Parameters drawn for the participant model, by name; absent if the model has none.
+        person: Parameters of the person by name, including randomly drawn values. The parameters of the hands
+            are grouped under `motion` (docs/participants.md).
+        behaviour: Parameters drawn for the participant model, by name. Absent if the model has none.
     """
 
     user: str
@@ -76,7 +76,7 @@ class ParticipantEvent(LoggedEvent, frozen=True):
 
 
 class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
-    """Start of a phase before the task. The task clock remains at 0.
+    """A phase before the task began. The task clock stays at 0.
 
     Attributes:
         phase: `story`, `flythrough` or `training`.
@@ -86,14 +86,14 @@ class PhaseBegunEvent(LoggedEvent, frozen=True, tag="phase_begun"):
 
 
 class PhaseEndedEvent(LoggedEvent, frozen=True, tag="phase_ended"):
-    """End of a phase before the task.
+    """A phase before the task ended.
 
     Attributes:
         phase: As in `phase_begun`.
-        duration_s: Time in seconds spent reading, watching, or training.
-        bins: In a simulated participant's fly-through: time in seconds at which each receptacle came into view.
+        duration_s: Time in seconds that the participant spent reading, watching or training.
+        bins: Time in seconds at which each receptacle came into view. Only in simulated fly-throughs.
         reason: Reason why the training ended, as in `end`. Its record is in the run directory `training`.
-        attempts: Attempts at the questions about the story. Only in logs from before version 0.3.
+        attempts: Number of attempts at the questions about the story. Only in logs from before version 0.3.
     """
 
     phase: Literal["story", "flythrough", "training"]
@@ -107,7 +107,7 @@ class StartedEvent(LoggedEvent, frozen=True):
     """The participant started the clock. The task is hidden until then.
 
     Attributes:
-        waited_s: Wall time in seconds for which the session had waited for the start.
+        waited_s: Wall time in seconds that the session spent waiting for the start.
         wall: Unix time in seconds.
     """
 
@@ -166,10 +166,10 @@ class OverrunEvent(LoggedEvent, frozen=True):
 
 
 class DisplayEvent(LoggedEvent, frozen=True):
-    """Quality of the display over the last 5 s, as measured by the page.
+    """The page measured the quality of the display over the last 5 s.
 
     Attributes:
-        draw: Whether the browser drew the view or showed frames from the server.
+        draw: `browser` if the browser drew the view, or `server` if it showed frames from the server.
         renderer: Name of the renderer.
         width: Width of the view in CSS pixels.
         height: Height of the view in CSS pixels.
@@ -177,8 +177,8 @@ class DisplayEvent(LoggedEvent, frozen=True):
         frames_per_s: Frames shown per second.
         frame_ms: Median time between two frames in milliseconds.
         frame_ms_95: 95th percentile of the time between two frames in milliseconds.
-        latency_ms: Median time, in ms, from an input to the frame that shows it or, if the browser draws, to the
-            server's state that includes it; null if nothing was pressed.
+        latency_ms: Median time in milliseconds from an input to the frame that shows it. If the browser
+            draws, the time to the server's state that includes the input. It is null if nothing was pressed.
         dropped: Number of received frames that were not shown.
         wall: Unix time in seconds.
         field_of_view: Horizontal field of view in radians; null if the person cannot choose it.
@@ -202,9 +202,9 @@ class DrawEvent(LoggedEvent, frozen=True):
     """Rendering moved to the server because the browser cannot draw.
 
     Attributes:
-        draw: The new renderer's side.
-        reason: Reason why the other side stopped: `slow` (below 20 frames per second), `context lost`, or the
-            missing feature.
+        draw: `browser` or `server`, depending on which of them draws from now on.
+        reason: Reason why the other side stopped drawing: `slow` (below 20 frames per second), `context
+            lost`, or the missing feature.
         wall: Unix time in seconds.
     """
 
@@ -214,7 +214,7 @@ class DrawEvent(LoggedEvent, frozen=True):
 
 
 class EndEvent(LoggedEvent, frozen=True):
-    """Last line of the log.
+    """The last line of the log.
 
     Attributes:
         reason: Reason why the trial ended.

@@ -1,4 +1,4 @@
-"""Verifies a record without simulating it: lengths, hashes, derived files and checksums."""
+"""Verify the lengths, hashes, derived files and checksums of a record without simulating the run."""
 
 import hashlib
 import json
@@ -21,11 +21,11 @@ from mjsim.world.state import checkpoint_hash
 
 @dataclass(frozen=True)
 class Mismatch:
-    """A difference that the verification of a record has found.
+    """A difference that was found while verifying a record.
 
     Attributes:
-        step: First control step concerned.
-        message: Description.
+        step: First control step that is affected.
+        message: Description of the difference.
         file: Name of the file that differs.
     """
 
@@ -35,13 +35,13 @@ class Mismatch:
 
 
 def damage(record: Record) -> list[Mismatch]:
-    """Check the lengths and hashes within a record. Return the mismatches, sorted by control step."""
+    """Check the lengths and hashes in a record. Return the mismatches, sorted by control step."""
     checks = (_lengths, _actions, _log, _checkpoints, _lines, _settings)
     return sorted((m for check in checks for m in check(record)), key=lambda mismatch: mismatch.step)
 
 
 def derived_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
-    """Compare the plans and metrics on disk with those computed from a verified record. Yield the mismatches."""
+    """Yield the differences between the stored plans and metrics and those computed from the record."""
     plans = record.plans
     yield from _derived(directory, record, records.PLAN, lambda found: _plan_fault(found, plans))
     yield from _derived(directory, record, records.METRICS, lambda found: _metrics_fault(found, record))
@@ -65,7 +65,7 @@ def checksum_mismatches(directory: Path, record: Record) -> Iterator[Mismatch]:
 
 
 def check_log(directory: Path) -> None:
-    """Check the format of a log and the fields of all its events.
+    """Check the format of an event log and the fields of all events.
 
     Raises:
         RecordError: The folder is not a run directory, or an event is invalid.
@@ -196,5 +196,5 @@ def _metrics_fault(found: Any, record: Record) -> str | None:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Compare two values as JSON, where 1, 1.0 and true differ."""
+    """Return True if two values are equal as JSON, where 1, 1.0 and true are different values."""
     return json.dumps(one) == json.dumps(other)

@@ -1,4 +1,4 @@
-"""Writes the record of a running session, and the run directory of a finished session."""
+"""Record a running session, and write the run directory of a finished session."""
 
 import dataclasses
 import json
@@ -28,14 +28,14 @@ from mjsim.world.health.monitor import HealthSample
 from mjsim.world.state import CHECKPOINT_PERIOD, WorldState, engine_versions, model_fingerprint
 from mjsim.world.world import World
 
-FIRST_CAPACITY = 4096  # number of rows allocated at first, doubled when full
+FIRST_CAPACITY = 4096  # initial number of allocated rows, which is doubled when all are used
 NOTHING_FILMED = "none: nothing was filmed"  # value of `renderer` in a run without a film
 
 
 class RecordWriter:
-    """The record of a running session.
+    """A writer for the record of a running session.
 
-    A session takes a checkpoint at the first control step at which the world is not busy and `CHECKPOINT_PERIOD` has
+    A checkpoint is taken at the first control step at which the world is not busy and `CHECKPOINT_PERIOD` has
     passed since the previous checkpoint. A replay takes checkpoints at the same steps as the original run.
 
     Args:
@@ -70,7 +70,7 @@ class RecordWriter:
         self._status: tuple[tuple[ObjectStatus, ...], list[int]] = ((), [])
 
     def restore(self, record: Record, step: int) -> None:
-        """Continue a record at a control step. The log keeps its earlier events, but earlier rows are not kept."""
+        """Continue a record at a control step. The log keeps earlier events, but earlier rows are dropped."""
         self.log.restore(record.events[: record.events_before(step)])
         self.step, self._length, self._committed = step, 0, self.log.entries
         self._last_checkpoint = max((k for k in record.checkpoint_steps if k <= step), default=0)
@@ -82,7 +82,7 @@ class RecordWriter:
 
         Args:
             before: State before the first step.
-            health: Health of the physics before the first step.
+            health: Physics errors before the first step.
             state_hash: Hash of the state before the first step.
             steps: The steps.
         """
@@ -108,15 +108,15 @@ class RecordWriter:
         self._length, self.step = (
             end,
             self.step + len(steps),
-        )  # set last, so that an interruption leaves only complete rows
+        )  # set last so that an interruption leaves only complete rows
 
     @property
     def last_state_hash(self) -> int:
-        """Hash of the state before the most recent control step."""
+        """The hash of the state before the most recent control step."""
         return int(self._columns["state_hash"][self._length - 1])
 
     def pass_checkpoint(self, world: World, now: Observation) -> Observation:
-        """Take a checkpoint if one is due, and restore the world from it. Return the new observation, or else `now`."""
+        """Take a checkpoint if one is due, and restore the world from it. Return the current observation."""
         if not self._due(world, now.busy):
             return now
         state = self.checkpoints[self.step] = world.state()
@@ -146,7 +146,7 @@ class RecordWriter:
         self.checkpoints.clear()
 
     def record(self) -> Record:
-        """Return the record so far. Data already in the journal are not included."""
+        """Return the record so far, without the data that are already in the journal."""
         return assemble(self._episode, self._rows[: self._length], self.log, self._unknown, self.checkpoints)
 
     def _due(self, world: World, busy: bool) -> bool:
@@ -185,7 +185,7 @@ def _period(world: World) -> int:
 
 
 def provenance(world: World) -> dict[str, Any]:
-    """Return as JSON values the versions, the compiled model and the world options on which a run depends."""
+    """Return the software versions, model fingerprint and world options on which a run depends, as JSON."""
     return {
         "versions": engine_versions(),
         "model": model_fingerprint(world.scene.counterpart(visuals=False).model),
@@ -202,15 +202,15 @@ def save_record(
     frames_sha256: str | None = None,
     renderer: str = NOTHING_FILMED,
 ) -> dict[str, Any]:
-    """Write the record of a session and its metrics to a working folder. Return the metrics.
+    """Write the record of a session and its metrics to a temporary folder. Return the metrics.
 
     Args:
-        folder: Working folder, which becomes the run directory.
+        folder: Temporary folder, which becomes the run directory.
         out: Path of the run directory.
         record: The record.
         wall: Wall time of the trial in seconds.
         frames_sha256: Hash of the filmed frames, or None.
-        renderer: Renderer of these frames.
+        renderer: Name of the renderer of these frames.
 
     Raises:
         RecordError: The folder cannot be written. The message names the path where the record was saved instead.
@@ -225,7 +225,7 @@ def save_record(
     try:
         _write(folder, record, metrics)
     except OSError as error:
-        if record.participant is not None:  # the record was read from a journal, which still contains it
+        if record.participant is not None:  # the record is still in the journal
             raise
         shutil.rmtree(folder, ignore_errors=True)
         metrics["frames_sha256"] = None
@@ -238,7 +238,7 @@ def _write(folder: Path, record: Record, metrics: dict[str, Any]) -> None:
     record.episode.save(folder / records.EPISODE)
     with replacing(folder / records.EVENTS) as path:
         path.write_bytes(record.log)
-    # Sessions of human participants are long enough to justify the slower compression, unlike short trials of a batch.
+    # Use the slower compression for sessions of human participants, which are longer than trials of a batch.
     played = record.participant is not None
     save_arrays(folder / records.TRAJECTORY, record.trajectory, small=played)
     save_arrays(folder / records.RECORDING, record.recording, small=played)

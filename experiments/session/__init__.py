@@ -1,4 +1,4 @@
-"""A session: the loop of participant, assistant and world, the participant's percept, and films.
+"""Sessions, in which a participant and an assistant act in the simulated world, and films of sessions.
 
-Trials, replays and the browser's worker run the same `Session`.
+Trials, replays and browser sessions all use the class `Session`.
 """

@@ -1,4 +1,4 @@
-"""The assistant, which plans with full knowledge of the house and determines the content of the HUD."""
+"""The assistant, which plans with full knowledge of the house and determines what the HUD shows."""
 
 import functools
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ VISIT_KIND = {EventKind.PICKED: VisitKind.PICK, EventKind.PLACED: VisitKind.PLAC
 
 
 class Assistant:
-    """Passes the state of the task to the planner, and its plans to the assistance condition.
+    """An assistant that passes task states to the planner and plans to the assistance condition.
 
     Attributes:
         shown_roles: Roles of the markers that the condition shows at the start of the task.
@@ -76,7 +76,7 @@ class Assistant:
             self._planner.settle()
 
     def observe(self, observation: Observation, events: Sequence[WorldEvent]) -> None:
-        """Process the last control step and its events. Make a new plan if the person has left the current one."""
+        """Process the last control step and its events, and make a new plan if necessary."""
         for event in events:
             if event.kind in VISIT_KIND:
                 made = Visit(VISIT_KIND[event.kind], event.object)
@@ -94,11 +94,11 @@ class Assistant:
 
     @property
     def expecting(self) -> bool:
-        """True if a better plan may arrive at any moment, so that the assistant must observe every control step."""
+        """True if a better plan may arrive at any time. The assistant then observes every control step."""
         return self._planner.pending
 
     def observe_walk(self, positions: NDArray[np.float64], observation: Observation) -> None:
-        """Process a walk without events. The result is the same as if `observe` were called at every step.
+        """Process a walk without events. The result is the same as calling `observe` at every step.
 
         Args:
             positions: Position of the person in metres after every control step, shape (n, 2).
@@ -133,7 +133,7 @@ class Assistant:
     def hud_state(self, observation: Observation, camera: CameraView | None = None) -> HudState:
         """Return the current HUD state.
 
-        With `camera`, the eye camera, a condition can point towards a goal that is out of view.
+        If the eye camera `camera` is given, conditions can point to a goal that is out of view.
         """
         view = self._board.view(
             observation,
@@ -153,7 +153,7 @@ class Assistant:
         return Guidance(visit, shown.points, self._goal(observation, visit), TOLERANCE)
 
     def choices(self, observation: Observation) -> tuple[Choice, ...]:
-        """Return the possible next visits, best first. The result is empty until their regrets have been computed."""
+        """Return the possible next visits, best first, or an empty tuple if their regrets are not ready."""
         return tuple(
             Choice(
                 visit,
@@ -166,7 +166,7 @@ class Assistant:
         )
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not yet computed when their visits were logged."""
+        """Log the regrets that had not been computed yet when the visits were logged."""
         self._log.finish(time)
 
     def task_state(self, observation: Observation) -> TaskState:
@@ -214,7 +214,7 @@ class Assistant:
 
 
 def deliveries(house: House, episode: Episode) -> dict[str, XY]:
-    """Return, for each object name, the position in metres where a person stands to deliver the object."""
+    """Return the positions in metres where a person stands to deliver the objects, by object name."""
     return {name: _xy(house.receptacles[key].approach) for name, key in episode.targets.items()}
 
 

@@ -1,4 +1,4 @@
-"""The camera path of the fly-through, which visits all rooms and looks at each bin."""
+"""Compute the camera path of the fly-through, which visits all rooms and shows all bins."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,9 +19,9 @@ EYE_HEIGHT = PersonParameters().eye_height
 STEP = 0.04  # time between two camera poses, in seconds
 SPEED = 1.3  # walking speed in m/s
 TURNING = math.radians(75.0)  # turning speed in rad/s
-LOOK_AHEAD = 0.8  # how far ahead on its path the moving camera looks, in metres
+LOOK_AHEAD = 0.8  # distance ahead on the path at which the moving camera looks, in metres
 BIN_TIME = 2.0  # how long the camera looks at each bin, in seconds
-# Distances in metres from the end of the path to a bin, tried until the bin is visible
+# Distances from the end of the path to a bin, in metres. They are tried in turn until the bin is visible.
 BIN_DISTANCES = (1.5, 1.0, 0.6, 0.3, 0.0)
 SMOOTHING = 0.25  # standard deviation of the Gaussian filter in seconds
 _FIELD = FieldOfView.of(PersonParameters())
@@ -29,7 +29,7 @@ _FIELD = FieldOfView.of(PersonParameters())
 
 @dataclass(frozen=True, eq=False)
 class CameraPath:
-    """Camera poses at intervals of `STEP` seconds, with the bin that the camera looks at in each of them."""
+    """Camera poses at intervals of `STEP` seconds, with the bin that the camera looks at in each pose."""
 
     positions: NDArray[np.float64]  # camera positions in metres, shape (n, 3)
     headings: NDArray[np.float64]  # yaw of the gaze in radians, 0 along +x, counter-clockwise, shape (n,)
@@ -41,7 +41,7 @@ class CameraPath:
         return len(self.headings) * STEP
 
     def at(self, times: NDArray[np.float64]) -> "CameraPath":
-        """Return the camera path sampled at these times in seconds, shape (m,)."""
+        """Return the camera path at the given times in seconds, shape (m,)."""
         rows = np.minimum((times / STEP).astype(np.int64), len(self.headings) - 1)
         bins = tuple(self.bins[row] for row in rows)
         return CameraPath(self.positions[rows], self.headings[rows], self.pitches[rows], bins)
@@ -70,7 +70,7 @@ class _Camera:
         ahead = np.minimum(at + LOOK_AHEAD, along[-1])
         here, there = _interpolate(points, along, at), _interpolate(points, along, ahead)
         offsets = there - here
-        # Near its destination the camera keeps its direction.
+        # near its destination, the camera keeps its direction
         offsets[np.linalg.norm(offsets, axis=1) < 0.1] = points[-1] - points[-2]
         headings = np.unwrap(np.arctan2(offsets[:, 1], offsets[:, 0]))
         self.turn(float(headings[0]))
@@ -110,8 +110,8 @@ class _Camera:
 def camera_path(house: House) -> CameraPath:
     """Return the camera path through a house. The same house always gives the same path.
 
-    In each room the camera first looks around from the central viewpoint. It then visits the bins of the room, always
-    choosing the nearest one that it has not visited yet, and moves on to the nearest unvisited room.
+    In each room, the camera first looks around from the central viewpoint. It then visits the bins of the
+    room, always choosing the nearest unvisited bin. Finally, it moves on to the nearest unvisited room.
     """
     stops = {room: _stops(house, room) for room in house.viewpoints}
     room = next(iter(stops))
@@ -128,9 +128,9 @@ def camera_path(house: House) -> CameraPath:
 
 
 def bins_seen(house: House, path: CameraPath, field: FieldOfView, interval: float) -> dict[str, float]:
-    """Return, for each bin that a viewer of the film can see, the time in seconds at which it first comes into view.
+    """Return the time in seconds at which each bin first becomes visible to a person who watches the film.
 
-    The viewer looks every `interval` seconds. Bins that are never seen are missing from the result.
+    Visibility is checked every `interval` seconds. The result does not contain bins that are never visible.
     """
     compiled = compiled_house(house.catalogue)
     times = np.arange(0.0, path.duration, interval)

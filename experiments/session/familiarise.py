@@ -1,4 +1,4 @@
-"""Familiarization of simulated participants: the story and the fly-through (PAPER sections 4 and 7)."""
+"""Familiarize simulated participants with a story and a fly-through (PAPER sections 4 and 7)."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from mjsim.support.files import read_text
 from mjsim.values.person_parameters import PersonParameters
 
 STORY_FILE = Path(__file__).with_name("story.md")
-READING_SPEED = 238.0  # words per minute (Brysbaert, Journal of Memory and Language 109, 2019)
+READING_SPEED = 238.0  # speed in words per minute (Brysbaert, Journal of Memory and Language 109, 2019)
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class Familiarisation:
     seen: frozenset[str] | None  # keys of the bins that the participant has seen, or None if all are known
 
     def trained(self, events: Sequence[Event]) -> "Familiarisation":
-        """Return a copy that includes a training with these events. The bin used in the training counts as seen."""
+        """Return a copy that includes a training. Bins that were used in the training count as seen."""
         used = {event["receptacle"] for event in events if event["event"] == "placed"}
         end = {"phase": TRAINING, "duration_s": events[-1]["t"], "reason": events[-1]["reason"]}
         return Familiarisation((*self.ended, end), None if self.seen is None else self.seen | used)
 
     def log(self, log: EventLog) -> None:
-        """Log the phases, which precede the start of the task clock."""
+        """Log the phases at time 0, because they take place before the task clock starts."""
         for end in self.ended:
             log.append(0.0, PHASE_BEGUN, phase=end["phase"])
             log.append(0.0, PHASE_ENDED, **end)
@@ -43,7 +43,7 @@ def familiarise(
 ) -> Familiarisation:
     """Let a simulated participant read the story and watch the fly-through, if the trial has these phases.
 
-    The participant has seen a bin if a ray from a pose on the camera path, within their own field of view, hits it.
+    A bin counts as seen if it is visible from the camera path within the participant's own field of view.
     """
     ended = tuple(_phases(phases, story, house, person))
     seen = next((frozenset(end["bins"]) for end in ended if "bins" in end), None)
@@ -51,7 +51,7 @@ def familiarise(
 
 
 def watch_flythrough(house: House, person: PersonParameters) -> dict[str, Any]:
-    """Return the fields of the `phase_ended` event of a fly-through."""
+    """Simulate watching the fly-through, and return the fields of its `phase_ended` event."""
     path = camera_path(house)
     seen = bins_seen(house, path, FieldOfView.of(person), person.looking_interval)
     return {"phase": FLYTHROUGH, "duration_s": round(path.duration, 6), "bins": seen}

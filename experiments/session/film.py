@@ -1,4 +1,4 @@
-"""The fly-through film, with captions that name rooms and bins (PAPER section 7)."""
+"""Create the fly-through film, with captions that name rooms and bins (PAPER section 7)."""
 
 import math
 from collections.abc import Callable
@@ -31,10 +31,10 @@ def write_flythrough(
     seconds: float | None = None,
     on_progress: OnFrames = lambda *_: None,
 ) -> str:
-    """Write the film of a house atomically. Return the SHA-256 of its frames, which is the same for equal arguments.
+    """Write the fly-through film of a house atomically, and return the SHA-256 hash of its frames.
 
-    The film lasts `seconds`, at least 1, or by default as long as the camera path. `on_progress` is called with the
-    number of frames drawn so far and the total number. Raises ConfigError if the film would be too short.
+    By default, the film is as long as the camera path. `on_progress` receives the number of drawn frames
+    and the total number. Equal arguments give the same hash. Raises ConfigError if `seconds` is less than 1.
     """
     if seconds is not None and seconds < MIN_DURATION:
         raise ConfigError(f"a film of {seconds} s is too short; it needs at least {MIN_DURATION:.0f} s")
@@ -52,7 +52,7 @@ def _draw(
     house: House, rows: CameraPath, film: FilmConfig, video: VideoWriter, on_progress: OnFrames
 ) -> None:
     compiled, count = compiled_house(house.catalogue), len(rows.headings)
-    # The horizontal field of view is that of a person, whatever the aspect ratio of the film.
+    # Use the horizontal field of view of a person, regardless of the film's aspect ratio.
     half = math.tan(PersonParameters().vertical_field / 2.0) * PICTURE_ASPECT * film.height / film.width
     captions = Captions(film.width, film.height)
     with Renderer(compiled.model, width=film.width, height=film.height, profile=film.profile) as renderer:

@@ -1,17 +1,17 @@
-"""Size and appearance of films."""
+"""Settings for the size and appearance of films."""
 
 from dataclasses import dataclass
 
 from experiments.errors import ConfigError
 from mjsim.render import PROFILES, RenderProfile
 
-# Views in which a replay can be filmed
+# Camera views from which a replay can be filmed
 FIRST_PERSON, TOP_DOWN, FREE = CAMERAS = ("first-person", "top-down", "free")
 
 
 @dataclass(frozen=True)
 class FilmConfig:
-    """Settings of the frames of a film.
+    """Settings that determine the frames of a film.
 
     Attributes:
         width: Picture width in pixels.
@@ -22,7 +22,7 @@ class FilmConfig:
         field_of_view: Horizontal field of view in radians, or None for that of the person.
 
     Raises:
-        ConfigError: There is no such profile.
+        ConfigError: The render profile does not exist.
     """
 
     width: int = 640
@@ -40,7 +40,7 @@ class FilmConfig:
         """Margins in pixels above, below, left and right of the picture. They make the frame size even."""
         if not self.beside:
             return 0, 0, 0, 0
-        from hud.layout import margins  # imported late, because the command line imports this module
+        from hud.layout import margins  # imported here so that the command line does not load it
 
         top, below, left, right = margins(self.width, self.height)
         return top + (self.height + top + below) % 2, below, left, right + (self.width + left + right) % 2

@@ -1,4 +1,4 @@
-"""First-person frames with the HUD, and films of them."""
+"""Render and film the first-person view with the HUD."""
 
 import contextlib
 import dataclasses
@@ -26,7 +26,7 @@ from mjsim.world.world import World
 
 
 class FirstPersonRenderer:
-    """Renders first-person frames with the HUD. Use it as a context manager to free the GL context.
+    """A renderer of first-person frames with the HUD. Use it as a context manager to free the GL context.
 
     `pictures` is the result of `render_pictures` for the catalogue of the house. If it is None, the pictures are
     rendered first. Raises RenderError if there is no off-screen GL context, or if the size or the profile is invalid.
@@ -46,7 +46,7 @@ class FirstPersonRenderer:
         self._film = film
 
     def camera_view(self, data: Any) -> CameraView:
-        """Return the eye camera for the state `data` of the scene's model."""
+        """Return the view of the eye camera. `data` is the state of the scene's model."""
         pose = self._renderer.camera_pose(data, self._camera(data))
         width, height = self._film.width, self._film.height
         return CameraView(pose.position, pose.rotation, pose.fovy, width=width, height=height)
@@ -54,8 +54,8 @@ class FirstPersonRenderer:
     def frame(self, data: Any, state: HudState) -> NDArray[np.uint8]:
         """Render the person's view with the HUD as an RGB image, uint8, shape (height, width, 3).
 
-        The image is larger than the film's picture if the panels are next to it. `data` is the state of the scene's
-        model. Raises RenderError if a marker cannot be drawn or the renderer is closed.
+        If the HUD panels are next to the picture, the image is larger than the picture. `data` is the state
+        of the scene's model. Raises RenderError if a marker cannot be drawn or the renderer is closed.
         """
         if state.minimap is not None and FLOORPLAN not in self._pictures:
             self._pictures[FLOORPLAN] = render_house_map(self._house.catalogue, self._house.bounds)
@@ -141,7 +141,7 @@ class TrialFilm:
         except RecordError as error:
             self._give_up(error)
         if self._renderer is not None:
-            # After a driver failure, freeing the GL context may fail too
+            # after a driver failure, freeing the GL context may fail as well
             with contextlib.suppress(RenderError):
                 self._renderer.close()
         if self.failure is not None:

@@ -1,4 +1,4 @@
-"""Pictures of a tidy house: a floor plan with room names, and a view of each room."""
+"""Draw pictures of a tidy house: a floor plan with room names, and a view of each room."""
 
 import math
 from collections.abc import Iterable
@@ -19,9 +19,9 @@ SIZE = (960, 640)  # size of a picture in pixels
 FIELD = math.radians(62.0)
 SCALE, MARGIN = 70.0, 0.4  # scale of the plan in pixels per metre, and the margin around it in metres
 TEXT, LINE = 13, 16  # font size and line height on the plan, in pixels
-TARGET_HEIGHT = 0.9  # height in metres of the point in the middle of a room at which views aim
+TARGET_HEIGHT = 0.9  # height in metres of the point in the middle of a room that the camera looks at
 PLACES = 3000  # number of sampled viewpoints
-# Size in pixels and maximum depth in metres of the depth images that rank the views
+# Size in pixels and maximum depth in metres of the depth images that are used to rank views
 SMALL, FAR = (96, 64), 4.0
 
 
@@ -45,7 +45,7 @@ def draw_house(house: House, folder: Path) -> list[Path]:
 def floor_plan(house: House, within: tuple[int, int] | None = None) -> NDArray[np.uint8]:
     """Draw the house from above as an RGB image, with the names and areas of the rooms.
 
-    The plan fills the size `within` (width and height in pixels). If it is None, the scale is fixed.
+    The plan fits into `within`, a width and a height in pixels. If `within` is None, the scale is fixed.
     """
     x0, y0, x1, y1 = house.bounds
     bounds = x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN
@@ -79,7 +79,7 @@ def _width(text: str) -> int:
 
 
 def room_views(house: House, rooms: Iterable[str]) -> dict[str, list[CameraPose]]:
-    """Return a view from each corner of each room, with the least obstructed view first."""
+    """Return views from the corners of each room, starting with the least obstructed view."""
     compiled = compiled_house(house.catalogue)
     floor = house.sampling_floor.sample(np.random.default_rng(0), PLACES)
     nearest = house.rooms.distances(floor).argmin(axis=1)

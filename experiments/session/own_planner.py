@@ -1,4 +1,4 @@
-"""Planners by name, and the verification of plans and bounds that custom planners return."""
+"""Look up planners by name, and verify the plans and bounds of custom planners."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,14 +13,14 @@ from planner.plan import Plan, Status, Visit, VisitKind
 from planner.problem import RoutingProblem
 from planner.solvers import SolveLimit, Solver, solver
 
-CLAIM_TOLERANCE = 1e-6  # relative rounding error allowed in the length or bound that a planner reports
+CLAIM_TOLERANCE = 1e-6  # maximum relative error in the length or bound that a planner reports
 
 
 def planner_named(name: str, *, exact: bool = True) -> Solver:
     """Return the planner with this name. The plans of a custom planner are verified.
 
-    With `exact`, the exact planner computes the lower bounds of custom plans. Raises PlannerError if there is no
-    planner with this name.
+    If `exact` is set, the exact planner computes the lower bounds of custom plans. Raises PlannerError if
+    there is no planner with this name.
     """
     found = solver(name)
     return OwnPlanner(name, found, ExactSolver() if exact else None) if is_own(found) else found
@@ -29,8 +29,8 @@ def planner_named(name: str, *, exact: bool = True) -> Solver:
 class OwnPlanner:
     """A custom planner whose plans are verified before use.
 
-    The length, bound and status of each plan are recomputed, and a wrong length is an error. The bound comes from the
-    planner `exact`, or from the verification if `exact` is None.
+    The length, bound and status of each plan are recomputed. A wrong length raises an error. The bound comes
+    from the planner `exact`, or from the verification if `exact` is None.
     """
 
     def __init__(self, name: str, planner: Solver, exact: ExactSolver | None) -> None:
@@ -38,13 +38,13 @@ class OwnPlanner:
         self._what = f"planner {name!r}"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Return the plan of the custom planner. Raises UserCodeError if it failed or its plan is not feasible."""
+        """Return the custom planner's plan. Raises UserCodeError if it failed or its plan is not feasible."""
         return self._with_bound(problem, self._asked(problem, seed, limit))
 
     def improve(
         self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None
     ) -> Iterator[Plan]:
-        """Yield the plans of the custom planner, and then the last plan with its bound.
+        """Yield the plans of the custom planner, then the last plan again if its bound has improved.
 
         Raises UserCodeError if the planner failed or a plan is not feasible.
         """

@@ -1,4 +1,4 @@
-"""What a participant perceives in a session."""
+"""The percepts of participants in a session."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -25,7 +25,7 @@ from mjsim.world.world import World
 
 
 class SessionPercept(Percept):
-    """A percept in a session. Expensive parts are computed once, at the first access."""
+    """A percept in a session. Expensive parts are computed only when they are accessed."""
 
     def __init__(
         self,

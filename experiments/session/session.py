@@ -1,4 +1,4 @@
-"""The loop of a session: show, perceive, act, simulate, record. Live trials and replays share it."""
+"""The main loop of a session, which is shared by live trials and replays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from mjsim.values.errors import PhysicsError
 from mjsim.values.observation import ObjectStatus, Observation, Steps
 from mjsim.world.world import World
 
-# Logged events with a cause outside the simulation, which a replay repeats from the log.
+# logged events with a cause outside the simulation, which a replay repeats
 EXTERNAL_EVENTS = ("scroll", "overrun", "started", "pause", "resume", "blur", "display", "draw")
-FINAL_HOLD = 1.6  # how long the viewer shows the world after the last delivery, in seconds
+FINAL_HOLD = 1.6  # how long the viewer continues after the last delivery, in seconds
 
 
 class Viewer(Protocol):
-    """Receives the state of every control step, for example to film it."""
+    """The interface of viewers, which receive the state of every control step, for example to film it."""
 
     def camera(self, world: World) -> CameraView | None:
-        """Return the eye camera in which the HUD is seen, or None for a view from outside."""
+        """Return the eye camera through which the HUD is seen, or None for a third-person view."""
         ...
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None: ...
@@ -37,7 +37,7 @@ class Viewer(Protocol):
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a session."""
+    """The simulated time and the number of delivered objects in a session."""
 
     time: float
     delivered: int
@@ -48,16 +48,16 @@ OnProgress = Callable[[Progress], None]
 
 
 class Session:
-    """One trial, from the start pose until all objects are delivered or the time limit is reached.
+    """A trial, which lasts until all objects are delivered or the time limit is reached.
 
     Args:
-        world: The world, freshly made.
-        assistant: Plans, and determines what the HUD shows.
-        participant: The user of the assistance.
-        record: Receives control steps, checkpoints and events.
+        world: Newly created world.
+        assistant: Assistant that makes plans and determines what the HUD shows.
+        participant: Participant who performs the task.
+        record: Writer that stores control steps, checkpoints and events.
         time_limit: Simulated time in seconds after which the session ends.
-        viewer: Receives every control step, or None. Without a viewer, walks and waits are simulated many control
-            steps at once, with the same result.
+        viewer: Viewer that receives every control step, or None. Without a viewer, many control steps of a
+            walk or a wait are simulated at once, with the same result.
 
     Attributes:
         shows_each_step: False if the viewer receives only the control steps for which `show` is called.
@@ -95,7 +95,7 @@ class Session:
         return self.finish(on_progress)
 
     def begin(self) -> None:
-        """Make the first plan and show it, before anything is simulated. Raises the same errors as `run`."""
+        """Make and show the first plan before the simulation starts. Raises the same errors as `run`."""
         self._now = self._world.reset()
         self._first_state = self._now, self._world.health_sample, self._world.state_hash()
         try:
@@ -117,7 +117,7 @@ class Session:
             )
 
     def finish(self, on_progress: OnProgress = lambda _: None) -> str:
-        """Run a session to its end after `begin`. The result and the errors are the same as those of `run`."""
+        """Run a session to its end after `begin`. The result and the errors are those of `run`."""
         try:
             while (reason := self.end_reason) is None:
                 self.advance()
@@ -132,7 +132,7 @@ class Session:
         return reason
 
     def end(self, reason: str, **details: str) -> None:
-        """End the session and log the reason. Record the last state unless the session was interrupted."""
+        """End the session and log the reason. The last state is recorded unless the run was interrupted."""
         if reason != INTERRUPTED:
             self._record_end(reason)
         self.assistant.finish(self._now.time)
@@ -163,7 +163,7 @@ class Session:
         return TIME_LIMIT if self._now.time >= self._time_limit - 1e-9 else None
 
     def advance(self) -> None:
-        """Let the participant act once. Walking and waiting can last many control steps, other actions last one."""
+        """Let the participant act once. A walk or a wait can take many control steps."""
         self._observe()
         if self.assistant.is_custom:
             self._hud_state()  # detects a faulty condition even if there is no viewer
@@ -174,10 +174,10 @@ class Session:
         self._step(decide(self._participant, percept), self._step_limit())
 
     def restore(self, record: Record, step: int | None) -> None:
-        """Restore the checkpoint before a control step of a record, or the start if `step` is None.
+        """Restore a session from the checkpoint before a recorded step, or from the start if `step` is None.
 
-        The assistant first observes the recorded steps, because the checkpoint does not contain its state. Raises
-        StateError if the checkpoint does not match the world.
+        The assistant observes the recorded steps again, because checkpoints do not contain the assistant's
+        state. Raises StateError if the checkpoint does not match the world.
         """
         if step is None:
             self.begin()
@@ -193,7 +193,7 @@ class Session:
         self._start(restored)
 
     def resume(self, record: Record) -> None:
-        """Continue an unfinished record from its end. The actions after its last checkpoint are simulated again.
+        """Restore the end of an unfinished record by simulating the actions after its last checkpoint again.
 
         Raises RecordError if the simulated states differ from the recorded ones.
         """
@@ -230,7 +230,7 @@ class Session:
         self._log.append(self._now.time, event, **fields)
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end, and log this for replays."""
+        """Scroll the task list by a number of rows, positive towards its end, and log the event."""
         self.note("scroll", rows=rows)
         self.assistant.scroll(rows)
         self._hud = None

@@ -1,4 +1,4 @@
-"""Paths to the next visit for the HUD: the planned path, and the path from the person's position."""
+"""Compute the paths that the HUD shows: the planned path, and the path from the person's position."""
 
 import math
 
@@ -9,16 +9,16 @@ from experiments.participants.base import Point
 from mjsim.world.walking.polyline import first_off_path, rest_of
 from planner.geodesics import Geodesics
 
-TOLERANCE = 0.6  # a new path is computed if the person is farther than this from the path, in metres
-MAX_GOAL_SHIFT = 0.25  # a new path is computed if the goal has moved farther than this, in metres
+TOLERANCE = 0.6  # distance from the path beyond which a new path is computed, in metres
+MAX_GOAL_SHIFT = 0.25  # displacement of the goal beyond which a new path is computed, in metres
 
 
 class ShownPath:
-    """A shortest path, computed at the first access. It is replaced if its goal moves or the person leaves it.
+    """A shortest path for the HUD, which is replaced if its goal moves or the person leaves it.
 
     Args:
-        geodesics: Finds the path.
-        rerouted: True to replace the path when the person leaves it. The planned path stays (PAPER section 5).
+        geodesics: Geodesics used to find the path.
+        rerouted: True to replace the path when the person leaves it, False to keep it (PAPER section 5).
     """
 
     def __init__(self, geodesics: Geodesics, *, rerouted: bool) -> None:
@@ -58,7 +58,7 @@ class ShownPath:
             self._renew(positions[off], target, goal)
 
     def follow_goal(self, position: Point, target: Point, goal: Point) -> None:
-        """Replace the path if the goal has moved. `position` is that of the person in metres, shape (2,)."""
+        """Replace the path if the goal has moved. `position` is the person's position in metres."""
         if self._points is not None and math.dist(goal, self._goal) > MAX_GOAL_SHIFT:
             self._renew(position if self._rerouted else self._start, target, goal)
 
@@ -68,19 +68,19 @@ class ShownPath:
 
 
 class PathsToNext:
-    """Paths to the next visit: the planned `segment` from the last visit, and the `path` from the person."""
+    """The paths to the next visit: `segment` from the last visit, and `path` from the person's position."""
 
     def __init__(self, geodesics: Geodesics) -> None:
         self.segment = ShownPath(geodesics, rerouted=False)
         self.path = ShownPath(geodesics, rerouted=True)
 
     def begin(self, last_visit: Point, position: Point, target: Point, goal: Point) -> None:
-        """Set the paths to another visit. All positions are in metres, shape (2,)."""
+        """Start new paths to another visit. All positions are in metres, shape (2,)."""
         self.segment.begin(last_visit, target, goal)
         self.path.begin(position, target, goal)
 
     def follow(self, position: Point, target: Point, goal: Point) -> None:
-        """Replace a path that the person has left, or both if the goal has moved.
+        """Replace `path` if the person has left it, or both paths if the goal has moved.
 
         All positions are in metres, shape (2,).
         """

@@ -11,11 +11,11 @@ from typing import Any, NoReturn, TypeVar
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 T = TypeVar("T")
-CHECK_TIMEOUT_S = 2.0  # a trial that does not check for signals within this time is interrupted
+CHECK_TIMEOUT_S = 2.0  # time after which a trial that does not check for signals is interrupted
 
 
 class Stopped(KeyboardInterrupt):
-    """The process was asked to stop by the signal `number`."""
+    """Raised if the process was asked to stop by the signal `number`."""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -63,7 +63,7 @@ def exit_raised() -> Iterator[None]:
 
 
 class PostponedSignals:
-    """Signals that have arrived but are not yet handled. `number` is the first one, or None."""
+    """A record of signals that have not been handled yet. `number` is the first signal, or None."""
 
     def __init__(self) -> None:
         self.number: int | None = None
@@ -81,7 +81,7 @@ class PostponedSignals:
         self._stop_timer()
 
     def record(self, number: int, _frame: FrameType | None) -> None:
-        """Record a signal. Code that does not call `check` in time, such as a hanging participant, is interrupted."""
+        """Record a signal. Code that does not call `check` within `CHECK_TIMEOUT_S` is interrupted."""
         first, self.number = self.number is None, self.number or number
         if first and not self._saving:
             signal.signal(signal.SIGALRM, self._interrupt)
@@ -98,14 +98,14 @@ class PostponedSignals:
 
 @contextmanager
 def signals_postponed() -> Iterator[PostponedSignals]:
-    """Record signals during the block instead of being interrupted. Has no effect outside the main thread."""
+    """Record signals instead of interrupting the block. This has no effect outside the main thread."""
     postponed = PostponedSignals()
     with _handled(postponed.record):
         yield postponed
 
 
 def run_until_signal(work: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine like `asyncio.run`. A signal cancels it, so that it can clean up, and raises `Stopped`."""
+    """Run a coroutine like `asyncio.run`. A signal cancels the coroutine and then raises `Stopped`."""
     came: list[int] = []
 
     async def watched() -> T:

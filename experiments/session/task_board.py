@@ -1,4 +1,4 @@
-"""The state of the world as an assistance condition sees it: labels, pictures, rooms and messages."""
+"""Describe the state of the world to assistance conditions, with labels, pictures, rooms and messages."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from planner.plan import Visit, VisitKind
 from planner.regret import Regret
 from planner.route import Route
 
-# How long a message is shown before the announcement of a new plan may replace it, in seconds
+# Minimum display time of a message before the announcement of a new plan replaces it, in seconds
 READING_TIME = 2.0
 REPLANNED = "replanned"
 
@@ -39,7 +39,7 @@ class _Shown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanView:
-    """The planner's suggestion for one state of the world, computed when a condition requests it."""
+    """The planner's suggestion for one state of the world, computed only if a condition requests it."""
 
     board: "TaskBoard"
     observation: Observation
@@ -73,7 +73,7 @@ class PlanView:
 
 
 class TaskBoard:
-    """Describes the task to the conditions, and stores the current message and the completed steps.
+    """A description of the task for conditions, with the current message and the completed steps.
 
     `order` lists the object names in the random order chosen for this participant (PAPER section 5).
     """
@@ -101,19 +101,19 @@ class TaskBoard:
         self._scroll = 0
 
     def scroll(self, rows: int) -> None:
-        """Scroll the task list by a number of rows, positive towards its end. The next visit resets it."""
+        """Scroll the task list by a number of rows, positive towards its end, until the next visit."""
         max_rows = 2 * len(self.episode.objects)
         self._scroll = min(max(self._scroll + rows, -max_rows), max_rows)
 
     def show_message(self, key: str, time: float, object_name: str | None = None) -> None:
-        """Show a message about an event or a refused action, replacing the previous one. `time` is in seconds."""
+        """Show a message about an event or a refused action instead of the last one. `time` is in seconds."""
         shown = self._shown(time)
         if shown.key == REPLANNED and time >= shown.since + READING_TIME:
             self._replanned_at = None
         self._latest = _Shown(key, time, object_name)
 
     def announce_replan(self, time: float) -> None:
-        """Announce a plan made at `time` in seconds, once the current message has been shown for `READING_TIME`."""
+        """Announce a new plan, made at `time` in seconds, after the minimum display time of messages."""
         self._replanned_at = time
 
     def view(
@@ -125,7 +125,7 @@ class TaskBoard:
         camera: CameraView | None = None,
         regrets: Callable[[], Mapping[Visit, Regret]] = dict,
     ) -> TaskView:
-        """Return the task as a condition currently sees it."""
+        """Return the current view of the task for a condition."""
         return TaskView(
             objects=self._task_objects(observation),
             receptacles=self._receptacles,
@@ -177,7 +177,7 @@ class TaskBoard:
         return self.house.catalogue.objects[model].label
 
     def goal(self, observation: Observation, visit: Visit) -> Vec3:
-        """Return the position of a visit's object, or the centre of its receptacle, in metres."""
+        """Return the position of the object to pick up, or the centre of the target receptacle, in metres."""
         if visit.kind is VisitKind.PICK:
             return _vec3(observation.object_positions[observation.object_names.index(visit.object)])
         return _vec3(self.house.receptacles[self.episode.targets[visit.object]].center)

@@ -1,4 +1,4 @@
-"""The log of a session's plans and visits, with the suggested visits and the regrets."""
+"""Log the plans and visits of a session, with suggested visits and regrets."""
 
 import itertools
 from typing import Any
@@ -16,9 +16,9 @@ from planner.service import Planner
 
 
 class TaskLog:
-    """Requests and logs plans, even in conditions that do not show them, to measure deviations (PAPER section 6).
+    """A log of plans and visits, which is needed to measure deviations from the plan (PAPER section 6).
 
-    Each log line is reserved immediately and filled in when the planner has answered.
+    Plans are logged even if they are not shown. Log lines are filled in when the planner has answered.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class TaskLog:
         self._visits = 0
 
     def plan(self, time: float, state: TaskState, position: NDArray[Any], *, shown: bool) -> None:
-        """Request a plan for a state, and log it if it is new. `position` is that of the person in metres, shape (2,).
+        """Request a plan for a state, and log it if it is new. `position` is the person's position in metres.
 
         Raises UnreachableError with the object names if objects cannot be fetched or delivered.
         """
@@ -59,7 +59,7 @@ class TaskLog:
         return before is None or better.visits != before.visits
 
     def visit(self, time: float, made: Visit, position: NDArray[Any]) -> None:
-        """Log a visit and the plan before it. `position` is that of the person in metres, shape (2,)."""
+        """Log a visit and compare it with the plan. `position` is the person's position in metres."""
         assert self._state is not None  # noqa: S101 - for the type checker
         line, state, number = self._log.reserve(), self._state, self._visits
         walk = self._house.body_geodesics.shortest_path(self._last_visit_at, position)
@@ -85,7 +85,7 @@ class TaskLog:
         self._last_visit_at = position
 
     def finish(self, time: float) -> None:
-        """Log the regrets that were not yet computed when their visits were logged."""
+        """Log the regrets that had not been computed yet when the visits were logged."""
         for (number, names), regret in self._planner.finish():
             self._log.append(time, "regret", visit=number, **dict.fromkeys(names, _rounded(regret)))
 
@@ -144,9 +144,9 @@ def _rounded(metres: float | None) -> float | None:
 def reach_bound(tour: float, house: House, episode: Episode) -> float:
     """Return a lower bound in metres on the walking distance for any order of visits.
 
-    `tour` is a lower bound in metres without reaching. A person who picks and places from a distance saves that
-    distance on the way to a location and again on the way from it, except after the last visit. The bound assumes that
-    objects stay where they are and that a person reaches only across free floor.
+    `tour` is a lower bound in metres for a person who walks up to each location. People who reach for objects
+    from a distance save this distance on the way to a location and on the way back, except after the last
+    visit. The bound assumes that objects are not pushed and that people reach only across free floor.
     """
     reach = house.person.reach
     places = [

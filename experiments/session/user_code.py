@@ -1,4 +1,4 @@
-"""Calls of custom participants, conditions and planners, with errors that name the faulty code."""
+"""Call custom participants, conditions and planners, and report the location of faulty code."""
 
 import os
 import signal
@@ -33,19 +33,19 @@ from mjsim.values.actions import Action
 from mjsim.values.errors import PhysicsError, RenderError
 from planner.errors import UnreachableError
 
-MAX_CALL_LIMIT = 1e6  # maximum value of the time limit in seconds
+MAX_CALL_LIMIT = 1e6  # largest time limit for a call that is supported, in seconds
 PASSED_ON = (KeyboardInterrupt, UserCodeError, UnreachableError, PhysicsError, RenderError)
 
 
 class _Overdue(BaseException):
-    """A call exceeded its time limit. Not an `Exception`, so user code does not catch it by accident."""
+    """Raised if a call exceeds its time limit. It is not an `Exception`, so user code does not catch it."""
 
 
 @contextmanager
 def user_code(code: object, what: str) -> Iterator[None]:
-    """Raise a `UserCodeError` for any exception in the block, including `SystemExit`, and limit the time of the block.
+    """Convert exceptions in the block, including `SystemExit`, to `UserCodeError`, and limit its duration.
 
-    The block is not affected if `code`, a function or an object, belongs to mjsim. `what` names the code in messages.
+    The block is not affected if the function or object `code` belongs to mjsim. `what` names it in messages.
     """
     if not is_own(code):
         yield
@@ -97,9 +97,9 @@ def is_own(code: object) -> bool:
 def make_participant(
     name: str, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
 ) -> Participant:
-    """Make a participant for a house. `behaviour` sets the parameters of the participant model, if it has any.
+    """Create a participant for a house. `behaviour` sets the parameters of the participant, if there are any.
 
-    Raises ConfigError if there is no such participant, and UserCodeError if a custom one is faulty.
+    Raises ConfigError if the participant does not exist, and UserCodeError if a custom participant is faulty.
     """
     make = participant(name)
     with user_code(make, f"participant {name!r}"):
@@ -145,7 +145,7 @@ def decide(participant: Participant, percept: Percept) -> Action:
 
 
 def shown_by(condition: Condition, name: str, view: TaskView) -> HudState:
-    """Return the HUD state of a condition.
+    """Return the HUD state that a condition creates from the view of the task.
 
     Raises UserCodeError if a custom condition failed or returned another type.
     """

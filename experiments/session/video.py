@@ -1,4 +1,4 @@
-"""H.264 videos for browsers, encoded in a separate thread."""
+"""Write H.264 videos for browsers, and encode them in a separate thread."""
 
 import hashlib
 import queue
@@ -18,7 +18,7 @@ QUEUE_LENGTH = 8  # maximum number of frames that wait to be encoded
 
 
 class VideoWriter:
-    """Writes frames to an MP4 file. Use it as a context manager to complete the file.
+    """A writer of MP4 files. Use it as a context manager so that the file is completed.
 
     Width and height in pixels must be even because chroma is subsampled (4:2:0). Raises RecordError if one of them is
     odd, or if the encoder failed.
@@ -38,7 +38,7 @@ class VideoWriter:
 
     @property
     def frames_sha256(self) -> str:
-        """Hash of the encoded frames, complete after `close`."""
+        """SHA-256 hash of the frames encoded so far. The hash is final after `close`."""
         return self._hash.hexdigest()
 
     def write(self, frame: Image) -> None:

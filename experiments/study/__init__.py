@@ -1,1 +1,1 @@
-"""Studies with human participants: study file, recruitment, payments, data, rehearsal and researcher's page."""
+"""Run studies with human participants, from rehearsals and recruitment to payments and data export."""

@@ -1,4 +1,4 @@
-"""Study files. A study file is a batch design (docs/batches.md) with an additional `[study]` table."""
+"""Read study files. A study file is a batch design with an additional `[study]` table."""
 
 import hashlib
 import itertools
@@ -28,10 +28,10 @@ PLATFORMS = ("link", "lab", "prolific", "connect", "external-question")
 
 Money = Annotated[float, msgspec.Meta(ge=0.0, le=10_000.0)]
 Code = Annotated[str, msgspec.Meta(pattern="^[0-9A-Za-z_-]{0,64}$")]
-# origin of a web page: scheme, host and port
+# The origin of a web page, which consists of the scheme, the host and an optional port
 Site = Annotated[str, msgspec.Meta(pattern=r"^https?://[0-9A-Za-z.-]+(:[0-9]{1,5})?$")]
 
-HERE = ("localhost", "127.0.0.1", "::1")  # hosts to which connections need no TLS
+HERE = ("localhost", "127.0.0.1", "::1")  # hosts that may be contacted without TLS
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,27 +39,27 @@ class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Pay(_Table, frozen=True):
-    """Payments to participants, in units of `currency`."""
+    """The payments to participants, in units of `currency`."""
 
     currency: Annotated[str, msgspec.Meta(pattern="^[A-Z]{3}$")] = "USD"
     reward: Money = 0.0  # pay for completing the study
     screen_out: Money = 0.0  # pay for screened-out participants
     bonus_for_all: Money = 0.0  # bonus for putting all objects away
-    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee, as a share of pay
-    wage: Money = 0.0  # hourly wage below which `mjsim study check` reports the pay as too low
+    fee: Annotated[float, msgspec.Meta(ge=0.0, le=10.0)] | None = None  # platform fee as a share of the pay
+    wage: Money = 0.0  # hourly wage below which `mjsim study check` reports a problem
     partial: bool = False  # if True, participants who leave during or after the task get part of the reward
 
 
 class Recruitment(_Table, frozen=True):
-    """The recruitment platform, with the codes and ids that its links contain."""
+    """Settings of the recruitment platform, such as the codes and ids in its links."""
 
     platform: Literal["link", "lab", "prolific", "connect", "external-question"] = "link"
-    completed: Code = ""  # completion code that is entered on the platform
+    completed: Code = ""  # completion code that participants enter on the platform
     screened_out: Code = ""
     no_consent: Code = ""
-    study_id: Code = ""  # the platform's id of the study; links from other studies are refused
-    sites: tuple[Site, ...] = ()  # origins of the platform's pages that embed an ExternalQuestion
-    api_url: str = ""  # URL of the platform's API; empty for the default
+    study_id: Code = ""  # id of the study on the platform; links with other ids are refused
+    sites: tuple[Site, ...] = ()  # origins of platform pages that embed the study
+    api_url: str = ""  # URL of the platform's API, or empty for the default
 
     def __post_init__(self) -> None:
         url = urlsplit(self.api_url)
@@ -70,7 +70,7 @@ class Recruitment(_Table, frozen=True):
 
 
 class StudySettings(_Table, frozen=True):
-    """Contents of the `[study]` table."""
+    """The contents of the `[study]` table in a study file."""
 
     name: Annotated[str, msgspec.Meta(pattern="^[a-z0-9][a-z0-9-]{0,39}$")]
     title: str
@@ -111,7 +111,7 @@ class StudySettings(_Table, frozen=True):
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of the design, with one trial for each participant wanted."""
+    """A cell of the study design, with one trial for each participant who is needed."""
 
     trials: Sequence[TrialConfig]
 
@@ -120,13 +120,13 @@ class Cell:
         return f"{self.trials[0].assistance}, {self.trials[0].objects} objects"
 
     def trial(self, place: int) -> TrialConfig:
-        """Return the trial at an index. Indices beyond the last trial wrap around."""
+        """Return the trial at an index. Indices beyond the last trial wrap around to the first trial."""
         return self.trials[place % len(self.trials)]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A validated study file, with the texts that participants read."""
+    """A validated study file with the texts that are shown to participants."""
 
     path: Path
     sha256: str  # SHA-256 of the study file
@@ -146,7 +146,7 @@ def read_people_study(path: Path) -> Study:
     """Read and validate a study file.
 
     Raises:
-        ConfigError: The file is missing or not valid. The message names the file, the line and the value.
+        ConfigError: The file is missing or invalid. The message names the file, the line and the value.
     """
     design = read_design(path)
     content = read_bytes(path)
@@ -220,7 +220,7 @@ _KEY = re.compile(r"\s*([\w.\"-]+)\s*=")
 
 
 def at_line(path: Path, text: str, message: str) -> str:
-    """Prefix a msgspec error message with the file and, if it can be found, the line of the value."""
+    """Add the file name and, if possible, the line number to an error message of msgspec."""
     found = _PATH.search(message)
     wanted = re.sub(r"\[[^\]]*\]", "", found[1]) if found else ""
     if unknown := re.search(r"unknown field `([^`]+)`", message):
@@ -230,7 +230,7 @@ def at_line(path: Path, text: str, message: str) -> str:
 
 
 def line_of(text: str, wanted: str) -> int | None:
-    """Return the line number of a key such as `study.pay.reward`, or else of its innermost table in the file."""
+    """Return the line number of a key such as `study.pay.reward`, or of its table if the key is missing."""
     table, best, depth = "", None, 0
     for number, line in enumerate(text.splitlines(), 1):
         if header := _HEADER.match(line):

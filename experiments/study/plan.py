@@ -1,4 +1,4 @@
-"""Visit plans of studies."""
+"""Create the visit plan of a study, which defines the phases of a participant's visit."""
 
 import math
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from experiments.visit.store import Assignment, CellQuota
 
 
 def plan_of(study: Study, film: Path | None = None, platform: Recruiter | None = None) -> VisitPlan:
-    """Create a study's visit plan with a video of the house. `platform` can replace the study's own platform.
+    """Create the visit plan of a study. `film` is a video of the house, and `platform` replaces the default.
 
     Raises:
         ConfigError: A setting that the platform requires is missing.

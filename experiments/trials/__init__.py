@@ -1,1 +1,1 @@
-"""Trials and batches of trials: settings, designs, execution and result tables."""
+"""Run single trials and batches of trials, and write tables of their results."""

@@ -1,4 +1,4 @@
-"""Runs a batch of trials in parallel. Each finished trial is stored, so a killed batch can be resumed."""
+"""Run a batch of trials in parallel. Finished trials are stored, so an interrupted batch can be resumed."""
 
 import dataclasses
 import functools
@@ -34,12 +34,12 @@ from mjsim.house.compiled.house import MAX_HOUSES
 from mjsim.support.files import remove_leftovers, work_folder
 
 ExecutorContext = Callable[[Path], AbstractContextManager[Pools]]
-RETRIES = 5  # how often a trial is rerun after its machine was lost, before it is run alone
+RETRIES = 5  # number of times that a trial is rerun after losing its machine, before it is run alone
 
 
 @dataclass(frozen=True)
 class BatchProgress:
-    """Progress of a batch: trials finished by this call, finished earlier and failed, and the last error."""
+    """The progress of a batch, as numbers of trials. `failure` describes the last error."""
 
     done: int
     resumed: int
@@ -60,26 +60,26 @@ def run_batch(
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
 ) -> list[Mapping[str, Any]]:
-    """Run every trial of the design that is not in `out` yet, then write the tables.
+    """Run all trials of a design that have not been run yet, and write the result tables.
 
     Args:
         design: The trials.
         out: Folder of the batch. An existing batch is extended.
         workers: Number of trials that run in parallel (default: one per core of this machine or of the Ray cluster).
-        executor: `processes` of this machine, or a `ray` cluster whose machines share the folder.
+        executor: `processes` to use this machine, or `ray` to use a cluster whose machines share the folder.
         packed: Store the trials in archives, one per worker process, instead of run directories.
-        shard: Run and read only this part of the design, and write no tables.
+        shard: Part of the design to run. Only this part is read, and no tables are written.
         on_progress: Called at the start and after every trial.
-        on_note: Called with messages for the user, such as which trials are rerun or are missing from the tables.
+        on_note: Called with messages for the user, for example about trials that are rerun or are missing.
         on_read: Called after each finished trial is read, with the number of trials read so far and the total number.
 
     Returns:
-        A row for each trial in the folder or, with a shard, in the shard. Those of the design come first, in its order.
+        A row for each trial in the folder or in the shard. The trials of the design come first, in its order.
 
     Raises:
         ConfigError: An argument is invalid, or a machine of the cluster cannot be used.
-        ConnectionError: The Ray cluster is lost.
-        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run. No trials were run.
+        ConnectionError: The connection to the Ray cluster is lost.
+        ExperimentError, MjsimError, PlannerError, HudError: A trial cannot be run, so no trial was run.
         OSError: A table cannot be written.
     """
     if workers is not None and workers < 1:
@@ -93,13 +93,13 @@ def run_batch(
             noted.add(line)
             on_note(line)
 
-    out = out.absolute() if executor == RAY else out  # the current folder may differ on other machines
+    out = out.absolute() if executor == RAY else out  # other machines have another current folder
     check_batch_folder(out)
     trials = design.trials if shard is None else shard.of(design).trials
     inputs = check_trials(trials)
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     label = "" if shard is None else shard.label
-    adopt(out / TRIALS, label)  # renames the archives that a killed batch has left
+    adopt(out / TRIALS, label)  # renames archives that a killed batch has left behind
     own = None if shard is None else {trial_name(*trial) for trial in zip(trials, inputs, strict=True)}
     readers = workers or os.cpu_count() or 1
     reader = TrialReader(out, workers=readers, on_read=on_read, names=own, label=label)
@@ -154,7 +154,7 @@ def _results(
     by_house = sorted(missing.items(), key=lambda trial: trial[1].house)
     left = {path: config for path, config in by_house if not _died(path).exists()}
     alone = {path: config for path, config in missing.items() if path not in left}
-    # The work folder is removed at the end, including files that killed processes left there.
+    # The work folder is removed at the end, together with any files that killed processes have left in it.
     with work_folder(by_house[0][0].parent) as folder, executor(folder) as pools:
         run = functools.partial(_run, folder=folder, archives=archives)
         while left:
@@ -171,7 +171,7 @@ def _results(
 
 
 def _died(path: Path) -> Path:
-    """Return a marker file for a trial that was running when a process died. Another trial may have been the cause."""
+    """Return the path of a marker file for a trial that was running when a worker process died."""
     return path.with_name(f".{path.name}.died")
 
 
@@ -218,14 +218,11 @@ def _house(name: str) -> House:
     return house
 
 
-_archive = functools.cache(new_archive)  # each process has its own archive until it ends
+_archive = functools.cache(new_archive)  # every process writes its own archive
 
 
 def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> StoredTrial | str:
-    """Run a trial and read its result. Return an error as text, because some exceptions cannot be pickled.
-
-    `archives` is a prefix of archive names. If it is given, the trial is packed.
-    """
+    """Run a trial, pack it if `archives` is given, and read its result. Return any error as text."""
     with nullcontext(out.parent) if archives is None else work_folder(folder) as parent:
         run = parent / out.name
         try:
@@ -236,7 +233,7 @@ def _run(config: TrialConfig, out: Path, folder: Path, archives: str | None) -> 
             finally:
                 if archives is not None and is_run(run):
                     pack(run, _archive(out.parent, archives))
-                    if is_run(out):  # left by an earlier, incomplete run
+                    if is_run(out):  # left behind by an earlier, incomplete run
                         shutil.rmtree(out)
         except Exception as error:  # an error in one trial must not stop the others
             return _failure(error).replace(str(run), str(out))

@@ -1,8 +1,8 @@
-"""The folder of a batch.
+"""Read and write the folder of a batch, which has the following layout.
 
 OUT/trials/NAME                  run directory of a trial
 OUT/trials/ARCHIVE.sqlar         packed trials, many in one file
-OUT/outdated/NAME                trials that were run again because something that they depend on has changed
+OUT/outdated/NAME                earlier results of trials that were rerun after a change of code or data
 OUT/trials.parquet, trials.csv   one row per trial
 OUT/.rows.jsonl.gz               cache of rows (`trial_reader`)
 """
@@ -33,23 +33,23 @@ from experiments.trials.trial_config import DEFAULTS, SEEDS, SETTINGS, TrialConf
 from mjsim.house.catalogue.house_ref import parse_house
 
 OUTDATED = "outdated"
-MAX_NAME = 120  # maximum length of a trial name without seeds and hash, in characters
+MAX_NAME = 120  # maximum length of a trial name in characters, without seeds and hash
 _SETTINGS = frozenset(SETTINGS)
 CHECKED = (records.EVENTS, records.TRAJECTORY, records.EPISODE, records.RECORDING)
 
-# Size in bytes and modification time in nanoseconds of each file that `read_trial` reads, or None if it is missing
+# Size in bytes and modification time in nanoseconds of each file of a trial, or None if it is missing
 Stamp = tuple[tuple[int, int] | None, ...]
 
 
 @dataclass(frozen=True)
 class StoredTrial:
-    """A trial of a batch.
+    """A trial that is stored in a batch folder.
 
     Attributes:
-        path: Run directory of the trial, or the path that a packed trial would have when unpacked.
-        row: Row of the result tables, computed from log and trajectory.
+        path: Run directory of the trial. If the trial is packed, the path that it would have when unpacked.
+        row: Row of the result tables, computed from the log and the trajectory.
         as_measured: True if `metrics.json` agrees with the row.
-        stamp: Stamp of its files, taken before they were read.
+        stamp: Sizes and modification times of the trial's files, taken before the files were read.
     """
 
     path: Path
@@ -61,7 +61,7 @@ class StoredTrial:
 
     @property
     def complete(self) -> bool:
-        """False for a trial that failed or was interrupted, and must be rerun."""
+        """True unless the trial failed or was interrupted and must therefore be rerun."""
         return self.row["ended"] in COMPLETE
 
     @functools.cached_property
@@ -69,12 +69,12 @@ class StoredTrial:
         return trial_key(self.settings)
 
     def is_in(self, house: str, inputs: Inputs) -> bool:
-        """Return True if the trial took place in this house, or in one with the same content."""
+        """Return True if the trial was run in the given house or in a house with the same content."""
         return self.inputs["house"] == inputs["house"] or self.settings["house"] == house
 
 
 def trial_key(settings: Mapping[str, Any]) -> str:
-    """Return a key that is equal for equal configurations, even if the paths of the house files differ."""
+    """Return a key that is the same for all trials with equal settings, apart from the path of the house."""
     return json.dumps({name: settings[name] for name in sorted(settings) if name != "house"})
 
 
@@ -105,7 +105,7 @@ def _metrics(path: Path) -> Mapping[str, Any]:
 
 
 def stamp_of(path: Path) -> Stamp:
-    """Return a stamp that changes with any file that `read_trial` reads, or with the archive of a packed trial."""
+    """Return the sizes and modification times of a trial's files, or those of its archive if it is packed."""
     if path.parent.suffix == PACKED:
         return (_file_stamp(str(path.parent)),)
     return tuple(_file_stamp(f"{path}/{name}") for name in (CHECKSUMS, records.METRICS, *CHECKED))
@@ -120,7 +120,7 @@ def _file_stamp(path: str) -> tuple[int, int] | None:
 
 
 def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
-    """Move trials to the `outdated` folder of their batch. Earlier trials there are kept."""
+    """Move trials to the `outdated` folder of a batch without overwriting earlier trials."""
     if names:
         (out / OUTDATED).mkdir(exist_ok=True)
         discard(out / TRIALS, names, out / OUTDATED, prefix)
@@ -130,7 +130,7 @@ def put_aside(out: Path, names: Collection[str], prefix: str = "") -> None:
 
 
 def trial_name(config: TrialConfig, inputs: Inputs) -> str:
-    """Return a readable folder name that is unique for each configuration and house."""
+    """Return a readable folder name, which is unique for each combination of settings and house."""
     is_custom = parse_house(config.house).kind == "folder"
     house = Path(config.house).parent.name if is_custom else config.house
     words = [house, f"{config.objects:02d}", config.assistance, config.user]
@@ -149,7 +149,7 @@ def write_rows(
     unusable: Mapping[Path, str],
     on_note: Callable[[str], None],
 ) -> list[Mapping[str, Any]]:
-    """Write the tables of the trials in a folder. Return the rows, with those of the design first."""
+    """Write the result tables of a batch folder. Return the rows, starting with the trials of the design."""
     for note in folder_notes(found, unusable):
         on_note(note)
     rows = [trial.row for trial in in_order(trials, found)]
@@ -159,7 +159,7 @@ def write_rows(
 
 
 def in_order(trials: Sequence[TrialConfig], found: Sequence[StoredTrial]) -> list[StoredTrial]:
-    """Return the complete trials. Those of the design come first, in its order."""
+    """Return all complete trials. The trials of the design come first, in the order of the design."""
     order = {trial_key(trial.settings()): number for number, trial in enumerate(trials)}
     complete = [trial for trial in found if trial.complete]
     return sorted(complete, key=lambda trial: (order.get(trial.key, len(order)), _sort_key(trial.settings)))
@@ -170,7 +170,7 @@ def _sort_key(settings: Mapping[str, Any]) -> list[Any]:
 
 
 def folder_notes(trials: Sequence[StoredTrial], unusable: Mapping[Path, str]) -> Iterator[str]:
-    """Yield warnings about trials that are missing from the tables or may not be comparable."""
+    """Yield warnings about trials that are missing from the tables or may not be comparable with others."""
     early = [trial for trial in trials if not trial.complete]
     if early:
         yield (

@@ -1,4 +1,4 @@
-"""The preparation of a batch: check that its trials can be run, and find those missing from its folder."""
+"""Check that the trials of a batch can be run, and find the trials that are missing from its folder."""
 
 import dataclasses
 import functools
@@ -32,18 +32,18 @@ from mjsim.values.errors import EpisodeError, PersonError
 from mjsim.values.person_parameters import PersonParameters
 from planner.solvers import solver
 
-MAX_REASONS = 3  # maximum number of reasons listed in a note
+MAX_REASONS = 3  # maximum number of reasons that are listed in a note
 Houses = Callable[[str], House]
 
 
 @dataclass(frozen=True)
 class BatchPlan:
-    """Finished and missing trials of a batch.
+    """The finished and the missing trials of a batch.
 
     Attributes:
-        done: Trials of the design that are in the folder and would have the same result now.
-        missing: Configuration of every other trial of the design, by run directory.
-        notes: Messages that explain which trials are rerun, and why.
+        done: Trials of the design that are in the folder and would still have the same result.
+        missing: Settings of all other trials of the design, by run directory.
+        notes: Messages that explain which trials are rerun and why.
     """
 
     done: tuple[StoredTrial, ...]
@@ -58,7 +58,7 @@ def plan_batch(
     reader: TrialReader | None = None,
     prefix: str = "",
 ) -> BatchPlan:
-    """Compare a design with the trials in a folder, and move outdated trials aside.
+    """Find the trials of a design that are missing from a folder, and move outdated trials out of the way.
 
     Only archives whose names begin with `prefix` are changed.
     """
@@ -102,7 +102,7 @@ def _notes(reasons: Counter[str], out: Path) -> Iterable[str]:
 
 
 def check_names(trials: Sequence[TrialConfig]) -> None:
-    """Raise an error for the first trial with an unknown participant, assistance, planner or behaviour."""
+    """Raise an error if the participant, assistance, planner or behaviour of a trial is unknown."""
     for check, names in (
         (participant, {trial.user for trial in trials}),
         (condition, {name for trial in trials for name in (trial.assistance, trial.training_assistance)}),
@@ -115,7 +115,7 @@ def check_names(trials: Sequence[TrialConfig]) -> None:
 
 
 def check_trials(trials: Sequence[TrialConfig]) -> list[Inputs]:
-    """Check, as far as possible before running them, that trials can be run. Return the inputs of each trial."""
+    """Check that trials have valid settings and files. Return hashes and versions of their inputs."""
     check_names(trials)
     catalogue = functools.cache(load_catalogue)
     house = functools.lru_cache(MAX_HOUSES)(House.load)
@@ -173,7 +173,7 @@ def _may_not_fit(trial: TrialConfig) -> bool:
 
 
 def _begin(trial: TrialConfig, house: House) -> None:
-    """Start a trial with a single object, so that participant and condition interact once."""
+    """Start a trial with one object to check that the participant and the condition work together."""
     small = replace(trial, objects=1, episode=None, live=False)
     person = draw_person(small)
     house = house.for_person(person)

@@ -1,4 +1,4 @@
-"""The trials of a batch: a full factorial of options, or the cells of a TOML file (docs/batches.md)."""
+"""Create the trials of a batch from a full factorial design or from a TOML file (docs/batches.md)."""
 
 import itertools
 import math
@@ -31,7 +31,7 @@ MAX_NUMBERS = 1_000_000
 
 @dataclass(frozen=True)
 class Design:
-    """The trials of a batch, in order and without duplicates, and the exclusions from its file, if any."""
+    """An ordered list of distinct trials, with optional exclusions of participants."""
 
     trials: tuple[TrialConfig, ...]
     exclusions: Exclusions | None = None
@@ -56,9 +56,9 @@ def factorial(
     seeds: Sequence[int],
     **same: Any,
 ) -> Design:
-    """Combine all values into a design in which the seed varies fastest.
+    """Create a full factorial design from lists of values. The seed varies fastest.
 
-    `same` contains the `TrialConfig` fields that all trials share.
+    `same` contains the fields of `TrialConfig` that are equal in all trials.
     """
     for name, values in (("objects", objects), ("assistance", assistance), ("user", users), ("seeds", seeds)):
         if not values:
@@ -84,14 +84,14 @@ class _People(msgspec.Struct, forbid_unknown_fields=True):
     person_seeds: _Seeds = None
     order_seeds: _Seeds = None
     trials_per_person: Annotated[int, msgspec.Meta(ge=1)] = 1
-    # Names, or a range of generated homes such as "generated:0:200?rooms=5"
+    # House names, or a range of generated homes such as "generated:0:200?rooms=5"
     houses: str | list[str] | None = None
 
     def each(self) -> list[dict[str, Any]]:
         """Return the seeds and the house of each trial. Shorter lists are repeated.
 
-        The trials of one participant are spread evenly over the list of houses. The next participant starts at the next
-        house, so that the order of houses varies.
+        The trials of a participant are spread evenly over the list of houses. Each participant starts at
+        another house, so that the order of the houses varies.
         """
         lists: dict[str, list[Any]] = {
             name: numbers(found) for name in _SEEDS if (found := getattr(self, name)) is not None
@@ -134,7 +134,7 @@ class _DesignFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_design(path: Path) -> Design:
-    """Read a design from a TOML file. Raises a `ConfigError` if the file is not a valid design."""
+    """Read a design from a TOML file. Raises `ConfigError` if the file is not a valid design."""
     trials: list[TrialConfig] = []
     reached = None
     content = _content(path, "design")
@@ -149,7 +149,7 @@ def read_design(path: Path) -> Design:
 
 
 def read_exclusions(path: Path) -> Exclusions:
-    """Read exclusions from a TOML file of rules and participants, or from the table [exclusions] of a design."""
+    """Read exclusions from a TOML file, or from the table `[exclusions]` in a design file."""
     content = _content(path, "rules")
     if "cells" in content:
         found = read_design(path).exclusions
@@ -203,14 +203,14 @@ def _cell_trials(values: dict[str, Any], folder: Path) -> list[TrialConfig]:
 
 
 def house_names(houses: str | list[str]) -> list[str]:
-    """Return the names of houses. `generated:0:200?split=test` stands for a range of generated homes."""
+    """Return a list of house names, in which ranges such as `generated:0:200?split=test` are expanded."""
     if isinstance(houses, list):
         return [name for entry in houses for name in house_names(entry)]
     return generated_names(houses) if is_generated(houses) else [houses]
 
 
 def numbers(text: int | list[int] | str) -> list[int]:
-    """Parse a number, a list of numbers, or a text such as `6,12` or `0:10`, where the end of the range is excluded."""
+    """Parse a number, a list of numbers, or text such as `6,12` or `0:10`. Ranges exclude their end."""
     if isinstance(text, int):
         text = [text]
     if isinstance(text, list):
@@ -237,12 +237,12 @@ def counted(number: int, noun: str) -> str:
 
 
 def confounded(trials: Sequence[TrialConfig]) -> str | None:
-    """Describe differences between the assistance conditions other than the assistance, or return None."""
+    """Describe settings that differ between the assistance conditions, or return None if there are none."""
     return confounded_rows([trial.settings() for trial in trials])
 
 
 def confounded_rows(rows: Sequence[Mapping[str, Any]]) -> str | None:
-    """Describe differences between the assistance conditions in a table other than the assistance, or return None."""
+    """Describe table columns that differ between the assistance conditions, or return None."""
     faults = []
     for name in CONFOUNDERS:
         values: dict[str, set[str]] = {}

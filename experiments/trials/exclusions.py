@@ -1,4 +1,4 @@
-"""Exclusions from a study: rules about the columns of its table, and participants by ID (docs/analysis.md)."""
+"""Exclude participants from a study by rules about table columns or by ID (docs/analysis.md)."""
 
 import difflib
 import math
@@ -16,13 +16,13 @@ Row = Mapping[str, Any]
 Comparison = Literal["<", "<=", ">", ">=", "==", "!=", "missing", "infinite"]
 Reason = Annotated[str, msgspec.Meta(min_length=1, max_length=200, pattern=r"^[^\r\n]*\S[^\r\n]*\Z")]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
-# Columns that identify a participant, the most reliable first
+# Columns that identify a participant, in order of reliability
 IDS = ("participant", "fingerprint", "person_seed")
 BY_NAME = "people by name"
 
 
 class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A rule that excludes rows by the value of a column. Only the comparison `missing` matches missing values."""
+    """A rule that excludes rows by a column's value. Missing values match only the comparison `missing`."""
 
     column: Name
     comparison: Comparison
@@ -45,7 +45,7 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return f"{self.column} {self.comparison}{given}"
 
     def holds(self, row: Row) -> bool:
-        """Return True if a row is excluded. Raises a `TypeError` if the value in the row cannot be compared."""
+        """Return True if the rule excludes a row. Raises `TypeError` if the value cannot be compared."""
         found = row.get(self.column)
         unknown = found is None or (isinstance(found, float) and math.isnan(found))
         if unknown or self.comparison == "missing":
@@ -69,14 +69,14 @@ UNFINISHED = Rule("ended", "!=", "did not deliver everything", ALL_DELIVERED)
 
 
 class ExcludedPerson(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A participant excluded by ID, with the reason."""
+    """A participant who is excluded by ID, with the reason for the exclusion."""
 
-    id: Name | int  # ID of the participant in one of the columns `IDS`
+    id: Name | int  # ID of the participant in one of the columns in `IDS`
     reason: Reason
 
 
 class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Rules and excluded participants. Unfinished participants are also excluded unless `unfinished` is `keep`."""
+    """The exclusions from a study. Unfinished participants are excluded unless `unfinished` is `keep`."""
 
     rules: tuple[Rule, ...] = ()
     people: tuple[ExcludedPerson, ...] = ()
@@ -89,14 +89,14 @@ class Exclusions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise ValueError(f"the {what} {twice} occurs twice; leave one out")
 
     def all_rules(self) -> tuple[Rule, ...]:
-        """Return the rules, including the rule for unfinished participants."""
+        """Return all rules, including the rule that excludes unfinished participants."""
         implied = self.unfinished == "leave out" and str(UNFINISHED) not in map(str, self.rules)
         return (*self.rules, *([UNFINISHED] if implied else []))
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """An excluded participant, with the reason for each rule that excludes them."""
+    """An excluded participant, with the reasons for the exclusion."""
 
     person: str
     assistance: str
@@ -105,9 +105,9 @@ class LeftOut:
 
 
 def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[int, LeftOut]:
-    """Return the excluded participants of a table by row number.
+    """Return the participants in a table who are excluded, by row number.
 
-    Every rule must name a column of the table, and every excluded ID must occur in it.
+    Every rule must name a column of the table, and every excluded ID must occur in the table.
     """
     found: dict[int, dict[str, str]] = {}
     for number, rule in enumerate(exclusions.all_rules(), start=1):
@@ -141,7 +141,7 @@ def left_out(exclusions: Exclusions, rows: Sequence[Row], path: Path) -> dict[in
 
 
 def person_name(row: Row, number: int) -> str:
-    """Return the ID of a participant, or their row number if they have none."""
+    """Return the ID of a participant, or the row number if the participant has no ID."""
     return str(next((row[name] for name in IDS if row.get(name) is not None), f"row {number}"))
 
 

@@ -1,6 +1,6 @@
-"""Files, source code and libraries on which the result of a trial depends, as hashes or versions.
+"""Compute hashes and versions of the files, source code and libraries on which a trial depends.
 
-A resumed batch compares them with the current ones, and reruns the trials for which one of them has changed.
+If a batch is resumed, trials are rerun if any of these hashes and versions has changed.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from mjsim.house.catalogue.catalogue import Catalogue
 from mjsim.support.files import PACKAGES, digest_of, read_bytes, source_digest
 
 LIBRARIES = ("mujoco", "numpy", "numba", "llvmlite", "ortools", "scipy", "shapely")
-# Source files that affect the record of a trial. Code that only reads records is not included.
+# Source files that can change the record of a trial. Code that only reads records is not included.
 CODE = (
     "hud",
     "planner",
@@ -33,7 +33,7 @@ Inputs = Mapping[str, str]
 
 
 def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
-    """Return hashes and versions by name. Equal configurations with equal inputs give equal records."""
+    """Return the hashes and versions of everything on which a trial depends besides its settings, by name."""
     inputs = {"house": catalogue.content, **code_versions()}
     if config.episode is not None:
         inputs["episode"] = hashlib.sha256(read_bytes(Path(config.episode))).hexdigest()
@@ -44,13 +44,13 @@ def trial_inputs(config: TrialConfig, catalogue: Catalogue) -> dict[str, str]:
 
 
 def code_versions(modules: Iterable[str] = ()) -> dict[str, str]:
-    """Return hashes and versions of the code that affects trials: this package, libraries and the given modules."""
+    """Return hashes and versions of this package, of its libraries and of additional modules."""
     user_code = {f"module {name}": plugin_digest(name) for name in modules}
     return {"code of mjsim": source_digest(*CODE), **_libraries(), **user_code}
 
 
 def fingerprint(config: TrialConfig, inputs: Inputs) -> str:
-    """Hash the settings and inputs of a trial to 16 hex digits. File contents affect the hash, file paths do not."""
+    """Hash the settings and inputs of a trial to 16 hex digits. The hash does not depend on file paths."""
     settings = {name: value for name, value in config.settings().items() if name not in PATHS}
     return hashlib.sha256(json.dumps([settings, sorted(inputs.items())]).encode()).hexdigest()[:16]
 
@@ -60,7 +60,7 @@ def changes(before: Inputs, now: Inputs) -> list[str]:
 
 
 def plugins(config: TrialConfig) -> tuple[str, ...]:
-    """Return the modules outside this package that define the participant, conditions and planner."""
+    """Return the modules of custom participants, conditions and planners that a trial uses."""
     conditions = (config.assistance, config.training_assistance)
     named = (config.user, config.planner, *(name.partition("-")[0] for name in conditions))
     modules = {module for module, colon, _ in (name.partition(":") for name in named) if colon}
@@ -70,7 +70,7 @@ def plugins(config: TrialConfig) -> tuple[str, ...]:
 
 @functools.cache
 def plugin_digest(module: str) -> str:
-    """Hash the source of a module, or of its whole top-level package, to 16 hex digits."""
+    """Hash the source code of a module or of its top-level package to 16 hex digits."""
     spec = importlib.util.find_spec(module.partition(".")[0])
     if spec is None:
         return ""

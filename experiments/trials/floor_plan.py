@@ -1,4 +1,4 @@
-"""The floor plan of a trial: rooms, objects, receptacles, the planned path and the walked path."""
+"""Draw a floor plan of a trial with rooms, objects, receptacles, the planned path and the walked path."""
 
 import contextlib
 import functools
@@ -22,17 +22,17 @@ from mjsim.support.kernels import cache_base
 from mjsim.values.episode import Episode
 from mjsim.values.observation import Observation
 
-# Okabe-Ito colours, which people with common forms of colour blindness can distinguish
+# The Okabe-Ito palette, whose colours can be distinguished with common forms of colour blindness
 CATEGORY_COLOURS = ("#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#CC79A7")
 PLANNED, WALKED = "#D55E00", "#1B1B1B"
 ORIGIN, LABEL, BLACK, WHITE = "#B00020", "#333333", "#000000", "#FFFFFF"
-PIXELS_PER_METRE = 90  # scale of the picture, reduced for large houses
-MAX_SIDE = 1920  # length of the longer side of the house picture in pixels
-# Frame around the house, row height and column width of the legend, in pixels
+PIXELS_PER_METRE = 90  # maximum scale of the picture, which is reduced for large houses
+MAX_SIDE = 1920  # maximum length of the picture's longer side, in pixels
+# Width of the frame around the house, and row height and column width of the legend, in pixels
 MARGIN, ROW, COLUMN = 28, 24, 240
-DASH, PERIOD = 8, 15  # length and period of dashes in pixels
+DASH, PERIOD = 8, 15  # length and period of dashes, in pixels
 _SAMPLE = np.array([[-18.0, 0.0], [18.0, 0.0]])  # ends of the sample line in the legend, in pixels
-_SHIFT = 4  # fractional bits of coordinates in OpenCV
+_SHIFT = 4  # number of fractional bits in OpenCV coordinates
 
 _Points = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ _Points = NDArray[np.float64]
 def draw_topdown(
     path: Path, house: House, episode: Episode, plan: Event, walked: _Points, origin: str
 ) -> None:
-    """Write a PNG of the house with the first plan and the walked path.
+    """Write a PNG image of the house with the first planned path and the walked path.
 
     Args:
         path: PNG file to write.
@@ -64,9 +64,9 @@ def draw_topdown(
 def task_picture(
     house: House, episode: Episode, title: str, planned: _Points | None = None
 ) -> NDArray[np.uint8]:
-    """Draw the start of a task and the planned path as an RGB image, shape (height, width, 3).
+    """Draw a house at the start of a task as an RGB image, shape (height, width, 3).
 
-    The path is in metres, shape (k, 2).
+    A planned path in metres, shape (k, 2), is drawn if it is given.
     """
     lines = {} if planned is None else {f"shortest way, {_length(planned):.1f} m": (planned, PLANNED)}
     drawing = _drawn_task(house, episode, lines, np.array([episode.start.x, episode.start.y]))
@@ -99,9 +99,9 @@ def _drawn_task(
 
 
 def planned_path(house: House, episode: Episode, plan: Event, seen: Observation | None = None) -> _Points:
-    """Return the path of a `plan` event in metres, shape (k, 2).
+    """Return the planned path of a `plan` event in metres, shape (k, 2).
 
-    The path begins at the person's position in `seen`, or at the start if `seen` is None.
+    The path begins at the person's position in `seen`, or at the start of the task if `seen` is None.
     """
     if seen is None:
         places = {o.name: np.array(o.position[:2]) for o in episode.objects}
@@ -197,7 +197,7 @@ class _Drawing:
 
 
 def house_picture(house: House, scale: float) -> NDArray[np.uint8]:
-    """Draw the tidy house from above as an RGB image, or read the image from the cache folder."""
+    """Return an RGB image of the tidy house from above. The image is cached on disk."""
     name = f"{house.catalogue.content}-{scale:g}.png"
     kept = cache_base() / f"mjsim-floorplans-{source_digest('mjsim')}" / name
     if (picture := cv2.imread(str(kept)) if kept.is_file() else None) is not None:

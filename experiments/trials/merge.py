@@ -1,4 +1,4 @@
-"""Merges shards: joins their folders, writes the tables, and finds missing trials."""
+"""Merge the shards of a batch: join their folders, write the tables, and find missing trials."""
 
 import dataclasses
 import functools
@@ -27,12 +27,12 @@ _ROWS_OF = re.compile(r"\.rows\.\d+-of-(\d+)\..*")
 
 @dataclass(frozen=True)
 class Merged:
-    """A design whose shards were merged.
+    """The result of merging the shards of a design.
 
     Attributes:
-        rows: Rows of the tables, with those of the design first.
+        rows: Rows of the tables, starting with the trials of the design.
         missing: Trials of the design that no folder contains.
-        shards: Number of missing trials for each shard. Empty if the number of shards is unknown.
+        shards: Number of missing trials by shard. Empty if the number of shards is unknown.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -49,12 +49,12 @@ def merge_shards(
     on_note: Callable[[str], None] = lambda _: None,
     on_read: OnRead = lambda *_: None,
 ) -> Merged:
-    """Join the folders of shards in `out`, and write the tables. The folders in `parts` are not changed.
+    """Copy the trials of all shards to one folder, and write the result tables.
 
     Args:
         design: The whole design.
-        out: Folder for all trials. It may contain some of them already.
-        parts: Folders of further shards.
+        out: Folder for all trials, which may already contain some of them.
+        parts: Folders of the other shards, which are not changed.
         workers: Number of processes that read trials.
         on_note: Called with messages for the user.
         on_read: Called after each trial is read, with the number of trials read so far and the total number.
@@ -70,7 +70,7 @@ def merge_shards(
             raise RecordError(f"{part} is not the folder of a batch; name the --out of shards")
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
     for folder in (out, *others):
-        adopt(folder / TRIALS)  # renames the archives that killed shards have left
+        adopt(folder / TRIALS)  # renames archives that killed processes have left behind
     reader, *readers = (TrialReader(folder, workers=workers, on_read=on_read) for folder in (out, *others))
     chosen = {trial.path.name: trial for trial in reader.read()[0] if trial.complete}
     added: dict[Path, dict[str, StoredTrial]] = {}

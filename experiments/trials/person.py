@@ -1,7 +1,7 @@
-"""Distributions of `mjsim.PersonParameters`, from which the person of each trial is drawn.
+"""Draw the person of a trial from distributions of the fields of `mjsim.PersonParameters`.
 
-Names and units are those of `PersonParameters`. Names in a group have a prefix, as in `motion.reach_time`. Parameters
-without a distribution have the same value for all persons.
+Names and units are the same as in `PersonParameters`. The name of a field in a group has a prefix, for
+example `motion.reach_time`. Parameters without a distribution have the same value for all persons.
 """
 
 import math
@@ -29,13 +29,13 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 
 def check_person(described: Distributions) -> None:
-    """Check distributions with the median person. Raises a `ConfigError` if a distribution is invalid."""
+    """Check distributions by creating the median person. Raises `ConfigError` if one of them is invalid."""
     if described:
         _person(quantiles(PARAMETERS, described, [0.5] * len(PARAMETERS), "a person"))
 
 
 def view_limits(text: str) -> tuple[float, float]:
-    """Parse `1.2,1.9`, the limits in radians of the field of view that a participant may choose."""
+    """Parse the limits of a participant's field of view in radians, such as `1.2,1.9`."""
     least, most, _ = RANGES["field_of_view"]
     try:
         low, high = map(float, text.split(","))
@@ -50,7 +50,7 @@ def view_limits(text: str) -> tuple[float, float]:
 
 
 def drawn_person(described: Distributions, rng: "np.random.Generator") -> PersonParameters:
-    """Draw a person. Raises a `ConfigError` if a name is unknown or a value cannot be drawn."""
+    """Draw the parameters of a person. Raises `ConfigError` if a name or a distribution is invalid."""
     if not described:
         return _DEFAULT
     return _person(draw(PARAMETERS, described, rng, "a person"))

@@ -1,4 +1,4 @@
-"""Workers on a Ray cluster whose machines share a folder. The extra `ray` installs Ray."""
+"""Run trials on a Ray cluster whose machines share a folder. The extra `ray` installs Ray."""
 
 import functools
 import logging
@@ -18,29 +18,29 @@ from typing import Any
 from experiments.errors import ConfigError
 from experiments.session.signals import SIGNALS
 
-TRIAL_BYTES = 300_000_000  # memory in bytes used by a trial with compiled kernels
+TRIAL_BYTES = 300_000_000  # memory that a trial with compiled kernels uses, in bytes
 QUEUED_PER_CORE = 2
 PERIOD_S = 5.0  # interval between checks of the cluster
-HEAD_TIMEOUT_S = 60.0  # how long the head node of the cluster may take to restart
-END_S = 10.0  # how long cancelled calls may take to end
-# By default, Ray sends usage statistics, and ends this process silently after a minute without the head node.
+HEAD_TIMEOUT_S = 60.0  # maximum time for a restart of the cluster's head node
+END_S = 10.0  # maximum time until cancelled calls have ended
+# By default, Ray sends usage statistics. It also ends this process silently if the head node is lost.
 ENVIRONMENT = {"RAY_gcs_rpc_server_reconnect_timeout_s": "600", "RAY_USAGE_STATS_ENABLED": "0"}
 REMEDY = "install the same versions on all machines, then restart Ray there"
 Versions = tuple[tuple[str, str], ...]
 
 
 class LostMachineError(BrokenProcessPool):
-    """A machine was lost while it ran a call."""
+    """Raised if a machine of the cluster is lost during a call."""
 
 
 @contextmanager
 def ray_cluster(
     workers: int | None, modules: Sequence[str], on_note: Callable[[str], None], folder: Path
 ) -> Iterator[Callable[[], AbstractContextManager["_Cluster"]]]:
-    """Connect to the cluster at RAY_ADDRESS, or to a local cluster, which is started if necessary.
+    """Connect to the Ray cluster at RAY_ADDRESS, or to a local cluster, which is started if necessary.
 
     Raises:
-        ConfigError: Ray or a cluster is missing, or a machine cannot run trials of this batch.
+        ConfigError: Ray is not installed, there is no cluster, or a machine cannot run trials of this batch.
     """
     os.environ.update(ENVIRONMENT | os.environ)
     try:
@@ -67,7 +67,7 @@ def _connect(ray: Any) -> None:
     ray._private.worker.print_to_stdstream = lambda *_, **__: None
     try:
         if ":" in (address := os.environ.get("RAY_ADDRESS", "")):
-            # Fails immediately if the cluster is unreachable, whereas Ray retries for minutes
+            # This fails immediately if the cluster cannot be reached. Ray itself would retry for minutes.
             _reach(address)
         ray.init(log_to_driver=False, logging_level=logging.ERROR)
     except (OSError, RuntimeError, ValueError) as error:
@@ -104,14 +104,14 @@ class _Cluster:
 
     def _finish(self, result: Future[Any], done: Future[Any]) -> None:
         self._running.pop(result, None)
-        with suppress(InvalidStateError):  # the call has already failed because the cluster was lost
+        with suppress(InvalidStateError):  # the call has already failed, because the cluster was lost
             if error := done.exception():
                 result.set_exception(_translated(error))
             else:
                 result.set_result(done.result())
 
     def prepare(self, on_note: Callable[[str], None]) -> None:
-        """Check all machines. On each, load the numeric code in one process before the others start."""
+        """Check all machines, and load the numeric code on each before the trials start."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy as On
 
         from experiments.trials.design import counted
@@ -129,7 +129,7 @@ class _Cluster:
         }
         for call in as_completed(calls):
             error = call.exception()
-            if error is None or isinstance(error, BrokenProcessPool):  # lost machines are tolerated
+            if error is None or isinstance(error, BrokenProcessPool):  # ignore lost machines
                 continue
             if isinstance(error, ConfigError | ConnectionError):
                 raise error
@@ -176,7 +176,7 @@ class _Cluster:
 
 @functools.cache
 def _check_machine(folder: Path, versions: Versions) -> None:
-    """Check, once per process, that this machine runs the same versions as the driver and shares the work folder."""
+    """Check that this machine has the same software versions as the driver and shares the work folder."""
     from experiments.trials.fingerprint import changes, code_versions
 
     expected, name = dict(versions), platform.node()

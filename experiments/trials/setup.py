@@ -1,4 +1,4 @@
-"""The setup of a trial: its person, its episode, and a session that is ready to run."""
+"""Set up a trial: draw its person, choose its episode, and create a session that is ready to run."""
 
 import hashlib
 from pathlib import Path
@@ -33,16 +33,16 @@ from planner.route import TaskState
 from planner.service import Mode, Planner
 from planner.solver_source import SolverSource
 
-_SESSION = 77  # keeps the random numbers of the session independent of those of a house with the same seed
-_LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # random streams of a session
-PREPARATION_S = 20.0  # maximum wall time for proving the first plan of a live trial before its clock starts
+_SESSION = 77  # keeps the session's random numbers independent of the house's random numbers
+_LIST_ORDER, _CHANCE, _PERSON, _BEHAVIOUR = range(4)  # indices of a session's random streams
+PREPARATION_S = 20.0  # maximum time for proving the first plan of a live trial, in seconds
 
 
 def draw_person(config: TrialConfig) -> PersonParameters:
-    """Draw the parameters of the participant's body with the person seed.
+    """Draw the body parameters of a trial's participant, using the person seed.
 
-    Values without a distribution in `config.person` follow the attribute `person` of the participant's factory, a
-    mapping as for `Distributions.of`. Values missing from both are the defaults.
+    Parameters without a distribution in `config.person` are drawn from the mapping `person` of the
+    participant's factory, which is used as in `Distributions.of`. All other parameters have default values.
     """
     factory = participant(config.user)
     try:
@@ -54,7 +54,7 @@ def draw_person(config: TrialConfig) -> PersonParameters:
 
 
 def draw_behaviour(config: TrialConfig) -> dict[str, float]:
-    """Draw the parameters of the participant model with the person seed. The result is empty if it has none."""
+    """Draw the parameters of the participant model, if it has any, using the person seed."""
     parameters = getattr(participant(config.user), "behaviour", {})
     rng = _session_rng(config.person_seed, _BEHAVIOUR)
     values = draw(parameters, config.behaviour, rng, f"participant {config.user!r}")
@@ -64,7 +64,7 @@ def draw_behaviour(config: TrialConfig) -> dict[str, float]:
 
 
 def trial_episode(config: TrialConfig, house: House) -> Episode:
-    """Sample the episode of a trial, or read it from a file."""
+    """Return the episode of a trial, which is sampled or read from a file."""
     if config.episode is None:
         return house.sample_episode(objects=config.objects, seed=config.house_seed, points=config.points)
     episode = Episode.load(Path(config.episode))
@@ -89,10 +89,10 @@ def regret_evaluator(config: TrialConfig, house: House) -> RegretEvaluator:
 
 
 def prepared_planner(config: TrialConfig, house: House, episode: Episode) -> Planner:
-    """Start planning for a trial, and return its planner. The caller must close the planner.
+    """Create a planner for a trial and start planning. The caller must close the planner.
 
-    The exact planner works in a thread, because its kernels release the GIL. For a live trial, the first plan is proved
-    before the clock starts.
+    The exact planner runs in a thread, because its kernels release the GIL. The first plan is prepared before
+    the clock of the trial starts.
     """
     mode = Mode.THREAD if isinstance(planner_named(config.planner), ExactSolver) else Mode.INLINE
     mode = Mode.LIVE if config.live else mode
@@ -120,18 +120,18 @@ def prepare_session(
     user: Participant | None = None,
     journal: Journal | None = None,
 ) -> tuple[Session, World]:
-    """Make the world, the assistant and the participant of a trial, and a session that is ready to run.
+    """Create the world, the assistant and the participant of a trial, and a session that uses them.
 
     Args:
-        config: The settings.
+        config: The settings of the trial.
         house: The house for the scene's person (`House.for_person`).
         scene: The composed episode.
         log: The event log.
-        viewer: Shows the session, or None.
-        planner: A planner, or None for that of the settings.
-        world: A new world, or None to make one.
-        user: A participant, or None for that of the settings.
-        journal: Receives the record, or None to keep it in memory.
+        viewer: Viewer that shows the session, or None.
+        planner: Planner to use, or None to create the planner that the settings name.
+        world: A new world to use, or None to create one.
+        user: Participant to use, or None to create the participant that the settings name.
+        journal: Journal that receives the record, or None to keep the record in memory.
     """
     order_rng = _session_rng(config.order_seed, _LIST_ORDER)
     planner = planner or Planner(solver_source(config, house), regret_evaluator(config, house))

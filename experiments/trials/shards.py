@@ -1,7 +1,7 @@
-"""Shards: parts of a design, one for each task of an array job.
+"""Split a design into shards, for example one for each task of an array job.
 
-A shard reads and runs only its own trials and writes no tables, so several shards can work in the same folder at the
-same time.
+A shard reads and runs only its own trials and writes no tables. Several shards can therefore be run in the
+same folder at the same time.
 """
 
 import dataclasses
@@ -17,14 +17,14 @@ from experiments.trials.trial_config import TrialConfig
 
 @dataclass(frozen=True)
 class Shard:
-    """One of `count` parts of a design. Numbers start at 1."""
+    """One of `count` parts of a design. The number of the first part is 1."""
 
     number: int
     count: int
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
-        """Parse `K/N`. Raises a `ConfigError` if the text is not a shard."""
+        """Parse a shard from text of the form `K/N`. Raises `ConfigError` if the text is invalid."""
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         if not found or not 1 <= int(found[1]) <= int(found[2]):
             raise ConfigError(
@@ -37,11 +37,11 @@ class Shard:
 
     @property
     def label(self) -> str:
-        """Part of the names of files that only this shard uses."""
+        """A label that is part of the names of this shard's files."""
         return f"{self.number}-of-{self.count}."
 
     def of(self, design: Design) -> Design:
-        """Return the trials of this shard, in the design's order."""
+        """Return the part of a design that belongs to this shard, in the same order."""
         total = len(design.trials)
         if total < self.count:
             raise ConfigError(
@@ -55,9 +55,9 @@ class Shard:
 def shard_numbers(trials: Sequence[TrialConfig], count: int) -> list[int]:
     """Return the shard number of each trial, from 1 to `count`.
 
-    The result depends only on the number of trials and their houses. A shard contains whole houses if possible, because
-    making a house takes longer than many trials. The trials of a house are shuffled, so that the shards take similar
-    times.
+    The result depends only on the number of trials and their houses. If possible, all trials of a house are
+    in the same shard, because creating a house takes longer than many trials. The trials of a house are
+    shuffled so that all shards take a similar time.
     """
     houses = {house: k for k, house in enumerate(dict.fromkeys(trial.house for trial in trials))}
     order = sorted(range(len(trials)), key=lambda k: (houses[trials[k].house], _shuffle_key(k)))

@@ -1,4 +1,4 @@
-"""Tables of trials as Parquet and CSV, with the meaning of their columns."""
+"""Read and write tables of trials, and describe their columns."""
 
 import dataclasses
 import inspect
@@ -24,7 +24,7 @@ from mjsim.values.person_parameters import PersonParameters
 
 NAME = "trials"
 _TRIAL = ("user", *SEEDS, "assistance", "objects", "fingerprint")  # columns that identify a trial
-# Key of the column types in the metadata, because the footer of Parquet has no checksum
+# Metadata key of the column types. They are stored twice because a Parquet footer has no checksum.
 _WRITTEN = b"mjsim.columns"
 Columns = dict[str, tuple[str, str]]  # type and description of each column
 _QUANTITIES = {
@@ -44,15 +44,15 @@ _NAMES = {"NoneType": "null", "VisitKind": "str", "Status": "str", "Refusal": "s
 
 
 def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path, Path]:
-    """Write `trials.parquet` and `trials.csv` atomically. Return their paths in this order.
+    """Atomically write `trials.parquet` and `trials.csv`, and return their paths.
 
-    The columns are the union of the rows' keys, in order of first appearance.
+    The columns are all keys of the rows, in order of first appearance.
     """
     columns = list(dict.fromkeys(key for row in rows for key in row))
     table = pa.table({c: [row.get(c) for row in rows] for c in columns})
     parquet, csv = folder / f"{NAME}.parquet", folder / f"{NAME}.csv"
     written = table.replace_schema_metadata({_WRITTEN: json.dumps(_types(table.schema))})
-    # Pass open files to pyarrow, which rejects paths that are not UTF-8 or that look like URLs.
+    # Pass open files to pyarrow, because it rejects paths that are not UTF-8 or that look like URLs.
     with replacing(parquet) as temporary, temporary.open("wb") as file:
         pa.parquet.write_table(written, file, write_page_checksum=True)
     # Columns without values have no type, so the CSV file omits them.
@@ -63,7 +63,7 @@ def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Path,
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a Parquet file. Each trial must occur only once."""
+    """Read the rows of a Parquet file, in which each trial must occur only once."""
     try:
         check_input(path)
         with path.open("rb") as file:
@@ -76,7 +76,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     for k, row in enumerate(rows):
         if row.get("fingerprint") is None and row.get("person_seed") is None:
             continue  # the row does not identify a trial
-        # Several participants may play the same trial with different results, so all columns identify their rows.
+        # Several human participants can play the same trial, so only all columns together identify a row.
         names = _TRIAL if is_simulated(row.get("user")) else sorted(row)
         first = seen.setdefault(tuple(str(row.get(name)) for name in names), k)
         if first != k:
@@ -103,7 +103,7 @@ def _check_columns(schema: pa.Schema) -> None:
 
 
 def trial_columns() -> Columns:
-    """Return the type and the description of each column in a table of trials, in order."""
+    """Return the type and the description of each column in a table of trials."""
     hints = typing.get_type_hints(TrialConfig)
     found: Columns = {
         name: (_type_name(hints[name]), str(about.description))
@@ -133,7 +133,7 @@ def trial_columns() -> Columns:
 
 
 def described(kind: type[Any], leave_out: set[str] | frozenset[str] = frozenset()) -> Columns:
-    """Return the type and the description of each field that a class defines itself.
+    """Return the type and the description of each field of a class, without inherited fields.
 
     The docstring of the class must describe all these fields.
     """

@@ -1,4 +1,4 @@
-"""The training before a task: a trial with one object and practically no time limit (PAPER section 7)."""
+"""Create the training before a task, which is a trial with a single object (PAPER section 7)."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,11 +11,11 @@ from experiments.trials.trial_config import NO_ASSISTANCE, TrialConfig
 
 TRAINING_LIMIT_S = 3600.0  # time limit of the training for simulated participants
 HUMAN_TRAINING_LIMIT_S = 24 * 3600.0
-_TRAINING_SEED = 7  # distinguishes the house seed of the training from that of the task
+_TRAINING_SEED = 7  # makes the house seed of the training differ from the seed of the task
 
 
 def training_config(config: TrialConfig) -> TrialConfig:
-    """Return the training of a trial: one object in the same house, at a different location than in the task."""
+    """Return the settings of the training before a trial, with one object in the same house."""
     seed = int(np.random.SeedSequence([config.house_seed, _TRAINING_SEED]).generate_state(1)[0])
     return replace(
         config,
@@ -32,6 +32,6 @@ def training_config(config: TrialConfig) -> TrialConfig:
 
 
 def trials_of(task: TrialConfig) -> Mapping[str, dict[str, Any]]:
-    """Return the settings of a person's training and task, by phase."""
+    """Return the settings of a participant's training and task, by phase."""
     training = replace(training_config(task), time_limit=HUMAN_TRAINING_LIMIT_S)
     return {TRAINING: training.settings(), TASK: task.settings()}

@@ -1,4 +1,4 @@
-"""Runs a trial and records it in a run directory."""
+"""Run a trial and record it in a run directory."""
 
 import dataclasses
 import os
@@ -53,16 +53,16 @@ def run_trial(
     on_progress: OnProgress = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Run a trial and write its record to `out` atomically. The record is kept even if the trial ends early.
+    """Run a trial and atomically write its record to a folder, even if the trial ends early.
 
     Args:
         config: Settings of the trial.
         out: Run directory.
         film: Settings of the film, or None for no video.
-        topdown: Draw the floor plan.
-        replace: Allow an earlier run in `out`, which is replaced.
-        scratch: Parent of the working folder (default: that of `out`).
-        house: The house that `config` names, if it is loaded already.
+        topdown: True to draw the floor plan.
+        replace: True if an earlier run in `out` may be replaced.
+        scratch: Parent of the temporary folder (default: the parent of `out`).
+        house: The house that `config` names, if it is already loaded.
         on_progress: Called after every action.
         on_warning: Called with errors that do not affect the record, such as a failed video or floor plan.
 
@@ -107,7 +107,7 @@ def run_trial(
 
 
 def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
-    """Draw the floor plan of a run directory. Return an error message, or None."""
+    """Draw the floor plan of a run. Return an error message, or None if this succeeded."""
     if not record.plans:
         return None
     try:
@@ -117,7 +117,7 @@ def draw_floor_plan(run: Path, house: House, record: Record) -> str | None:
             walked = record.trajectory["position"]
             draw_topdown(folder / records.TOPDOWN, house, record.episode, record.plans[0], walked, origin)
             add_files(folder, run)
-    except Exception as error:  # a failed picture must not cost the record
+    except Exception as error:  # the record must be kept even if drawing fails
         return f"no floor plan: {describe(error)}"
     return None
 

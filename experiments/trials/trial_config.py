@@ -1,4 +1,4 @@
-"""The settings of a trial, from which options, design files, start events and table columns are derived."""
+"""Settings of a trial, from which command-line options and table columns are derived."""
 
 import math
 import typing
@@ -18,7 +18,7 @@ from mjsim.values.episode import CAPACITY, POINTS, Episode
 from mjsim.values.options import CAPACITIES, FIDELITIES, WorldOptions
 from planner.solvers import DEFAULT_SOLVER
 
-SECONDS_PER_OBJECT = 150.0  # several times as long as the slowest participant, `searcher`, needs
+SECONDS_PER_OBJECT = 150.0  # several times as long as the slowest simulated participant needs
 SEEDS = ("house_seed", "person_seed", "order_seed")
 NO_ASSISTANCE = "none"
 DRAWN_BY = ("auto", "browser", "server")
@@ -29,13 +29,13 @@ def _about(description: str, **extra: Any) -> msgspec.Meta:
     return msgspec.Meta(description=description, extra=extra)
 
 
-_AS_SEED = cast(int, None)  # default value, replaced by that of `seed`
+_AS_SEED = cast(int, None)  # default value, which is replaced by `seed`
 
 
 class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Settings that determine a trial. Equal settings give equal records.
+    """The settings of a trial. Trials with equal settings have equal records.
 
-    The field `seed` sets each of the three other seeds that is not given, and is None afterwards.
+    Each of the other three seeds is set to `seed` if it is not given. Afterwards, `seed` is None.
 
     Raises:
         ConfigError: A value is invalid.
@@ -169,7 +169,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> "TrialConfig":
-        """Make a configuration from `settings`. Missing settings have their default values."""
+        """Create a configuration from a mapping. Missing settings have their default values."""
         try:
             return msgspec.convert(settings, cls, dec_hook=lambda kind, given: kind.of(given))
         except msgspec.ValidationError as error:
@@ -229,16 +229,16 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def view_limits(self) -> tuple[float, float] | None:
-        """Limits in radians of the field of view that a participant may choose, or None if it is fixed."""
+        """The limits of the participant's field of view in radians, or None if it cannot be changed."""
         return None if self.field_of_view_range is None else view_limits(self.field_of_view_range)
 
     @property
     def limit(self) -> float:
-        """Simulated time in seconds after which the trial ends."""
+        """The simulated time in seconds after which the trial ends."""
         return self.time_limit if self.time_limit is not None else 60.0 + SECONDS_PER_OBJECT * self.objects
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings by name as JSON values. The time limit is filled in."""
+        """Return all settings by name as JSON values, including the default time limit."""
         values = {name: getattr(self, name) for name in SETTINGS}
         return {
             **values,
@@ -248,7 +248,7 @@ class TrialConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         }
 
 
-# Description of each recorded setting
+# The description of each recorded setting
 SETTINGS: dict[str, msgspec.Meta] = {
     name: hint.__metadata__[0]
     for name, hint in typing.get_type_hints(TrialConfig, include_extras=True).items()
@@ -256,7 +256,7 @@ SETTINGS: dict[str, msgspec.Meta] = {
 }
 DEFAULTS: dict[str, Any] = {f.name: f.default for f in msgspec.structs.fields(TrialConfig)}
 PATHS = tuple(name for name, about in SETTINGS.items() if (about.extra or {}).get("path"))
-# Settings that may differ by accident between the conditions of a comparison
+# Settings that may accidentally differ between the conditions that are compared
 CONFOUNDERS = tuple(
     name
     for name in SETTINGS
@@ -265,7 +265,7 @@ CONFOUNDERS = tuple(
 
 
 def episode_settings(path: Path) -> dict[str, Any]:
-    """Return the arguments of `TrialConfig` that an episode file sets."""
+    """Return the trial settings that are determined by an episode file."""
     episode = Episode.load(path)
     return {
         "objects": len(episode.objects),

@@ -1,8 +1,8 @@
-"""Reads the trials of a batch folder, each of them only once.
+"""Read the trials of a batch folder, and cache their results.
 
-Rows are cached in OUT/.rows.jsonl.gz, or in a separate file for each shard, with the sizes and modification times of
-the files from which they were computed. A trial is read again if these or the code of mjsim have changed. The caches
-may be deleted at any time.
+Table rows are cached in OUT/.rows.jsonl.gz, or in a separate file for each shard, together with the sizes and
+modification times of the files of the trial. A trial is read again if its files or the code of mjsim have
+changed. The cache may be deleted at any time.
 """
 
 import dataclasses
@@ -26,7 +26,7 @@ from mjsim.support.files import replacing, source_digest
 
 ROWS = ".rows.jsonl.gz"
 UNSTAMPED: Stamp = ()
-POOL_FROM = 500  # number of unread trials from which worker processes save time
+POOL_FROM = 500  # minimum number of unread trials for which worker processes save time
 
 OnRead = Callable[[int, int], None]  # called with the number of trials read so far and the total number
 
@@ -44,14 +44,14 @@ _DECODER, _ENCODER = msgspec.json.Decoder(_CachedRow), msgspec.json.Encoder()
 
 
 class TrialReader:
-    """Reads the trials of a batch folder, with a cache in that folder.
+    """A reader for the trials in a batch folder, with a cache in the same folder.
 
     Args:
-        out: The folder.
+        out: The batch folder.
         workers: Number of processes that read trials.
         on_read: Called after each trial is read.
         names: Names of the trials that a shard reads, or None for all trials.
-        label: Label of a shard. The names of the shard's cache and archives contain it, so shards share no files.
+        label: Label of a shard, which is part of the names of all its files, so that shards share no files.
     """
 
     def __init__(
@@ -71,11 +71,11 @@ class TrialReader:
         self._saved = dict(self._known)
 
     def add(self, trial: StoredTrial) -> None:
-        """Add a trial that was read elsewhere. Its stamp is `UNSTAMPED` if it has been packed since then."""
+        """Add a trial that was read by another process. If it was packed later, its stamp is `UNSTAMPED`."""
         self._known[trial.path.name] = trial
 
     def read(self) -> tuple[list[StoredTrial], dict[Path, str]]:
-        """Return the trials by name, and an error message for each trial that cannot be used."""
+        """Return all trials sorted by name, and an error message for each trial that cannot be used."""
         paths = self._paths()
         self._known = {
             path.name: trial for path in paths if (trial := self._unchanged(path, stamp_of(path))) is not None
@@ -109,7 +109,7 @@ class TrialReader:
             with suppress(BrokenProcessPool), worker_pool(self._workers) as pool:
                 for result in pool.map(_read, unread, chunksize=20):
                     yield next(left), result
-        for path in left:  # all paths, or those that a broken pool did not read
+        for path in left:  # all trials, or those that the worker processes did not read
             yield path, _read(path)
 
     def _trial(self, row: _CachedRow) -> StoredTrial:

@@ -1,7 +1,7 @@
-"""Compiles all kernels in advance. Later processes load them from disk.
+"""Compile all numeric kernels in advance, so that later processes can load them from disk.
 
-Run this once after installing: `python -m experiments.trials.warmup`. It takes a minute, or a few seconds if all
-kernels are compiled already.
+Run `python -m experiments.trials.warmup` once after the installation. This takes a minute, or a few seconds
+if all kernels are already compiled.
 """
 
 import contextlib
@@ -29,11 +29,11 @@ from planner.exact.warm_start import NOTHING_KNOWN
 from planner.problem import RoutingProblem, Shipment
 from planner.regret import regrets
 
-TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity and simulated time in seconds of each short trial
+TRIALS = (("full", 2.0), ("event", 60.0))  # fidelity and duration (simulated seconds) of each short trial
 
 
 def compile_kernels(house: House | None = None) -> None:
-    """Run every kernel once, with arguments of the types used in trials."""
+    """Run every kernel once, with the argument types that are used in trials."""
     house = house or House.load()
     plan()
     act(house)
@@ -41,7 +41,7 @@ def compile_kernels(house: House | None = None) -> None:
 
 
 def plan() -> None:
-    """Solve a problem with the full table and by search, with regrets, then again from a warm start."""
+    """Solve a routing problem in every way that trials use, in order to compile the planner's kernels."""
     places = np.random.default_rng(0).random((16, 2))
     distances = np.linalg.norm(places[:, None] - places[None], axis=2)
     for resolution in (1e-4, None):
@@ -112,7 +112,7 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
         first, self._seen = not self._seen, True
         if first and sys.stderr is not None and self._may_print():
             kept = cache_folder(Path(event.data["dispatcher"].py_func.__code__.co_filename)) is not None
-            with contextlib.suppress(OSError):  # standard error may be closed
+            with contextlib.suppress(OSError):  # the standard error stream may be closed
                 sys.stderr.write(f"mjsim: {NOTICE if kept else NOT_KEPT.format(folder=cache_base())}\n")
                 sys.stderr.flush()
 
@@ -120,5 +120,5 @@ class _Notice(Listener):  # type: ignore[misc]  # numba has no types
 
 
 def announce_compiling(may_print: Callable[[], bool] = lambda: True) -> None:
-    """Print a notice to standard error the first time a kernel is compiled, if `may_print()` allows it."""
+    """Print a notice to standard error when the first kernel is compiled, if `may_print` returns True."""
     register("numba:compile", _Notice(may_print))

@@ -1,4 +1,4 @@
-"""Workers of a batch: processes on this machine, which end with their parent, or a Ray cluster."""
+"""Run the trials of a batch in worker processes on this machine or on a Ray cluster."""
 
 import functools
 import multiprocessing
@@ -15,18 +15,18 @@ from typing import Any, Protocol
 from experiments.session.signals import SIGNALS, signals_postponed
 from experiments.trials.ray_workers import ray_cluster
 
-QUEUED_PER_WORKER = 2  # a small number, so that Ctrl-C takes effect soon
+QUEUED_PER_WORKER = 2  # number of queued calls per worker, kept small so that Ctrl-C takes effect quickly
 
 
 class _Pool(ProcessPoolExecutor):
-    """A pool whose processes block signals, so that only the parent process can stop a batch."""
+    """A pool of processes that block signals, so that a batch can be stopped only by the parent process."""
 
     @property
     def room(self) -> int:
         return int(self._max_workers * QUEUED_PER_WORKER)  # type: ignore[attr-defined]
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        # Another thread may still receive a signal that is blocked in this one
+        # Postpone signals too, because another thread can receive a signal that this thread blocks.
         with signals_postponed() as signals:
             before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             try:
@@ -39,8 +39,8 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def worker_pool(count: int | None = None) -> Iterator[_Pool]:
-    """Start worker processes, by default one per core. They end at once if the block raises or this process dies."""
-    # Processes are spawned, because GL contexts and thread pools do not survive a fork.
+    """Start worker processes (default: one per core), which end if the block fails or this process dies."""
+    # Spawn the processes, because GL contexts and thread pools do not survive a fork.
     context = multiprocessing.get_context("spawn")
     end_of_work, work = context.Pipe(duplex=False)
     pool = _Pool(count, mp_context=context, initializer=_begin, initargs=(end_of_work, context.Semaphore(1)))
@@ -48,7 +48,7 @@ def worker_pool(count: int | None = None) -> Iterator[_Pool]:
         yield pool
         pool.shutdown()
     finally:
-        work.close()  # ends all workers
+        work.close()  # ends all worker processes
         pool.shutdown(cancel_futures=True)
         end_of_work.close()
 
@@ -61,7 +61,7 @@ def _begin(end_of_work: Connection, may_print: Semaphore) -> None:
 
 
 def _end_with(end_of_work: Connection) -> None:
-    """End this process when its parent terminates it, closes the other end of the connection, or dies."""
+    """End this process when its parent process terminates it, closes the connection, or dies."""
     parent = os.getppid()
 
     def wait_for_end() -> None:
@@ -69,7 +69,7 @@ def _end_with(end_of_work: Connection) -> None:
         os._exit(1)
 
     def wait_for_parent() -> None:
-        # From Python 3.12, a pool that has lost a process waits for the processes that it terminates.
+        # Since Python 3.12, a pool that has lost a process waits for the processes that it terminates.
         while signal.sigwaitinfo({signal.SIGTERM}).si_pid != parent:
             pass
         os._exit(1)
@@ -79,11 +79,11 @@ def _end_with(end_of_work: Connection) -> None:
 
 
 class Executor(Protocol):
-    """Runs calls in the background. A call whose process dies raises `BrokenProcessPool`."""
+    """An executor for background calls. A call raises `BrokenProcessPool` if its process dies."""
 
     @property
     def room(self) -> int:
-        """Maximum number of running and queued calls."""
+        """The maximum number of running and queued calls."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
@@ -91,8 +91,8 @@ class Executor(Protocol):
 PROCESSES, RAY = "processes", "ray"
 Pools = Callable[
     [], AbstractContextManager[Executor]
-]  # makes a new executor each time, so that a batch can continue after a crash
-# Arguments: number of workers or None, user modules, callback for messages, and work folder of the batch
+]  # creates a new executor each time, so that a batch can continue after a crash
+# The arguments are a number of workers or None, user modules, a callback for messages, and the work folder.
 EXECUTORS: Mapping[str, Callable[..., AbstractContextManager[Pools]]] = {
     PROCESSES: lambda workers, *_: nullcontext(functools.partial(worker_pool, workers)),
     RAY: ray_cluster,

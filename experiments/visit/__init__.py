@@ -1,4 +1,4 @@
-"""Visits of participants to a study: plan, phases, server and database."""
+"""Studies with human participants: their plans, phases, servers and databases."""
 
 import lazy_loader
 

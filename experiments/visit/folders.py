@@ -1,7 +1,7 @@
-"""Visit folders. Each contains the settings, journals and runs of one participant's trials.
+"""Visit folders, each of which stores the settings, journals and runs of one participant's trials.
 
-The folder's name is the SHA-256 of the token in the participant's link. The participant's progress is only in the
-database.
+The name of a folder is the SHA-256 of the token in the participant's link. The participant's progress is only
+stored in the database.
 """
 
 import shutil
@@ -19,31 +19,31 @@ from experiments.record.phases import TASK, TRAINING
 from experiments.record.run_directory import JOURNALS, VISIT
 from mjsim.support.files import write_text_atomically
 
-VISITS = "visits"  # subfolder of a study's folder that contains all visit folders
+VISITS = "visits"  # name of the subfolder of a study that contains all visit folders
 
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A phase that has ended, with the fields of a `phase_ended` event. Only training phases have a `reason`."""
+    """A record of a phase that has ended. The fields are those of a `phase_ended` event."""
 
     phase: str
     duration_s: float
-    reason: str | None = None
+    reason: str | None = None  # reason for the end of a training phase, otherwise None
     attempts: int | None = None
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """Contents of `visit.json`, which is written once and never changed."""
+    """The contents of the file `visit.json`, which is written once and never changed."""
 
-    phase: str  # phase in which the folder was created
-    phases: list[str]  # phases with trials, in order
-    trials: dict[str, dict[str, Any]]  # settings of the trials, by phase
+    phase: str  # name of the phase in which the folder was created
+    phases: list[str]  # names of all phases that have a trial, in order
+    trials: dict[str, dict[str, Any]]  # settings of each trial, by phase name
     ended: list[Ended] = []  # phases that ended before the first trial began
     version: int = 1
 
 
 @dataclass(frozen=True)
 class VisitFolder:
-    """The folder of one visit."""
+    """The folder that stores one participant's visit."""
 
     path: Path
     stored: Stored
@@ -66,7 +66,7 @@ class VisitFolder:
         return found
 
     def before(self, phase: str) -> list[dict[str, Any]]:
-        """Return the fields of all `phase_ended` events before the task. The list is empty for other phases."""
+        """Return the fields of `phase_ended` events before the task, or an empty list for other phases."""
         if phase != TASK:
             return []
         ended = [one for one in self.stored.ended if one.phase != TRAINING]
@@ -82,7 +82,7 @@ class VisitFolder:
 
 
 class VisitFolders:
-    """The folders of all visits."""
+    """A collection of the visit folders of all participants."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
@@ -95,7 +95,7 @@ class VisitFolders:
         trials: Mapping[str, dict[str, Any]],
         ended: Sequence[Ended] = (),
     ) -> VisitFolder:
-        """Create the folder of a visit, or return the existing one.
+        """Create a visit folder, or return the existing one.
 
         Args:
             name: Hash of the token in the participant's link.
@@ -111,12 +111,12 @@ class VisitFolders:
         return VisitFolder(folder, stored)
 
     def remove(self, name: str) -> None:
-        """Delete the folder of a visit, including its journals and runs."""
+        """Delete a visit folder, including its journals and runs."""
         shutil.rmtree(self.path / name, ignore_errors=True)
         sync_folder(self.path)
 
     def find(self, name: str) -> VisitFolder | None:
-        """Return the folder of a visit, or None if there is none.
+        """Return the visit folder with this name, or None if there is no such folder.
 
         Raises:
             RecordError: The folder's `visit.json` is damaged.

@@ -1,4 +1,4 @@
-"""Visit plans, which list the phases through which a server leads its participants."""
+"""Visit plans, which define the phases of a study and the settings that all participants share."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Count = Annotated[int, msgspec.Meta(ge=1, le=1_000_000)]
 
 
 class Device(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Requirements for a participant's computer."""
+    """The requirements that a participant's computer must meet."""
 
     frames_per_s: Annotated[float, msgspec.Meta(ge=0.0, le=240.0)] = 20.0
     latency_ms: Annotated[float, msgspec.Meta(ge=1.0)] = 500.0
@@ -32,15 +32,15 @@ class Device(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Timeouts of participants, and limits on failed checks."""
+    """Timeouts for inactive participants, and limits on failed checks."""
 
-    idle: Seconds = 1800.0  # inactivity after which a trial's slot is released, in seconds
-    abandoned_after: Seconds = 1800.0  # inactivity after which a place in a cell is released, in seconds
-    timed_out_after: Seconds = 14400.0  # inactivity after which a participant is timed out, in seconds
-    attempts: Count = 3  # number of attempts allowed at the comprehension check
-    # number of wrong answers allowed in the survey's attention checks; if None, they do not screen out anyone
+    idle: Seconds = 1800.0  # period of inactivity after which a trial's slot is released, in seconds
+    abandoned_after: Seconds = 1800.0  # period of inactivity after which a place is released, in seconds
+    timed_out_after: Seconds = 14400.0  # period of inactivity after which a participant times out, in seconds
+    attempts: Count = 3  # maximum number of attempts at the comprehension check
+    # Number of attention checks in the survey that a participant may fail, or None for no limit
     inattentive: Annotated[int, msgspec.Meta(ge=0, le=1000)] | None = None
-    keep_days: Count | None = None  # days from the last activity to the deletion of identifying data
+    keep_days: Count | None = None  # days of inactivity after which identifying data are deleted
 
     def __post_init__(self) -> None:
         if self.timed_out_after < self.abandoned_after:
@@ -52,20 +52,20 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 @dataclass(frozen=True)
 class VisitPlan:
-    """A plan for all visits to a study or to `mjsim play`.
+    """A plan with the phases and settings of a study or of `mjsim play`.
 
     Attributes:
         name: Name of the study in the database.
         language: Language tag of the pages.
-        phases: Names of the phases, in order. A visit is finished once it reaches the last one.
+        phases: Names of the phases, in order. A visit is finished when the participant reaches the last one.
         story: Text of the story, with blank lines between paragraphs.
         minimum: Minimum duration of each phase, in seconds. It is infinite for trials that cannot be ended early.
         optional: Names of the phases that participants may skip.
         minutes: Expected duration of a visit, in minutes.
         cells: Cells of the design. Each participant is assigned a place in one of them.
-        trials: Function that returns the settings of an assignment's trials, by phase.
+        trials: Function that returns the settings of the trials for an assignment, by phase.
         headset: True if trials can be played with a VR headset.
-        floor_plan: True if a floor plan with the paths walked is added to the run of the task.
+        floor_plan: True if the run directory of the task includes a floor plan with the participant's path.
         rehearsal: True if all participants are simulated.
     """
 

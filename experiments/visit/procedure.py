@@ -1,4 +1,4 @@
-"""Progress of participants through the phases of a visit."""
+"""The procedure that leads participants through the phases of a study."""
 
 import asyncio
 import dataclasses
@@ -24,13 +24,13 @@ from experiments.visit.store.values import utc_now
 from experiments.web.server.player import LiveTrial
 
 LOG = logging.getLogger("mjsim.study")
-FULL = "full"  # recorded as the reason if a phase ends because all cells are full
-ATTEMPTS = "attempts"  # name of the answer that stores the number of attempts at a phase
+FULL = "full"  # reason that is recorded if a visit ends because all cells are full
+ATTEMPTS = "attempts"  # name under which the number of attempts is stored among the answers of a phase
 
 
 @dataclass(frozen=True)
 class PhaseState:
-    """The current state of a visit.
+    """The current state of a participant's visit.
 
     Attributes:
         phase: Current phase, or None if the visit has ended.
@@ -46,7 +46,7 @@ class PhaseState:
 
 
 class Procedure:
-    """Leads participants through the phases of a plan."""
+    """A procedure that leads participants through the phases of a plan."""
 
     def __init__(
         self, plan: VisitPlan, store: Store, folders: VisitFolders, rng: np.random.Generator
@@ -57,7 +57,7 @@ class Procedure:
         self._rng = rng
 
     async def now(self, person: PersonRow, path: str) -> PhaseState:
-        """Return the current state of a visit, and record when the phase was first shown."""
+        """Return the current state of a visit. Record the time if the phase is shown for the first time."""
         if not person.active and person.status != "finished":
             return PhaseState(person, None, 0, Visitor({}, 0.0, 0, path), 0.0)
         if person.phase not in self.names:
@@ -70,11 +70,11 @@ class Procedure:
         return PhaseState(person, self.phases[number], number + 1, visitor, wait)
 
     async def times(self, person: PersonRow) -> tuple[float, float]:
-        """Return the time since the current phase was first shown and the time until it may end, both in seconds."""
+        """Return how long ago the current phase was first shown and how soon it may end, both in seconds."""
         shown = await self.store.show_phase(person.id, person.phase)
         passed = (utc_now() - shown.shown).total_seconds()
         minimum = self.plan.minimum.get(person.phase, 0.0)
-        # If `passed` is negative, the clock was set back, and the participant need not wait.
+        # If `passed` is negative, the clock has been set back. The participant may then continue immediately.
         return passed, max(0.0, minimum - passed) if passed >= 0.0 or minimum == float("inf") else 0.0
 
     async def submit(self, now: PhaseState, phase: str, sent: FormData) -> Again | None:
@@ -103,7 +103,7 @@ class Procedure:
         return None
 
     async def save(self, now: PhaseState, phase: str, sent: FormData) -> None:
-        """Save the answers in a form that has not been submitted yet."""
+        """Save the answers from a form that the participant is still filling in."""
         current = now.phase
         if current is None or phase != current.name or not hasattr(current, "drafts"):
             return
@@ -111,14 +111,14 @@ class Procedure:
             await self.store.save_answers(now.person.id, phase, drafts)
 
     async def assign(self, person: PersonRow) -> Assignment | None:
-        """Return the participant's place in a cell, assigning one if needed, or None if all cells are full."""
+        """Assign the participant to a cell if needed. Return the place, or None if all cells are full."""
         plan = self.plan
         return await self.store.assign(
             person.id, plan.cells, plan.rule, self._rng, abandoned_after=self._away
         )
 
     async def begin_playing(self, person: PersonRow, place: Assignment) -> VisitFolder:
-        """Create the visit's folder with the settings of its trials."""
+        """Create the participant's visit folder, which stores the settings of the trials."""
         played = [name for name in self.names if name in PLAYED]
         ended = await self._before_playing(person)
         trials = self.plan.trials(await self._after_earlier_visit(person, place))
@@ -130,18 +130,18 @@ class Procedure:
             await asyncio.to_thread(self.folders.remove, person.token_hash)
 
     async def room(self) -> int:
-        """Return the number of free places that participants in earlier phases do not need."""
+        """Return the number of free places minus the number of participants who still need one."""
         wanted = [cell.wanted for cell in self.plan.cells]
         return await self.store.room(wanted, self.names[0], self._away)
 
     async def turn_away(self, person: PersonRow) -> PersonRow:
-        """End the visit of a participant for whom no place is free."""
+        """End the visit of a participant because no place is free."""
         here = person.phase
         await self.store.finish_phase(person.id, here, here, {}, FULL, status="screened_out")
         return await self.store.person(person.id)
 
     async def record_trials(self, person: PersonRow) -> PersonRow:
-        """Record the participant's trials whose runs have been written, and return the updated participant."""
+        """Record all trials that the participant has completed, and return the updated participant."""
         while person.active and person.phase in PLAYED:
             folder = self.folders.find(person.token_hash)
             if folder is None or not folder.is_over(person.phase):
@@ -154,9 +154,9 @@ class Procedure:
         return person
 
     async def recover(self, before: datetime.datetime | None = None) -> None:
-        """Add ended trials that the database lacks, for all participants or those inactive since `before`.
+        """Add completed trials that are missing from the database.
 
-        Damaged folders are logged and skipped.
+        Only check participants who have been inactive since `before`, if given. Log and skip damaged folders.
         """
         for person in await self.store.people():
             if before is None or person.seen < before:
@@ -166,7 +166,7 @@ class Procedure:
                     LOG.error("person %d: %s", person.id, error)
 
     async def adopt(self) -> None:
-        """Add the participants of existing visit folders to a new database of `mjsim play`."""
+        """Add the participants of existing visit folders to the database of `mjsim play`."""
         for name in await asyncio.to_thread(self.folders.names):
             try:
                 folder = self.folders.find(name)
@@ -198,7 +198,7 @@ class Procedure:
         return folder.metrics(TASK) if folder is not None and folder.is_over(TASK) else None
 
     async def _after_earlier_visit(self, person: PersonRow, place: Assignment) -> Assignment:
-        """Return `place`, with the next house seed if the participant has completed an earlier visit."""
+        """Return `place`, but with a new house seed if the participant has already completed a visit."""
         earlier = (await self.store.identity(person.id)).get(AFTER)
         folder = self.folders.find(earlier) if earlier else None
         if folder is None or not folder.is_over(TASK):
@@ -221,7 +221,7 @@ class Procedure:
 
 
 class BrowserPlayer:
-    """A participant who plays the trials of a visit in a browser."""
+    """A participant who completes the trials of a visit in a browser."""
 
     def __init__(self, procedure: Procedure, person: PersonRow) -> None:
         self.key = person.token_hash

@@ -1,4 +1,4 @@
-"""Interface of recruitment platforms for arriving and departing participants."""
+"""The interface to recruitment platforms, from which participants arrive and to which they return."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from typing import Literal, Protocol
 
 from experiments.visit.tokens import TOKEN, token_hash
 
-AFTER = "after"  # query parameter for the token of an earlier visit
+AFTER = "after"  # name of the query parameter that contains the token of an earlier visit
 Leaving = Literal["finished", "screened_out", "no_consent", "withdrawn", "timed_out"]
 
 
@@ -15,7 +15,7 @@ class Candidate:
     """A person who may take part in the study.
 
     Attributes:
-        key: The person's id on the platform, by which returning participants are recognized, or None.
+        key: The person's id on the platform, which identifies returning participants, or None.
         identity: All ids needed for payment. They are never exported.
     """
 
@@ -25,19 +25,19 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Preview:
-    """A person who views the study on the platform before accepting it."""
+    """A person who previews the study on the platform before accepting it."""
 
 
 @dataclass(frozen=True)
 class InvalidLink:
-    """A link that the platform cannot have created, and the reason why."""
+    """A link that does not come from the platform, and the reason why it is invalid."""
 
     reason: str
 
 
 @dataclass(frozen=True)
 class WayBack:
-    """The way in which the last page sends a participant back to the platform.
+    """The link or form on the last page that takes the participant back to the platform.
 
     Attributes:
         fields: Fields of a form that is posted to `url`, or None for a plain link.
@@ -52,7 +52,7 @@ class WayBack:
 
 
 class Recruiter(Protocol):
-    """A recruitment platform.
+    """The interface of a recruitment platform.
 
     Attributes:
         platform: Name of the platform in the study file.
@@ -67,19 +67,19 @@ class Recruiter(Protocol):
     embedded_by: tuple[str, ...]
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Check the query parameters of the link with which a person arrives."""
+        """Identify a person from the query parameters of the link that the person has opened."""
         ...
 
     def way_back(self, how: Leaving, identity: Mapping[str, str]) -> WayBack:
-        """Return how the last page sends a participant with the final status `how` back to the platform."""
+        """Return the link or form that takes a participant with the status `how` back to the platform."""
         ...
 
 
 class OpenLink:
-    """An open link, with which anyone may take part. Each participant gets a personal link for returning.
+    """A public link that anyone can use to take part. Each participant gets a personal link for returning.
 
     Args:
-        platform: `link`, or `lab` if the last page should lead to the first one for the next participant.
+        platform: `link`, or `lab` if the last page should link to the first page for the next participant.
         repeats: True if links for playing again contain the token of the earlier visit.
     """
 

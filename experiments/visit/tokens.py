@@ -1,4 +1,4 @@
-"""Tokens of personal links, and keys for recognizing the participants of a platform."""
+"""Tokens for personal links, and keys that identify returning participants."""
 
 import base64
 import hashlib
@@ -14,22 +14,22 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """Return the SHA-256 of a token in hexadecimal. The token itself is never stored."""
+    """Return the hexadecimal SHA-256 of a token. Only this hash is stored, never the token itself."""
     return hashlib.sha256(token.encode()).hexdigest()
 
 
 class Keys:
-    """Derives keys and tokens from a study's secret."""
+    """A generator of keys and tokens, which are derived from a study's secret."""
 
     def __init__(self, secret: bytes, study: str) -> None:
         self._secret, self._study = secret, study
 
     def person(self, platform_id: str) -> str:
-        """Return the key for a participant's platform id, in hexadecimal."""
+        """Return the hexadecimal key for a participant's platform id."""
         return self._digest(f"key:{platform_id}").hex()
 
     def token(self, platform_id: str) -> str:
-        """Return the token for a participant's platform id. It is the same at each arrival."""
+        """Return the token for a participant's platform id. The same id always gives the same token."""
         return base64.urlsafe_b64encode(self._digest(f"token:{platform_id}")).decode().rstrip("=")
 
     def _digest(self, text: str) -> bytes:

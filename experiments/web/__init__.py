@@ -1,4 +1,4 @@
 """Live trials in a browser: server, worker processes, client, and pages that show recorded runs.
 
-The package serves `mjsim play` and studies, but imports neither.
+The package is used by `mjsim play` and by studies, but it imports neither of them.
 """

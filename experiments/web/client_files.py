@@ -1,4 +1,4 @@
-"""Files and pages for browsers: the client, scenes and rendered templates."""
+"""Serve the files that browsers need: the client's modules, scenes and rendered templates."""
 
 import functools
 import gzip
@@ -22,14 +22,14 @@ CLIENT = Path(__file__).parent / "client"
 STATIC = CLIENT / "static"
 _IMPORT = re.compile(r"(\bfrom\s*|\bimport\s*)\"(\.{1,2}/[^\"]+)\"")
 IMMUTABLE = "public, max-age=31536000, immutable"
-CHECKED = "no-cache"  # browsers may cache the file but must revalidate it
+CHECKED = "no-cache"  # browsers may cache the file, but must revalidate it before each use
 SCENE_HEADERS = {"Cache-Control": IMMUTABLE, "Vary": "Accept-Encoding"}
 _MEDIA_TYPES = {".glb": "model/gltf-binary", ".json": "application/json", ".webp": "image/webp"}
 _HASH, _NAME = re.compile(r"[0-9a-f]{16,64}"), re.compile(r"(objects/)?[A-Za-z0-9_-][A-Za-z0-9_.-]*")
 
 
 def modules_of(entry: str) -> Mapping[str, str]:
-    """Return the sources of a module and its imports by path. Import statements are rewritten to these paths."""
+    """Return the sources of a module and its dependencies by path. Import statements use these paths."""
     found: dict[str, str] = {}
     waiting = [entry]
     while waiting:
@@ -59,12 +59,12 @@ def _folder() -> str:
 
 
 def static_url(name: str) -> str:
-    """Return the URL of a static file. Its folder is named after the hash of all files."""
+    """Return the URL of a static file. The URL contains a hash of all static files."""
     return f"{_folder()}/{name}"
 
 
 def static_routes() -> Sequence[Mount]:
-    """Serve static files at their URLs, and also at `/static/NAME`, which never changes."""
+    """Return routes for static files, both at URLs with a hash and at the fixed URLs `/static/NAME`."""
     files = GZipMiddleware(StaticFiles(directory=STATIC))
     return [Mount(_folder(), files), Mount("/static", files)]
 
@@ -77,7 +77,7 @@ def static_caching(path: str) -> str | None:
 
 
 def scene_route(folder: Path) -> Route:
-    """Serve scenes from a folder that `mjsim.formats.gltf.cache` has written. No token is required."""
+    """Return a route for scenes in a folder written by `mjsim.formats.gltf.cache`. It requires no token."""
 
     def serve(request: Request) -> Response:
         scene, name = request.path_params["hash"], request.path_params["name"]
@@ -113,7 +113,7 @@ def _duration(seconds: float) -> str:
 
 @functools.cache
 def _modules(entry: str) -> tuple[str, ...]:
-    """Return the paths of all modules that a page needs, so that the browser can preload them in parallel."""
+    """Return the paths of all modules that a page needs. The browser preloads them in parallel."""
     return tuple(modules_of(entry))
 
 
@@ -121,7 +121,7 @@ _templates = Jinja2Templates(CLIENT / "templates")
 _templates.env.filters.update(duration=_duration, filled=filled)
 _templates.env.globals.update(modules=_modules, static=static_url)
 _templates.env.trim_blocks = True
-_templates.env.auto_reload = False  # do not check the template files on each request
+_templates.env.auto_reload = False  # template files are not checked for changes on each request
 
 
 def page(request: Request, name: str, status: int = 200, **values: Any) -> Response:
@@ -129,5 +129,5 @@ def page(request: Request, name: str, status: int = 200, **values: Any) -> Respo
 
 
 def trial_texts(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return the texts of the trial page, by name. `sections` holds all texts of a language."""
+    """Return the texts of the trial page, by name. `sections` contains all texts of a language."""
     return {name: text for section in ("common", "hud", "trial") for name, text in sections[section].items()}

@@ -1,7 +1,7 @@
-"""Conversion of a participant's inputs to one action per control step.
+"""Convert a participant's inputs to one action per control step.
 
-A control step handles all inputs since the previous one, so that a short tap between two steps counts. The mouse sets a
-target angle, which the body and head follow within their speed limits.
+A control step handles all inputs since the previous step, so that even a short tap between two steps has an
+effect. The mouse sets target angles, which the body and head follow within their speed limits.
 """
 
 import math
@@ -15,34 +15,34 @@ from mjsim.values.actions import Action, ActionResult, Move, Pick, Place, Refusa
 from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 
-Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # fraction of the maximum speed
+Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]  # speed as a fraction of the maximum speed
 Angle = Annotated[float, msgspec.Meta(ge=-7.0, le=7.0)]  # angle in radians
 Press = Literal["act", "left hand", "right hand"]
 MAX_PITCH = 1.2  # maximum pitch that can be set with the mouse, in radians
 MAX_PRESSES = 8  # maximum number of queued key presses
 PRESS_LIFE = 0.5  # time after which a queued key press is dropped, in seconds
-MAX_TURN_AHEAD = 2.8  # maximum angle by which the mouse's target may be ahead of the body, in radians
+MAX_TURN_AHEAD = 2.8  # maximum angle between the body and the mouse's target heading, in radians
 
 
 class Input(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A change of the keyboard, mouse, gamepad or touch screen."""
+    """An input event from the keyboard, mouse, gamepad or touch screen."""
 
-    # number of the input, counted from 1
+    # Number of the input, counted from 1
     number: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
-    # control step in which the input takes effect; if None or in the past, the next one
+    # Control step in which the input takes effect. If it is None or in the past, the next step is used.
     step: Annotated[int, msgspec.Meta(ge=0, le=2**53)] | None = None
-    forward: Share = 0.0  # walking speed while held; negative values walk backwards
-    left: Share = 0.0  # speed to the left while held
-    turn: Share = 0.0  # turning speed to the left while held
-    look: Share = 0.0  # upward looking speed while held
-    yaw: Angle = 0.0  # change of the target heading, in radians, counter-clockwise
-    pitch: Angle = 0.0  # change of the target pitch, in radians, upwards
-    press: Press | None = None  # pressed key: the action key or the key of a hand
-    # number of rows to scroll the task list, positive towards its end
+    forward: Share = 0.0  # forward walking speed; negative values mean walking backwards
+    left: Share = 0.0  # sideways walking speed, positive to the left
+    turn: Share = 0.0  # turning speed of the body, positive to the left
+    look: Share = 0.0  # pitch speed of the head, positive upwards
+    yaw: Angle = 0.0  # change of the target heading in radians, positive counter-clockwise
+    pitch: Angle = 0.0  # change of the target pitch in radians, positive upwards
+    press: Press | None = None  # key that was pressed, which is either the action key or the key for a hand
+    # Number of rows by which the task list is scrolled, positive towards the end
     scroll: Annotated[int, msgspec.Meta(ge=-100, le=100)] = 0
 
     def at_rest(self) -> "Input":
-        """Return a copy with only the changes that take effect while the clock is paused."""
+        """Return a copy that contains only the inputs that also work while the clock is paused."""
         return Input(number=self.number, scroll=self.scroll)
 
 
@@ -51,7 +51,7 @@ Answer = Callable[[Pick | Place], ActionResult]
 
 @dataclass(frozen=True)
 class Controls:
-    """Latest input, target angles of the mouse in radians, and queued key presses with their ages in seconds."""
+    """The latest input, the mouse's target angles in radians, and queued key presses with ages in seconds."""
 
     held: Input | None = None
     heading: float | None = None
@@ -85,8 +85,8 @@ def control_step(
 
     The action key places a held object if its receptacle is within reach. Otherwise it picks up the nearest object
     within reach. The key of a hand places the object in that hand, or picks up an object if the hand is empty.
-    Impossible actions are also attempted, so that the message bar can show the reason. `answer` returns the world's
-    answer to a pick or place.
+    Impossible actions are attempted as well, so that the message bar can explain why they fail. The function
+    `answer` returns the result that a pick or place would have.
     """
     controls = before.take(inputs, seen)
     if not controls.presses:
@@ -115,14 +115,14 @@ def act(answer: Answer) -> Pick | Place:
 def _move(
     controls: Controls, inputs: Sequence[Input], seen: Observation, person: PersonParameters, duration: float
 ) -> Move:
-    """Return the move with the highest speeds requested since the previous step, turning to the mouse's target."""
+    """Combine all inputs since the previous step into one move, using the highest requested speeds."""
     asked = inputs if controls.held is None else (*inputs, controls.held)
 
     def fastest(name: str) -> float:
         return max((float(getattr(new, name)) for new in asked), key=abs, default=0.0)
 
     forward, left = fastest("forward"), fastest("left")
-    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # diagonal speed is limited, too
+    speed = person.walking_speed / max(1.0, math.hypot(forward, left))  # also limits the diagonal speed
     turn, look = fastest("turn") * person.turning_speed, fastest("look") * person.looking_speed
     if controls.heading is not None and not turn:
         turn = _rate(_gap(controls.heading, seen.heading) / duration, person.turning_speed)

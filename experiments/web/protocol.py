@@ -1,7 +1,7 @@
 """Messages between browser, server and worker (docs/protocol.md).
 
-A message is an object whose `type` is the tag of its class. Messages between browser and server are JSON, except binary
-frames. Messages between server and worker are MessagePack. The server forwards most messages.
+Each message is an object with a field `type`, which contains the tag of its class. Browser and server
+exchange JSON and binary frames. Server and worker exchange MessagePack. The server forwards most messages.
 """
 
 import struct
@@ -22,22 +22,22 @@ from experiments.web.state import (
     WireMessage,
 )
 
-HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable that names the house to preload
-VERSION = 1  # version of the frame header
+HOUSE = "MJSIM_PLAY_HOUSE"  # environment variable with the name of the house to preload
+VERSION = 1  # version number of the frame header
 MAX_TEXT = 64 * 1024  # maximum size of a message from a browser, in bytes
 MAX_INPUTS = 64  # maximum number of inputs in a message
 FRAME_HEAD = struct.Struct("<BBBBHHIIQf")
 LENGTH = struct.Struct("!I")  # length prefix of a message between server and worker
 CODECS = {"jpeg": 1, "h264": 2}
-BEAT_PERIOD = 0.5  # time between heartbeats, in seconds
-MAX_SILENCE = 1.0  # silence after which the connection is considered lost, in seconds
-MAX_STEPS_AHEAD = 25  # maximum lead of inputs and promises over the last step taken, in control steps
+BEAT_PERIOD = 0.5  # interval between heartbeats, in seconds
+MAX_SILENCE = 1.0  # time without a message after which the connection counts as lost, in seconds
+MAX_STEPS_AHEAD = 25  # number of control steps by which inputs and promises may be ahead of the clock
 DISPLAY_PERIOD = 5.0  # interval between `display` messages, in seconds
 KEY_FLAG = 1
 REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSocket close codes
 
 Codec = Literal["jpeg", "h264", "none"]
-Drawer = Literal["browser", "server"]  # program that draws the view
+Drawer = Literal["browser", "server"]  # program that renders the participant's view
 PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # length in pixels
@@ -47,7 +47,7 @@ Measured = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 
 
 class View(WireMessage, frozen=True):
-    """Requested view: its size in CSS pixels, and the codec of frames, or `none` if the page draws.
+    """A request for a view of this size in CSS pixels. The codec is `none` if the page itself draws the view.
 
     `field_of_view` is chosen by the participant, within the `field_of_view_range` of the scene.
     """
@@ -59,7 +59,7 @@ class View(WireMessage, frozen=True):
 
 
 class Hello(WireMessage, frozen=True):
-    """First message of a connection. `tab` is a random name of the page. It stays the same after a reconnection."""
+    """The first message of a connection. `tab` is a random name that the page keeps when it reconnects."""
 
     tab: Annotated[str, msgspec.Meta(pattern="^[A-Za-z0-9-]{8,64}$")]
     trial: Annotated[str, msgspec.Meta(max_length=20)]
@@ -67,20 +67,20 @@ class Hello(WireMessage, frozen=True):
 
 
 class TakeOver(WireMessage, frozen=True):
-    """Continue here a session that is open in another page. This is the reply to `occupied`."""
+    """A request to continue a session that is open in another page. It answers an `occupied` message."""
 
 
 class RunMessage(WireMessage, frozen=True, tag="run"):
-    """Start or resume the clock. `until` is the page's first promise (see `Inputs`), or None without promises."""
+    """A request to start or resume the clock. `until` is the first promise (see `Inputs`), or None."""
 
     until: Count | None = None
 
 
 class Inputs(WireMessage, frozen=True):
-    """Inputs of the participant in chronological order. Each input is sent once.
+    """The participant's inputs in chronological order. Each input is sent only once.
 
-    With `until`, the page promises that it has sent all inputs for earlier control steps. The clock then waits up to
-    0.75 s for each further promise.
+    By setting `until`, the page promises that it has sent all inputs for earlier control steps. The clock
+    then waits up to 0.75 s for each further promise.
     """
 
     inputs: Annotated[list[Input], msgspec.Meta(max_length=MAX_INPUTS)]
@@ -88,28 +88,28 @@ class Inputs(WireMessage, frozen=True):
 
 
 class Seen(WireMessage, frozen=True):
-    """Acknowledgement that the browser has shown a frame. `frame` is its number."""
+    """An acknowledgement that the browser has shown the frame with this number."""
 
     frame: Count
 
 
 class Beat(WireMessage, frozen=True):
-    """Heartbeat. The server sends two per second, and the page answers each.
+    """A heartbeat. The server sends two per second, and the page answers each of them.
 
     If the page sends no message for 1 s, the clock stops.
     """
 
 
 class Display(WireMessage, frozen=True):
-    """Display quality over the last 5 s, which is written to the log.
+    """A report on the display quality over the last 5 s, which is written to the log.
 
     Attributes:
         width: Width of the view in CSS pixels, like `height`.
         pixel_ratio: Device pixels per CSS pixel.
         frame_ms: Median time between two pictures, in milliseconds.
         frame_ms_95: 95th percentile of the time between two pictures, in milliseconds.
-        latency_ms: Median time from an input to the first picture that shows its effect, in milliseconds, or to the
-            first server state that includes it if the browser draws. None if there were no inputs.
+        latency_ms: Median time from an input to the first picture that shows its effect, in milliseconds. If
+            the browser draws, the time to the first server state that includes it. None without inputs.
         field_of_view: Horizontal field of view, in radians, if the participant may choose it.
     """
 
@@ -127,34 +127,34 @@ class Display(WireMessage, frozen=True):
 
 
 class Draw(WireMessage, frozen=True):
-    """Change of the program that draws the view, and its reason. Both are written to the log."""
+    """A notice that the browser or the server now draws the view. It is logged with its reason."""
 
     draw: Drawer
     reason: Annotated[str, msgspec.Meta(max_length=200)]
 
 
 class Pause(WireMessage, frozen=True):
-    """Stop the clock. The reason is written to the log."""
+    """A request to stop the clock. The reason is written to the log."""
 
     reason: PauseReason
 
 
 class Blur(WireMessage, frozen=True):
-    """Loss or return of the keyboard focus, which is written to the log."""
+    """A notice that the page has lost or regained the keyboard focus. It is written to the log."""
 
     away: bool
 
 
 class Leave(WireMessage, frozen=True):
-    """End the trial immediately."""
+    """A request to end the trial immediately."""
 
 
 class Open(WireMessage, frozen=True):
-    """Open a session in a worker.
+    """A request to open a session in a worker.
 
     Attributes:
         restarted: True if the session's previous worker died.
-        as_inputs_come: True to take each control step as soon as its inputs have been promised, as in rehearsals.
+        as_inputs_come: True to run each control step as soon as its inputs have arrived, as in rehearsals.
         texts: HUD texts that override those of the language.
     """
 
@@ -170,17 +170,17 @@ class Open(WireMessage, frozen=True):
 
 
 class Taken(WireMessage, frozen=True):
-    """All inputs and control steps up to these numbers have been processed and are on disk."""
+    """An acknowledgement that all inputs and control steps up to these numbers are on disk."""
 
     input: int
     step: int
 
 
 class FrameMessage(WireMessage, frozen=True, tag="frame"):
-    """A frame and its control step. Frames are numbered from 1 in each view. `input` is the last input in effect.
+    """A rendered frame. Frames are numbered from 1 in each view.
 
-    H.264 is in Annex B format, one access unit per frame. A `key` frame can be decoded without earlier ones.
-    `milliseconds` is the time taken to draw and compress the frame.
+    An H.264 frame is one access unit in Annex B format. A `key` frame can be decoded without earlier frames.
+    `input` is the last input in effect, and `milliseconds` is the time taken to draw and compress the frame.
     """
 
     number: int
@@ -200,23 +200,23 @@ class FrameMessage(WireMessage, frozen=True, tag="frame"):
 
 
 class Saved(WireMessage, frozen=True):
-    """The run directory of a finished session is complete."""
+    """A notice that the run directory of a finished session is complete."""
 
 
 class Queue(WireMessage, frozen=True):
-    """All slots are taken. The page must reload to show the queue."""
+    """A notice that all slots are taken. The page must reload to show the queue."""
 
 
 class Occupied(WireMessage, frozen=True):
-    """The session is open in another page. The reply `takeover` continues it here."""
+    """A notice that the session is open in another page. The reply `takeover` continues it in this page."""
 
 
 class Replaced(WireMessage, frozen=True):
-    """Another page has taken over the session, so this connection will be closed."""
+    """A notice that another page has taken over the session. This connection will be closed."""
 
 
 class Error(WireMessage, frozen=True):
-    """Rejection of a message, with an error code and a reason."""
+    """The rejection of a message, with an error code and a reason."""
 
     code: ErrorCode
     message: str
@@ -255,6 +255,6 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def packed(message: WireMessage) -> bytes:
-    """Encode a message between server and worker, with its length as a prefix."""
+    """Encode a message between server and worker, and prefix it with its length."""
     content = _encode(message)
     return LENGTH.pack(len(content)) + content

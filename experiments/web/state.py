@@ -12,7 +12,7 @@ from hud.state import HudState, Marker, MiniMap, Pointer
 
 
 class SessionPhase(StrEnum):
-    """State of a session. The clock advances only in the running state."""
+    """The phase of a live session. The clock only advances in the phase `RUNNING`."""
 
     LOADING = auto()
     READY = auto()
@@ -23,7 +23,7 @@ class SessionPhase(StrEnum):
 
 
 class Trigger(StrEnum):
-    """Cause of a transition."""
+    """An event that can change the phase of a live session."""
 
     OPENED = auto()
     RESTORED = auto()
@@ -42,28 +42,28 @@ TRANSITIONS: Mapping[tuple[SessionPhase, Trigger], SessionPhase] = {
     (RUNNING, Trigger.PAUSE): PAUSED,
     **{(phase, Trigger.END): OVER for phase in (LOADING, READY, RUNNING, PAUSED)},
     **{(phase, Trigger.FAIL): FAILED for phase in (LOADING, READY, RUNNING, PAUSED, OVER)},
-}  # all other triggers have no effect
+}  # all other combinations have no effect
 
 
 class WireMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """Base class of messages. The `type` of a message is its tag, by default its class name in lower case."""
+    """The base class of messages. A message's `type` is its tag, by default its class name in lower case."""
 
 
 class State(WireMessage, frozen=True):
-    """State of the session, the reason for a pause, end or failure, and the number of the last received input."""
+    """The state of a session. `reason` explains a pause, end or failure. `input` numbers the last input."""
 
     phase: SessionPhase = LOADING
     reason: str = ""
     input: int = 0
 
     def after(self, trigger: Trigger, reason: str = "") -> "State":
-        """Return the next state, or this state if the trigger has no effect."""
+        """Return the state after a trigger, or this state if the trigger has no effect."""
         phase = TRANSITIONS.get((self.phase, trigger))
         return self if phase is None else State(phase, reason, self.input)
 
 
 class GaitParameters(msgspec.Struct, frozen=True):
-    """Parameters of walking in SI units. The fields are those of `mjsim.world.fidelity.kinematics.Gait`."""
+    """Walking parameters in SI units, with the same fields as `mjsim.world.fidelity.kinematics.Gait`."""
 
     max_speed: float
     max_turn: float
@@ -90,7 +90,7 @@ class GaitParameters(msgspec.Struct, frozen=True):
 
 
 class Speeds(msgspec.Struct, frozen=True):
-    """Speeds of the participant at full deflection of the controls, in m/s and rad/s."""
+    """The participant's speeds at full deflection of the controls, in m/s and rad/s."""
 
     walking_speed: float
     turning_speed: float
@@ -98,12 +98,12 @@ class Speeds(msgspec.Struct, frozen=True):
 
 
 class SceneMessage(WireMessage, frozen=True, tag="scene"):
-    """Scene to be drawn by the client. It is sent once.
+    """The scene that the client draws. It is sent once.
 
     Attributes:
         path: URL path of the scene's files, or None if the server draws.
-        floor: Name of the file with obstacles, or None if the client cannot predict walking.
-        field_of_view: Horizontal field of view in radians, whatever the view's aspect ratio.
+        floor: URL path of the file with obstacles, or None if the client cannot predict walking.
+        field_of_view: Horizontal field of view in radians, which does not depend on the aspect ratio.
         field_of_view_range: Smallest and largest field of view that the participant may choose, or None.
         step_duration: Duration of a control step, in seconds.
     """
@@ -118,7 +118,7 @@ class SceneMessage(WireMessage, frozen=True, tag="scene"):
 
 
 class Snapshot(WireMessage, frozen=True):
-    """State at the start of a control step, for clients that draw. One is sent per control step.
+    """The state at the start of a control step. One snapshot per step is sent to clients that draw the view.
 
     Attributes:
         step: Control step that starts with this state.
@@ -130,7 +130,7 @@ class Snapshot(WireMessage, frozen=True):
         objects: Positions in metres (3) and quaternions wxyz (4) of objects that moved since the last snapshot, by
             instance name.
         models: Models of objects that are new to the client or were `gone`, by instance name.
-        gone: Instance names of objects that will not be updated.
+        gone: Instance names of objects for which no further updates are sent.
     """
 
     step: int
@@ -147,28 +147,28 @@ class Snapshot(WireMessage, frozen=True):
 
 
 class Markers(WireMessage, frozen=True):
-    """Markers of the HUD, for clients that draw. They are sent when they change."""
+    """The markers of the HUD. They are sent to clients that draw the view whenever they change."""
 
     markers: tuple[Marker, ...]
 
 
 class Pictures(WireMessage, frozen=True):
-    """Pictures that a `hud` message refers to, as data URLs by key. They are sent once to each page."""
+    """Pictures to which `hud` messages refer, as data URLs by key. Each page receives them once."""
 
     pictures: dict[str, str]
 
 
 class Hud(WireMessage, frozen=True):
-    """State of the HUD, without markers and the values sent in `moment`."""
+    """The state of the HUD, except for the markers and the values in `moment` messages."""
 
     state: HudState
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """Effect of the action key: the object that it would pick up or place, and the receptacle when placing.
+    """The object that the action key would pick up or place, and the receptacle in which it would be placed.
 
-    `instance` is the object's instance name. `place` is the position of the object or the receptacle in metres. `at` is
-    this position in the view, in fractions of its width and height, or None if it is not visible.
+    `instance` is the object's instance name. `place` is the position of the object or receptacle in metres.
+    `at` is this position in the view, as fractions of its width and height, or None if it is not visible.
     """
 
     object: str
@@ -179,7 +179,7 @@ class Reach(msgspec.Struct, frozen=True):
 
 
 class Moment(WireMessage, frozen=True):
-    """Values that change with movement: clock in whole seconds, room, object within reach, pointer and map."""
+    """HUD values that change often: clock in whole seconds, room, object within reach, pointer and map."""
 
     step: int
     clock: float | None
@@ -190,6 +190,6 @@ class Moment(WireMessage, frozen=True):
 
 
 class Busy(WireMessage, frozen=True):
-    """Start or end of a pick or place, for clients that show frames. Key presses in between are handled afterwards."""
+    """A notice that a pick or place has started or ended. It is only sent to clients that show frames."""
 
     busy: bool

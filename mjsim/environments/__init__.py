@@ -1,4 +1,4 @@
-"""Learning environments: one core behind the dm_env and the Gymnasium interface.
+"""Reinforcement-learning environments with dm_env and Gymnasium interfaces, which share one core.
 
     sensors ─┐
     control ─┼─> Rearrangement (core) ─> RearrangeDmEnvironment   mjsim.make(...)

@@ -1,7 +1,7 @@
-"""Controls, which translate an agent's actions into actions of the world.
+"""Action spaces of agents, and the conversion of agent actions into simulator actions.
 
-The translation is a generator that receives the result of each control step. An action of the agent can therefore last
-for many control steps.
+The conversion is a generator that receives the result of every control step. A single agent action can
+therefore span many control steps.
 """
 
 import math
@@ -21,17 +21,17 @@ Steps = Generator[Action, StepResult, None]
 
 
 class Control(Protocol):
-    """Translates actions of the agent into actions of the world."""
+    """Protocol for classes that convert agent actions into simulator actions."""
 
     def spec(self) -> specs.BoundedArray: ...
 
     def steps(self, action: Any, observation: Observation, world: World) -> Steps:
-        """Yield one or more actions of the world for an action of the agent.
+        """Yield the simulator actions that carry out one agent action.
 
         Args:
-            action: Action of the agent. It conforms to `spec`.
-            observation: State before the action.
-            world: Current world. It must not be changed.
+            action: The agent action, which conforms to `spec`.
+            observation: The state before the action.
+            world: The simulated world. It must not be changed.
 
         Raises:
             ActionError: The action does not conform to `spec`.
@@ -41,13 +41,14 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class Continuous:
-    """Continuous actions (forward, left, turn, trigger), each clipped to [-1, 1].
+    """A continuous action space with four components (forward, left, turn, trigger) from -1 to 1.
 
-    Velocities are relative to the person's limits. A trigger above 0.5 picks the nearest object in reach, and a trigger
-    below -0.5 places a carried object. The person does not walk in the first control step of a pick or place.
+    Values outside this range are clipped. Velocities are fractions of the person's maximum speeds. A trigger
+    above 0.5 picks the nearest object in reach, and a trigger below -0.5 places a carried object. The person
+    does not walk in the first control step of a pick or place.
 
     Attributes:
-        repeat: Number of control steps per action.
+        repeat: Number of control steps per agent action.
 
     Raises:
         EnvironmentConfigError: `repeat` is below 1.
@@ -85,11 +86,11 @@ MOVES = ("forward", "turn_left", "turn_right", "pick", "place")
 
 @dataclass(frozen=True)
 class Discrete:
-    """Five discrete actions, numbered as in `MOVES`. Each lasts until it is completed or blocked.
+    """A discrete action space with the actions in `MOVES`. An action runs until it is complete or blocked.
 
     Attributes:
-        stride: Distance of `forward` in metres.
-        angle: Angle of a turn, in radians.
+        stride: Distance that `forward` walks, in metres.
+        angle: Angle by which a turn action rotates the person, in radians.
 
     Raises:
         EnvironmentConfigError: A value is not positive.
@@ -119,14 +120,14 @@ class Discrete:
         return _pick_or_place(Pick() if move == "pick" else Place())
 
 
-_GAIN = 8.0  # gain of the controller at the end of a walk or a turn, in 1/s
-_BRAKING = 2 / 3  # planned deceleration, as a share of the limit
-_DISTANCE_TOLERANCE = 0.002  # remaining distance at which a walk is complete, in metres
+_GAIN = 8.0  # proportional gain of the controller for walks and turns, in 1/s
+_BRAKING = 2 / 3  # planned deceleration as a fraction of the maximum acceleration
+_DISTANCE_TOLERANCE = 0.002  # remaining distance below which a walk is complete, in metres
 _ANGLE_TOLERANCE = math.radians(0.1)
-_STANDING = 0.01  # speed below which the person counts as standing, in m/s
-_MIN_PROGRESS = 0.0005  # distance per control step below which a walk counts as blocked, in metres
-_MAX_BLOCKED_STEPS = 4  # number of control steps without progress after which a walk ends
-_MAX_EXTRA_TIME = 2.0  # additional time for a walk that slides along an obstacle, in seconds
+_STANDING = 0.01  # speed below which the person counts as standing still, in m/s
+_MIN_PROGRESS = 0.0005  # minimum distance per control step that counts as progress, in metres
+_MAX_BLOCKED_STEPS = 4  # number of consecutive steps without progress after which a walk ends
+_MAX_EXTRA_TIME = 2.0  # extra time allowed for a walk that slides along an obstacle, in seconds
 
 
 def _walk(observation: Observation, stride: float, world: World) -> Steps:
@@ -139,7 +140,7 @@ def _walk(observation: Observation, stride: float, world: World) -> Steps:
         if blocked == _MAX_BLOCKED_STEPS or stride - walked <= _DISTANCE_TOLERANCE:
             break
         left = stride - walked
-        delay = braking * timestep / 2  # compensates for late braking due to discrete steps
+        delay = braking * timestep / 2  # compensates for braking that starts only at the next time step
         speed = min(fastest, math.sqrt(2 * braking * left + delay**2) - delay, _GAIN * left)
         step = yield Move(forward=speed)
         now = float((step.observation.position - start) @ direction)

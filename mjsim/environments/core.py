@@ -1,4 +1,4 @@
-"""The rearrangement task. The dm_env and Gymnasium environments are thin adapters of it."""
+"""The rearrangement task, which the dm_env and Gymnasium environments wrap."""
 
 import contextlib
 import math
@@ -29,34 +29,32 @@ from mjsim.values.observation import ObjectStatus, Observation
 from mjsim.world.world import StepResult, World
 
 ObservationDict = dict[str, NDArray[Any]]
-"""Observation arrays by sensor name."""
+"""A mapping from sensor names to observation arrays."""
 MAX_SEED = 2**31 - 1
-MAX_DRAWS = (
-    10  # maximum number of seeds that `reset_random` tries to find one whose objects fit into the house
-)
+MAX_DRAWS = 10  # maximum number of seeds that `reset_random` tries before it raises an error
 
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """Outcome of one step of the environment."""
+    """The result of one environment step."""
 
     observation: ObservationDict
     reward: float
-    terminated: bool  # True if all objects are delivered
+    terminated: bool  # True if all objects have been delivered
     truncated: bool  # True if the time limit or a physics error ended the episode
     info: dict[str, Any]  # values for logging and statistics
-    steps: tuple[StepResult, ...]  # result of each control step
+    steps: tuple[StepResult, ...]  # results of the control steps, in order
 
 
 class Rearrangement:
-    """The rearrangement task.
+    """A task in which an agent carries misplaced objects to their receptacles.
 
-    `episodes` compiles the episode of a seed, `sensors` compute the arrays of an observation, and `control` translates
-    the agent's actions. A physics error is raised, or truncates the episode if `truncate_on_physics_error` is True.
-    `on_control_step`, if set, is called with the world after every control step.
+    `episodes` compiles the episode for a seed, `sensors` compute the arrays of an observation, and `control`
+    converts agent actions. Physics errors are raised, or truncate the episode if
+    `truncate_on_physics_error` is True. `on_control_step`, if set, is called after every control step.
 
-    Compiled models and current motions cannot be pickled. Copying and unpickling therefore call `rebuild`, and repeat
-    the actions of the episode so far. Equal seeds and actions lead to equal states.
+    Compiled models and ongoing motions cannot be pickled. A copied or unpickled task is therefore created by
+    `rebuild` and replays the actions of the current episode. Equal seeds and actions lead to equal states.
     """
 
     def __init__(
@@ -82,7 +80,7 @@ class Rearrangement:
         self._images = frozenset[str]().union(*(s.images for s in sensors))
         self._episode: CompiledEpisode | None = None
         self._seed = 0
-        self._actions: list[Any] = []  # actions of the episode so far
+        self._actions: list[Any] = []  # actions executed in the current episode
         self._is_over = True
         self._last_observation: ObservationDict = {}
 
@@ -105,7 +103,7 @@ class Rearrangement:
 
     @property
     def episode(self) -> CompiledEpisode:
-        """The compiled episode. Raises an EnvironmentStateError before the first reset."""
+        """The current compiled episode. Raises an EnvironmentStateError before the first reset."""
         if self._episode is None:
             raise EnvironmentStateError("there is no episode yet; call reset first")
         return self._episode
@@ -121,17 +119,17 @@ class Rearrangement:
         return self.world.observation()
 
     def prepare(self, seed: int) -> None:
-        """Compile the episode of a seed without starting it."""
+        """Compile the episode for a seed without starting it."""
         self._episode, self._is_over = self._episodes.get(seed), True
         self._seed, self._actions = seed, []
 
     def reset(self, seed: int) -> tuple[ObservationDict, dict[str, Any]]:
-        """Start the episode of a seed. Return the observation and the info.
+        """Start the episode for a seed. Return the first observation and the info dictionary.
 
         Raises:
-            SamplingError: The house has no room for this seed's objects.
+            SamplingError: The objects for this seed do not fit into the house.
             AssetError: A model is malformed.
-            RenderError: Images were requested and cannot be drawn.
+            RenderError: A sensor needs an image, but images cannot be rendered.
         """
         self.prepare(seed)
         self._is_over = False
@@ -139,7 +137,7 @@ class Rearrangement:
         return self._observe(inputs), self._info(inputs, ())
 
     def reset_random(self, rng: np.random.Generator) -> tuple[ObservationDict, dict[str, Any]]:
-        """Start the episode of a random seed. Raise a SamplingError if no episode is found for `MAX_DRAWS` seeds."""
+        """Start an episode with a random seed. Raise a SamplingError after `MAX_DRAWS` failed attempts."""
         for _ in range(MAX_DRAWS - 1):
             try:
                 return self.reset(int(rng.integers(MAX_SEED)))
@@ -148,17 +146,17 @@ class Rearrangement:
         return self.reset(int(rng.integers(MAX_SEED)))
 
     def step(self, action: Any) -> Transition:
-        """Execute an action for as many control steps as it needs, or until the episode ends.
+        """Execute an action until it is complete or the episode ends.
 
         Raises:
-            EnvironmentStateError: The episode is over, or there is none.
+            EnvironmentStateError: The episode is over or has not started.
             ActionError: The action does not conform to its spec.
             PhysicsError: MuJoCo issued a warning, and `truncate_on_physics_error` is False. The episode is over.
         """
         world = self.world
         if self._is_over:
             raise EnvironmentStateError("the episode is over; call reset before the next step")
-        self._actions.append(copy(action))  # the agent may reuse its array
+        self._actions.append(copy(action))  # copied because the agent may reuse its array
         before = world.observation()
         steps, error = self._run(world, action, before)
         after = steps[-1].observation if steps else before
@@ -166,7 +164,7 @@ class Rearrangement:
         self._is_over = terminated or timed_out or error is not None
         inputs = self._sensor_input(after)
         return Transition(
-            # The state after a physics error cannot be observed, so repeat the last observation.
+            # The state is invalid after a physics error, so the last observation is returned again.
             observation=self._observe(inputs) if error is None else _copied(self._last_observation),
             reward=self._compute_reward(world, before, after),
             terminated=terminated,
@@ -176,7 +174,7 @@ class Rearrangement:
         )
 
     def rgb(self, width: int, height: int, profile: str) -> NDArray[np.uint8]:
-        """Draw the current first-person view, uint8, shape (height, width, 3).
+        """Render the current first-person view as a uint8 array of shape (height, width, 3).
 
         Raises:
             EnvironmentStateError: There is no episode yet.
@@ -185,7 +183,7 @@ class Rearrangement:
         return self.episode.renderer(width, height, profile).rgb(self.world.data)
 
     def close(self) -> None:
-        """Free all compiled episodes. A later reset compiles them again."""
+        """Free all compiled episodes. A later reset compiles its episode again."""
         self._episode, self._is_over, self._actions = None, True, []
         self._episodes.close()
 
@@ -214,7 +212,7 @@ class Rearrangement:
                 return tuple(results), None
 
     def _end(self, observation: Observation) -> tuple[bool, bool]:
-        """Return whether the task is complete, and whether the time limit has been reached before."""
+        """Return whether the task is complete, and whether it has timed out."""
         done = all(s is ObjectStatus.DELIVERED for s in observation.object_status)
         return done, not done and observation.time >= self.layout.time_limit - 1e-9
 
@@ -281,7 +279,7 @@ def _restored(rebuild: Callable[[], Rearrangement], progress: tuple[int, list[An
         seed, actions = progress
         core.reset(seed)
         for action in actions:
-            with contextlib.suppress(ActionError, PhysicsError):  # the original run raised it too
+            with contextlib.suppress(ActionError, PhysicsError):  # the original run raised the same error
                 core.step(action)
     return core
 

@@ -1,4 +1,4 @@
-"""Environment with the dm_env interface."""
+"""The rearrangement environment with the dm_env interface."""
 
 from typing import Any
 
@@ -11,10 +11,10 @@ from mjsim.environments.options import build, parse_options
 
 
 def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment":
-    """Create an environment with the dm_env interface.
+    """Create a rearrangement environment with the dm_env interface.
 
     Args:
-        seed: Seed of the first episode and of the generator of later seeds. By default, it is random.
+        seed: Seed of the first episode, which also seeds the generator for later episodes. Random by default.
         **options: Fields of `mjsim.environments.EnvironmentOptions`.
 
     Raises:
@@ -32,10 +32,10 @@ def make(*, seed: int | None = None, **options: Any) -> "RearrangeDmEnvironment"
 
 
 class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_env has no types
-    """The task with dm_env's interface.
+    """The rearrangement task as a dm_env environment.
 
-    The last step has discount 0 if all objects are delivered, and 1 if the time limit truncates the episode, so that a
-    critic still bootstraps.
+    The last step has discount 0 if all objects have been delivered. If the time limit truncates the episode,
+    the discount is 1, so that a critic still bootstraps.
     """
 
     def __init__(self, core: Rearrangement, *, seed: int | None = None) -> None:
@@ -46,9 +46,9 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
 
     @property
     def physics(self) -> Any:
-        """The current state as a `dm_control.mujoco.Physics`, which `dm_control.viewer.launch(env)` requires.
+        """The current state as a `dm_control.mujoco.Physics` object, which dm_control's viewer requires.
 
-        Before the first reset, this is the start of the first episode.
+        Before the first reset, this is the start state of the first episode.
         """
         if not self.core.has_episode:
             if self._next_seed is None:
@@ -63,7 +63,7 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         return dm_env.restart(observation)
 
     def step(self, action: Any) -> dm_env.TimeStep:
-        """Execute an action. After the last step and before the first reset, start the next episode instead.
+        """Execute an action. If the episode is over or has not started, start the next episode instead.
 
         Raises:
             ActionError: The action does not conform to its spec.
@@ -71,7 +71,7 @@ class RearrangeDmEnvironment(dm_env.Environment):  # type: ignore[misc]  # dm_en
         """
         if not self._is_running:
             return self.reset()
-        self._is_running = False  # stays False if the physics fails
+        self._is_running = False  # stays False if `step` raises an error
         taken = self.core.step(action)
         if taken.terminated:
             return dm_env.termination(taken.reward, taken.observation)

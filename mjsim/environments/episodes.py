@@ -1,4 +1,4 @@
-"""Sampling, compilation and caching of an environment's episodes."""
+"""Sample, compile and cache the episodes of an environment."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -19,18 +19,18 @@ from mjsim.values.options import WorldOptions
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-_COUNT_STREAM = 41  # random stream for the number of objects, independent of the seed's other streams
+_COUNT_STREAM = 41  # index of the random stream for the number of objects
 
 
 class CompiledEpisode:
-    """A compiled episode and its renderers."""
+    """A compiled episode together with its renderers."""
 
     def __init__(self, world: World) -> None:
         self.world = world
         self._renderers: dict[tuple[int, int, str], Renderer] = {}
 
     def renderer(self, width: int, height: int, profile: str) -> Renderer:
-        """Return the renderer for a size in pixels and a profile. It is created at first use."""
+        """Return the renderer for an image size in pixels and a render profile. Create it on first use."""
         key = width, height, profile
         if key not in self._renderers:
             self._renderers[key] = Renderer(self.world.model, width=width, height=height, profile=profile)
@@ -42,22 +42,22 @@ class CompiledEpisode:
 
     @cached_property
     def physics(self) -> Any:
-        """The world's state as a `dm_control.mujoco.Physics`."""
+        """The state of the world as a `dm_control.mujoco.Physics` object."""
         return dm_control_physics(self.world)
 
     def close(self) -> None:
-        """Free the GL resources. Repeated calls have no effect."""
+        """Free the OpenGL resources. Repeated calls have no effect."""
         while self._renderers:
             self._renderers.popitem()[1].close()
 
 
 def dm_control_physics(world: World) -> Any:
-    """Wrap the state of a world as a `dm_control.mujoco.Physics`, which must not be changed.
+    """Return the state of a world as a `dm_control.mujoco.Physics` object, which must not be modified.
 
     Raises:
         ViewerError: dm-control is not installed.
     """
-    # Importing dm_control determines the OpenGL backend of the process, so it is imported only on demand.
+    # Importing dm_control fixes the OpenGL backend of the process, so it is imported only when needed.
     try:
         from dm_control import mujoco as dm_mujoco
     except ModuleNotFoundError as error:
@@ -67,16 +67,16 @@ def dm_control_physics(world: World) -> Any:
 
 
 def sample(catalogue: Catalogue, navigable: NavigablePoints, objects: tuple[int, int], seed: int) -> Episode:
-    """Sample the episode of a seed. `objects` are the smallest and largest number of objects."""
+    """Sample the episode for a seed. `objects` holds the minimum and maximum number of objects."""
     low, high = objects
     count = int(np.random.default_rng([seed, _COUNT_STREAM]).integers(low, high + 1))
     return sample_episode(catalogue, navigable, objects=count, seed=seed)
 
 
 class EpisodeCache:
-    """Cache of compiled episodes by seed. Equal seeds have equal episodes, in any order of requests.
+    """A cache of compiled episodes by seed. A seed always gives the same episode.
 
-    If `count` is given, seeds are taken modulo `count`. The cache holds at most `size` episodes, about 20 MB each.
+    If `count` is given, seeds are taken modulo `count`. The cache holds at most `size` episodes (20 MB each).
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class EpisodeCache:
         self._compiled: OrderedDict[int, CompiledEpisode] = OrderedDict()
 
     def get(self, seed: int) -> CompiledEpisode:
-        """Return the compiled episode of a seed. Its world has to be reset before use."""
+        """Return the compiled episode for a seed. The caller must reset its world before use."""
         key = seed if self._count is None else seed % self._count
         if key not in self._compiled:
             while len(self._compiled) >= self._size:
@@ -105,6 +105,6 @@ class EpisodeCache:
         return self._compiled[key]
 
     def close(self) -> None:
-        """Free all compiled episodes. `get` compiles them again."""
+        """Free all compiled episodes. `get` compiles an episode again when it is needed."""
         while self._compiled:
             self._compiled.popitem()[1].close()

@@ -1,4 +1,4 @@
-"""Environment with the Gymnasium interface."""
+"""The rearrangement environment with the Gymnasium interface."""
 
 from typing import Any, cast
 
@@ -14,14 +14,15 @@ from mjsim.environments.options import build, parse_options
 from mjsim.environments.viewer import InteractiveViewer, can_open_window
 from mjsim.values.errors import EnvironmentConfigError
 
-RENDER_SIZE = (640, 480)  # width and height in pixels
+RENDER_SIZE = (640, 480)  # width and height of rendered images, in pixels
 
 
 class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
-    """The task with Gymnasium's interface: `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`.
+    """The rearrangement task as a Gymnasium environment.
 
-    `reset(seed=s)` starts the episode of seed s, which `mjsim house --seed s` writes to a file, and seeds the generator
-    of later episodes.
+    It is created by `gymnasium.make("mjsim.environments:mjsim/Rearrange-v0", objects=6)`. `reset(seed=s)`
+    starts the episode with seed s, which `mjsim house --seed s` writes to a file. It also seeds the generator
+    for later episodes.
 
     Args:
         render_mode: None, `rgb_array` for the first-person view, or `human` for dm_control's viewer.
@@ -30,7 +31,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
     Raises:
         EnvironmentConfigError: An option is unknown or invalid.
         AssetError: The house is malformed.
-        ViewerError: The render mode is `human`, and no window can be opened.
+        ViewerError: The render mode is `human`, but no window can be opened.
     """
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own name
@@ -46,7 +47,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         fps = max(1, round(1 / (parsed.world.control_timestep * repeat)))
         shown = [
             mode for mode in modes if mode != "human" or can_open_window()
-        ]  # environment checkers try all listed modes
+        ]  # environment checkers try every mode in this list
         self.metadata = {**self.metadata, "render_modes": shown, "render_fps": fps}
         arrays = {name: to_space(spec) for name, spec in self.core.observation_spec.items()}
         self.observation_space = cast("spaces.Space[ObservationDict]", spaces.Dict(arrays))
@@ -61,7 +62,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """Start an episode.
 
         Args:
-            seed: Seed of the episode and of the generator of later episodes. By default, it is random.
+            seed: Seed of the episode, which also seeds the generator for later episodes. Random by default.
             options: Must be empty.
 
         Raises:
@@ -80,7 +81,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         """Execute an action.
 
         Raises:
-            EnvironmentStateError: The episode is over, or there is none.
+            EnvironmentStateError: The episode is over or has not started.
             ActionError: The action does not conform to its space.
             PhysicsError: MuJoCo issued a warning. The episode is over.
         """
@@ -88,7 +89,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
         return taken.observation, taken.reward, taken.terminated, taken.truncated, taken.info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return the first-person view, shape (480, 640, 3). In mode `human`, update the window and return None.
+        """Return the first-person view, shape (480, 640, 3), or update the window in `human` mode.
 
         Raises:
             RenderError: No OpenGL context can be created.
@@ -111,7 +112,7 @@ class RearrangeEnv(gymnasium.Env[ObservationDict, Any]):
 
 
 def to_space(spec: specs.Array) -> spaces.Space[Any]:
-    """Convert a dm_env spec to a Gymnasium space. Raise an EnvironmentConfigError if it has no bounds."""
+    """Convert a dm_env spec to a Gymnasium space. Raise an EnvironmentConfigError if it is unbounded."""
     if isinstance(spec, specs.DiscreteArray):
         return spaces.Discrete(spec.num_values)
     if isinstance(spec, specs.BoundedArray):

@@ -1,4 +1,4 @@
-"""Options of environments."""
+"""Options for creating a rearrangement environment."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,32 +23,33 @@ from mjsim.values.person_parameters import PersonParameters
 T = TypeVar("T")
 
 SECONDS_PER_OBJECT = 60.0
-DEFAULT_CACHE_SIZE = 8  # number of compiled episodes
-MAX_SLOTS = 1000  # maximum number of object rows in an observation
+DEFAULT_CACHE_SIZE = 8  # default number of compiled episodes in the cache
+MAX_SLOTS = 1000  # maximum number of rows in per-object arrays
 
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentOptions:
-    """Options of both `mjsim.make` and `gymnasium.make`.
+    """Options that `mjsim.make` and `gymnasium.make` accept.
 
     Attributes:
-        house: Name under `models/houses`, or path of a `catalogue.toml` or its folder.
-        objects: Number of misplaced objects, or (min, max) for a random number in each episode.
+        house: Name of a folder under `models/houses`, or the path of a `catalogue.toml` file or its folder.
+        objects: Number of misplaced objects, or (min, max) to draw a random number for each episode.
         observations: Names of sensors or bundles, or custom `Sensor` values (docs/environments.md).
         actions: `continuous`, `discrete` or a custom `Control`.
         reward: `time`, `shaped` or a custom function.
-        time_limit: Simulated time after which an episode is truncated, in seconds. By default 60 s per object.
-        episodes: None for a new episode at every reset, a number of different episodes that repeat, which makes resets
-            fast, or a list of sampled episodes.
-        slots: Number of rows in arrays with one row per object. By default the largest number of objects in an episode.
+        time_limit: Simulated time in seconds after which an episode is truncated, by default 60 s per object.
+        episodes: None to sample a new episode at every reset, or N to reuse N sampled episodes, which makes
+            resets faster, or a list of episodes to use.
+        slots: Number of rows in per-object arrays, by default the maximum number of objects in an episode.
         camera: Options of the eye camera's images.
         person: Parameters of the person.
         world: Options of the world.
-        keep: Number of compiled episodes in the cache, about 20 MB each. By default all if `episodes` is a number,
-            otherwise 8.
-        physics_errors: `raise`, or `truncate` to end the episode instead, so that training continues. The last valid
-            observation is then repeated, and `info["physics_error"]` contains the error.
-        navigable: Function that computes the walkable floor. By default the installed builder.
+        keep: Number of compiled episodes in the cache, each of about 20 MB. The default is `episodes` if that
+            is a number, otherwise 8.
+        physics_errors: `raise` to raise physics errors, or `truncate` to end the episode so that training
+            continues. A truncated episode repeats its last valid observation, and `info["physics_error"]`
+            contains the error.
+        navigable: Function that computes the walkable floor. By default, the installed function is used.
 
     Raises:
         EnvironmentConfigError: A value is out of range.
@@ -112,7 +113,7 @@ class EnvironmentOptions:
 
     @property
     def object_range(self) -> tuple[int, int]:
-        """The smallest and the largest number of objects in an episode."""
+        """The minimum and maximum number of objects in an episode."""
         if isinstance(self.episodes, Sequence) and self.episodes:
             counts = [len(e.objects) for e in self.episodes]
             return min(counts), max(counts)
@@ -142,7 +143,7 @@ def _check_types(options: EnvironmentOptions) -> None:
 
 
 def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
-    """Create options from keyword arguments. Raise an EnvironmentConfigError for an unknown or invalid option."""
+    """Create options from keyword arguments. Raise an EnvironmentConfigError if one is unknown or invalid."""
     known = [f.name for f in fields(EnvironmentOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:
@@ -151,11 +152,11 @@ def parse_options(given: dict[str, Any]) -> EnvironmentOptions:
 
 
 def build(options: EnvironmentOptions) -> Rearrangement:
-    """Load the house and create the rearrangement task.
+    """Load the house, and create a rearrangement task with the given options.
 
     Raises:
-        EnvironmentConfigError: A name is unknown.
-        SamplingError: No builder of a walkable floor is installed.
+        EnvironmentConfigError: The name of a sensor, control or reward is unknown.
+        SamplingError: No package that computes the walkable floor is installed.
         AssetError: The house is malformed.
     """
     sensors = resolve_sensors(options.observations)

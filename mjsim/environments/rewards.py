@@ -11,11 +11,11 @@ from mjsim.values.episode import CAPACITY
 from mjsim.values.errors import EnvironmentConfigError
 from mjsim.values.observation import ObjectStatus, Observation
 
-HANDLING_TIME = 2.0  # approximate time for a pick or a place, in seconds
+HANDLING_TIME = 2.0  # approximate duration of a pick or place, in seconds
 
 
 class RewardFunction(Protocol):
-    """Function that computes the reward of an environment step."""
+    """Protocol for functions that compute the reward for an environment step."""
 
     def __call__(self, scene: Scene, before: Observation, after: Observation) -> float:
         """Return the reward for the step from `before` to `after`."""
@@ -24,19 +24,19 @@ class RewardFunction(Protocol):
 
 @dataclass(frozen=True)
 class TimeReward:
-    """Negative elapsed time, plus potential-based shaping if `shaping` is not 0.
+    """A reward that penalizes elapsed time, with optional potential-based shaping.
 
-    The shaping is `shaping * (discount * potential(after) - potential(before))`, where the potential is the negative
-    estimated time to finish. Such a term does not change the optimal policy, however poor the estimate, if the agent
-    uses the same discount factor (Ng, Harada and Russell 1999).
+    The shaping term is `shaping * (discount * potential(after) - potential(before))`, where the potential is
+    the negative estimated time to finish. Even with a poor estimate, this term does not change the optimal
+    policy of an agent that uses the same discount factor (Ng, Harada and Russell 1999).
 
     Attributes:
-        per_second: Cost per second.
-        shaping: Weight of the shaping. With 1, an estimated second counts as much as a real one.
-        discount: The agent's discount factor per environment step, 0 to 1.
+        per_second: Penalty per second of elapsed time.
+        shaping: Weight of the shaping term. If it is 1, an estimated second counts as much as an elapsed one.
+        discount: The agent's discount factor per environment step, from 0 to 1.
 
     Raises:
-        EnvironmentConfigError: A value is not finite, or `discount` is not 0 to 1.
+        EnvironmentConfigError: A value is not finite, or `discount` is not from 0 to 1.
     """
 
     per_second: float = 1.0
@@ -60,7 +60,7 @@ class TimeReward:
 
 
 def potential(scene: Scene, observation: Observation) -> float:
-    """Return the negative time to finish, in seconds, estimated for straight walks with one object at a time."""
+    """Return the negative estimated time to finish in seconds, for straight walks with single objects."""
     status = observation.object_status
     bins = np.array(
         [scene.receptacles[scene.episode.targets[n]].center[:2] for n in observation.object_names]

@@ -1,4 +1,4 @@
-"""Window that shows a running world with dm_control's viewer."""
+"""An interactive window that shows a running simulation in dm_control's viewer."""
 
 import os
 import time
@@ -15,10 +15,10 @@ _REMEDY = "run it where there is a display, or use render_mode='rgb_array', whic
 
 
 class InteractiveViewer:
-    """dm_control's viewer without its own loop, for Gymnasium's render mode `human`.
+    """A window with dm_control's viewer for Gymnasium's render mode `human`. It has no event loop of its own.
 
-    `width` and `height` are the window size in pixels. With `realtime`, `show` waits so that the world does not run
-    faster than real time.
+    `width` and `height` are the window size in pixels. If `realtime` is True, `show` waits so that the
+    simulation does not run faster than real time.
 
     Raises:
         ViewerError: There is no display, or GLFW or dm-control is missing.
@@ -36,7 +36,7 @@ class InteractiveViewer:
         self._world: World | None = None
         self._renderer: Any = None
         self._viewer: Any = None
-        self._last_shown = (0.0, 0.0)  # wall-clock and simulated time, in seconds
+        self._last_shown = (0.0, 0.0)  # wall-clock time and simulated time of the last frame, in seconds
 
     def show(self, world: World) -> None:
         """Draw the current state of a world. Raise a ViewerError if the viewer is closed."""
@@ -90,9 +90,9 @@ def can_open_window() -> bool:
 
 
 def _load() -> tuple[Any, Any, Any, Any]:
-    """Load dm_control's viewer modules, with GLFW as the OpenGL backend.
+    """Import dm_control's viewer modules with GLFW as the OpenGL backend.
 
-    A process has a single OpenGL backend, which is determined at first use. Raises a ViewerError if it is not GLFW.
+    A process has a single OpenGL backend, which is fixed on first use. Raise a ViewerError if it is not GLFW.
     """
     if os.environ.get(_BACKEND, "glfw") != "glfw":
         raise ViewerError(
@@ -112,7 +112,7 @@ def _load() -> tuple[Any, Any, Any, Any]:
 
 
 def _check_display() -> None:
-    """Test GLFW directly, because dm_control would select the backend of the process before it fails."""
+    """Check that GLFW works before dm_control selects an OpenGL backend for the process."""
     try:
         with warnings.catch_warnings(record=True) as caught:
             import glfw

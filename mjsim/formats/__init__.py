@@ -1,4 +1,4 @@
-"""Readers and writers for file formats of houses and scenes. Every reader returns a `SourceScene`."""
+"""Readers and writers for house and scene file formats. Every reader returns a `SourceScene`."""
 
 import lazy_loader
 

@@ -1,7 +1,8 @@
-"""Export of a house as a Habitat scene dataset: stage, objects, scene instance, rooms and rearrangement episodes.
+"""Export a house as a Habitat scene dataset with objects, rooms and rearrangement episodes.
 
-Habitat has y up and the camera along -z, so x, y, z in mjsim are x, -z, y in Habitat. The stage is everything
-that cannot move. Receptacles and objects are templates with their own origins, so that mjsim's poses apply to them.
+In Habitat, y is up and the camera looks along -z, so a vector (x, y, z) in mjsim becomes (x, z, -y) in
+Habitat. The stage contains everything that cannot move. Receptacles and objects are templates with the same
+origins as in mjsim, so that they also have the same poses.
 """
 
 import gzip
@@ -33,13 +34,13 @@ from mjsim.values.episode import Episode
 from mjsim.values.person_parameters import PersonParameters
 
 _UPRIGHT = np.linalg.inv(Y_TO_Z)
-_CEILING = 2.6  # height of regions in metres
+_CEILING = 2.6  # height of the exported room regions, in metres
 _OBJECT, _SCENE = ".object_config.json", ".scene_instance.json"
-_AIR = 0.05  # clearance between a person's body and walls on a path, in metres
+_AIR = 0.05  # clearance between a person's body and walls, in metres
 
 
 def export_habitat(catalogue: Catalogue, episodes: Sequence[Episode], folder: Path) -> str:
-    """Write a house and its episodes into an existing folder. Return the name of the scene."""
+    """Write a house and its episodes into an existing folder. Return the name of the Habitat scene."""
     house = compiled_house(catalogue)
     name = _slug(catalogue.name if catalogue.ref.kind == "generated" else catalogue.label)
     axes = {"up": [0, 1, 0], "front": [0, 0, -1]}
@@ -119,7 +120,6 @@ def _solid(pieces: Iterable[ScenePiece]) -> bytes:
 
 
 def _template(path: Path, marks: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of an object template except its meshes. The template's frame is the model's frame."""
     mass = float(read_model(path).compile().body_mass.sum())
     return {
         "mass": round(mass, 4),
@@ -148,7 +148,7 @@ def _mount(house: CompiledHouse, key: str) -> tuple[Floats, Floats]:
 
 
 def _volume(house: CompiledHouse, key: str) -> dict[str, Any]:
-    """Return Habitat's description of a receptacle's volume: centre and half sizes in its own frame, in metres."""
+    """Describe the volume of a receptacle by its centre and half sizes in its own frame, in metres."""
     geometry = house.receptacles[key]
     position, rotation = _mount(house, key)
     middle = _UPRIGHT[:3, :3] @ rotation.T @ (geometry.center - position)
@@ -237,7 +237,7 @@ def _episode(house: CompiledHouse, episode: Episode, scene: str, number: int) ->
         geometry = house.receptacles[receptacle]
         targets[handle] = _pose(geometry.center, geometry.rotation).tolist()
         goals.append([f"{_slug(receptacle)}_:0000", None])
-    turn = (episode.start.heading - math.pi / 2) / 2  # Habitat looks along -z, which is y in mjsim
+    turn = (episode.start.heading - math.pi / 2) / 2  # Habitat's camera looks along -z, which is y in mjsim
     return {
         "episode_id": str(number),
         "scene_id": scene + _SCENE,

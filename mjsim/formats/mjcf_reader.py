@@ -1,4 +1,4 @@
-"""Reader for MJCF scenes. Geoms are read in their start poses. Joints, actuators and sensors are ignored."""
+"""Import scenes from MJCF files. Geoms keep their initial poses. Joints and actuators are ignored."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,17 +27,17 @@ from mjsim.house.compiled.sites import PREFIX, RoomMap
 from mjsim.values.errors import AssetError
 
 SUFFIXES = (".xml", ".mjcf")
-_SEEN = (0, 1, 2)  # geom groups that viewers show
-_CLEAR = 0.9  # a colliding geom with lower opacity is a marker that is not drawn
-# Minimum alpha, out of 255; a texture with lower alpha everywhere is a drawn shadow, which is ignored.
+_SEEN = (0, 1, 2)  # geom groups that viewers show by default
+_CLEAR = 0.9  # minimum opacity at which a colliding geom is drawn
+# A texture whose alpha values (out of 255) are all lower is a painted shadow and is ignored.
 _OPAQUE = 250
-_COVER = 0.02  # distance in metres by which a visual geom may end inside a collision geom that it covers
-_ENDLESS = 15.0  # half of the side given to an infinite plane, in metres
+_COVER = 0.02  # distance by which a collision geom may protrude from a visual geom that hides it, in metres
+_ENDLESS = 15.0  # maximum half size of imported planes, in metres
 _GEOM = mujoco.mjtGeom
 
 
 def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene. Raise `AssetError` if it does not compile or refers to a missing mesh."""
+    """Read an MJCF scene. Raise `AssetError` if it does not compile or refers to a missing mesh."""
     spec = read_model(path)
     missing = MissingFiles(options.skip_missing)
     _without_missing_meshes(spec, path, missing)
@@ -57,7 +57,7 @@ def read_mjcf(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def _rooms(model: Any) -> tuple[NamedRoom, ...]:
-    """Return the rooms of an mjsim house, which are marked by box sites. Other scenes have none."""
+    """Return the rooms of an mjsim house, which are marked by box sites. Other scenes have no rooms."""
     if not any(model.site(site).name.startswith(PREFIX) for site in range(model.nsite)):
         return ()
     rooms = RoomMap.from_model(model)
@@ -71,9 +71,9 @@ def _rooms(model: Any) -> tuple[NamedRoom, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    image: Floats  # RGB from 0 to 1, shape (height, width, 3)
-    repeat: Floats  # number of repetitions along each axis, shape (2,)
-    uniform: bool  # True if `repeat` counts per metre on primitives
+    image: Floats  # RGB image from 0 to 1, shape (height, width, 3)
+    repeat: Floats  # number of repetitions along each texture axis, shape (2,)
+    uniform: bool  # True if `repeat` counts repetitions per metre
 
 
 def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFiles) -> None:
@@ -95,8 +95,8 @@ def _without_missing_meshes(spec: mujoco.MjSpec, path: Path, missing: MissingFil
 
 
 def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]:
-    """Remove all textures from a model. Return them by material name, together with the missing files."""
-    files = {t.name: t.file for t in spec.textures if t.file}  # cube textures are drawn on each side
+    """Remove all textures from a model. Return them by material name, and the names of missing files."""
+    files = {t.name: t.file for t in spec.textures if t.file}  # cube textures are shown on every side
     made = {t.name: t.rgb1 for t in spec.textures if not t.file}
     images: dict[str, Floats] = {}
     found, absent = {}, []
@@ -111,7 +111,7 @@ def _take_pictures(spec: mujoco.MjSpec) -> tuple[dict[str, _Picture], list[str]]
             try:
                 with Image.open(files[name]) as picture:
                     if "A" in picture.getbands() and np.asarray(picture.getchannel("A")).max() < _OPAQUE:
-                        material.rgba[3] = 0.0  # a drawn shadow, which is not imported
+                        material.rgba[3] = 0.0  # a painted shadow, which is not imported
                         continue
                     small = picture.convert("RGB")
                     small.thumbnail((TEXTURE_SIDE, TEXTURE_SIDE))
@@ -133,7 +133,7 @@ def _pieces(model: Any, pictures: dict[str, _Picture]) -> Iterator[ScenePiece]:
     alpha = np.where(model.geom_matid >= 0, material_alpha, model.geom_rgba[:, 3])
     shown = np.isin(model.geom_group, _SEEN) & (alpha > 0)
     bodies = model.geom_bodyid
-    # In many scenes, bodies have visual and collision geoms. Visual geoms are solid if the body has no collision geoms.
+    # Many bodies have both visual and collision geoms. If there are only visual geoms, these collide.
     has_solid = np.isin(bodies, np.unique(bodies[collides])) & (bodies > 0)
     decor = np.flatnonzero(shown & ~collides)
     for geom in range(model.ngeom):
@@ -173,7 +173,7 @@ def _name(model: Any, geom: int) -> str:
 
 
 def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | None:
-    """Return a geom's surface in its own frame, or None for a geom without one, such as a height field."""
+    """Return a geom's surface in its own frame, or None if the geom type is not supported."""
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
     picture = pictures.get(model.material(material).name) if material >= 0 else None
@@ -188,9 +188,9 @@ def _surface(model: Any, geom: int, pictures: dict[str, _Picture]) -> Surface | 
         return surface
     sides = np.ones(3) if picture.uniform else np.maximum(made.extents, 1e-3)
     axis = np.abs(made.face_normals).argmax(axis=1)
-    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the two axes parallel to a face
+    plane = np.array([[1, 2], [0, 2], [0, 1]])[axis]  # the two axes that are parallel to a face
     places = surface.corners / sides
-    # A texture that does not repeat covers a side from edge to edge.
+    # Without repetition, the texture covers each side from edge to edge.
     uv = (np.take_along_axis(places, plane[:, None, :].repeat(3, axis=1), axis=2) + 0.5) * picture.repeat
     return _painted(surface, uv, picture)
 
@@ -205,7 +205,7 @@ def _mesh(model: Any, mesh: int, colour: Floats, picture: _Picture | None) -> Su
         return surface
     places = model.mesh_texcoord[model.mesh_texcoordadr[mesh] :]
     uv = places[model.mesh_facetexcoord[start : start + faces]].astype(np.float64) * picture.repeat
-    uv[..., 1] = 1.0 - uv[..., 1]  # MuJoCo counts rows from the top
+    uv[..., 1] = 1.0 - uv[..., 1]  # in MuJoCo, v points down
     return _painted(surface, uv, picture)
 
 

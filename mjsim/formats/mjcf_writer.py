@@ -1,4 +1,4 @@
-"""Export of a composed house as plain MJCF for stock MuJoCo: one XML file and a folder of assets."""
+"""Export a house as plain MJCF, which consists of one XML file and a folder of assets."""
 
 import hashlib
 import xml.etree.ElementTree as ET
@@ -15,10 +15,11 @@ ASSETS = "assets"
 
 
 def export_house(scene: Scene, path: Path) -> None:
-    """Write the scene as a self-contained model whose reference pose `qpos0` is the scene's current state.
+    """Write a scene as a self-contained MJCF model that starts in the current state of the scene.
 
-    Meshes and textures are copied into the folder `assets` next to the file and named by their content. Paths are
-    relative, so the folder can be moved. The XML file is written last, atomically.
+    The current state is stored as the reference pose `qpos0`. Meshes and textures are copied into the folder
+    `assets` next to the file, and their names contain a hash. Paths are relative, so the folder can be moved.
+    The XML file is written last, atomically.
 
     Raises:
         AssetError: The path does not end in `.xml`, or an asset file is missing.
@@ -27,7 +28,7 @@ def export_house(scene: Scene, path: Path) -> None:
         raise AssetError(f"cannot export to {path}: MuJoCo reads models from files that end in .xml")
     try:
         root = ET.fromstring(scene.spec.to_xml())
-    except ValueError as error:  # MuJoCo compiles the model again from its files
+    except ValueError as error:  # raised if MuJoCo cannot compile the model from its files
         raise AssetError(f"cannot export to {path}: {error}") from error
     for compiler in root.findall("compiler"):
         for folder in ("meshdir", "texturedir", "assetdir"):
@@ -45,7 +46,7 @@ def _copy_asset(source: Path, folder: Path) -> str:
         content = source.read_bytes()
     except OSError as error:
         raise AssetError(f"cannot read asset {source}: {error.strerror}") from error
-    # Files of the same name from different folders must not replace each other.
+    # The hash distinguishes files that have the same name in different folders.
     name = f"{source.stem}-{hashlib.sha256(content).hexdigest()[:12]}{source.suffix}"
     target = folder / ASSETS / name
     if not target.exists():
@@ -55,7 +56,7 @@ def _copy_asset(source: Path, folder: Path) -> str:
 
 
 def _sharpen_poses(root: ET.Element, model: mujoco.MjModel) -> None:
-    """Write the poses that determine `qpos0` with full precision, because MuJoCo writes only six digits."""
+    """Rewrite the poses that determine `qpos0` with full precision. MuJoCo writes only six digits."""
     world = root.find("worldbody")
     for body in [] if world is None else _top_level_bodies(world):
         if body.find("joint") is not None or body.find("freejoint") is not None:

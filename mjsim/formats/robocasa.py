@@ -1,4 +1,4 @@
-"""Reader for RoboCasa's kitchen layouts (YAML). Walls, floors and fixtures are boxes, since layouts have no meshes."""
+"""Import RoboCasa kitchen layouts from YAML files. All parts become boxes, as layouts contain no meshes."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
 SUFFIXES = (".yaml", ".yml")
-# Width, depth and height, in metres, of fixtures whose size is not always given in a layout.
+# Default width, depth and height of fixtures whose size may be missing from a layout, in metres.
 _SIZES = {
     "counter": (1.0, 0.65, 0.92),
     "stove": (0.76, 0.66, 0.92),
@@ -38,19 +38,19 @@ _SIZES = {
 }
 _COLOURS = {"counter": 0xD8D3C8, "wall": 0xEDE8DF, "floor": 0xB08D66, "steel": 0xA9AEB3, "wood": 0xC9B08C}
 _STEEL = ("stove", "oven", "microwave", "hood", "dishwasher", "fridge", "sink")
-# Types of wall fixtures that are ignored.
+# Types of small wall fixtures that are not imported.
 _SMALL = ("window", "window_proc", "wall_accessory", "utensil_rack")
 _AXES = (("left", "right"), ("front", "back"), ("bottom", "top"))
-# Base height of stacks, worktop thickness and cabinet setback, in metres.
+# Height of the plinth below a stack, thickness of worktops, and setback of cabinet fronts, in metres.
 _BASE, _TOP, _SET_BACK = 0.05, 0.04, 0.12
-# Axis of each side, and the sign of the direction out of the room.
+# For each side of the room, the axis and the sign of the outward direction.
 _SIDES = {"left": (0, -1), "right": (0, 1), "back": (1, 1), "front": (1, -1)}
-_WALL, _BACKING = 0.02, 0.1  # half thickness of walls and of their backing, in metres
+_WALL, _BACKING = 0.02, 0.1  # half thickness of a wall, and half thickness of its backing, in metres
 
 
 def read_robocasa(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a layout. Raise `AssetError` if it is damaged or has an unknown fixture."""
-    del options  # layouts are always in metres with z up
+    """Read a kitchen layout. Raise `AssetError` if the file is damaged or contains an unknown fixture."""
+    del options  # layouts always use metres and have z up
     try:
         layout = yaml.safe_load(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
@@ -72,17 +72,15 @@ class _LayoutReader:
         self._left_out: dict[str, int] = {}
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Return report lines about ignored fixtures and about the use of boxes."""
         small = ", ".join(f"{n} {kind}" for kind, n in sorted(self._left_out.items()))
         boxes = ImportDecision("fixtures", "boxes", "the layout has sizes and places; meshes are RoboCasa's")
         return (boxes, left_out(small, "on walls and worktops")) if small else (boxes,)
 
     def group(self, key: str, group: Mapping[str, Any]) -> Iterator[ScenePiece]:
-        """Yield the pieces of a group of fixtures, in the frame of the kitchen."""
         origin, place = ([*group.get(name, (0, 0)), 0] for name in ("group_origin", "group_pos"))
         turn = rotation_matrix(group.get("group_z_rot", 0.0), [0, 0, 1])
         frame = translation_matrix(place) @ turn @ translation_matrix(-np.array(origin, float))
-        known: dict[str, tuple[Floats, Floats]] = {}  # centre and size of each fixture in the group
+        known: dict[str, tuple[Floats, Floats]] = {}  # centre and size of each fixture in the group, by name
         for fixtures in group.values():
             for fixture in fixtures if isinstance(fixtures, list) else ():
                 if isinstance(fixture, dict) and fixture.get("enable", True):
@@ -106,7 +104,7 @@ class _LayoutReader:
         placed = "pos" in fixture or "align_to" in fixture
         centre = _centre(fixture, size, known)
         known[self.name] = centre, size
-        if not placed:  # drawn as part of the fixture that contains it
+        if not placed:  # a fixture without a position is drawn as part of its container
             return
         if "z_rot" in fixture:
             spin = rotation_matrix(fixture["z_rot"], [0, 0, 1])
@@ -140,7 +138,7 @@ def _size(fixture: Mapping[str, Any], kind: str, known: Mapping[str, tuple[Float
 
 
 def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[Floats, Floats]]) -> Floats:
-    """Return the centre of a fixture in its group's frame, in metres. It may be given relative to another fixture."""
+    """Return the centre of a fixture in its group's frame, in metres."""
     if "align_to" not in fixture:
         standing = (0.0, 0.0, size[2] / 2)
         given = fixture.get("pos") or [None] * 3
@@ -156,7 +154,7 @@ def _centre(fixture: Mapping[str, Any], size: Floats, known: Mapping[str, tuple[
 
 
 def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
-    """Return the centre and size of a wall or floor in metres. Layouts give the position of its inner face."""
+    """Compute the centre and size of a wall or floor, in metres, from the position of its inner face."""
     centre, half = np.array(fixture["pos"], float), np.array(fixture["size"], float)
     backing = bool(fixture.get("backing"))
     depth = half[2] + 2 * _WALL * backing
@@ -171,7 +169,7 @@ def _flat(fixture: Mapping[str, Any], kind: str) -> tuple[Floats, Floats]:
 
 
 def _counter(name: str, centre: Floats, size: Floats, frame: Floats) -> Iterator[ScenePiece]:
-    """Yield a worktop, and below it a cabinet set back so that its fronts are visible. They collide as one solid."""
+    """Yield a worktop, a cabinet below it that is set back, and one collision shape for both."""
     yield _box(name, "counter", centre, size, frame, seen=False)
     top = np.array([0.0, 0.0, (size[2] - _TOP) / 2])
     yield _box(name, "counter", centre + top, np.array([*size[:2], _TOP]), frame, solid=False)

@@ -1,4 +1,4 @@
-"""Reader for SDF worlds (Gazebo): models with their links, poses, shapes and meshes. Joints do not move."""
+"""Import Gazebo worlds from SDF files, including models, shapes and meshes. All joints become rigid."""
 
 import os
 import re
@@ -27,14 +27,14 @@ from mjsim.values.errors import AssetError
 
 SUFFIXES = (".world", ".sdf")
 _VARIABLES = ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
-_BUILT_IN = ("sun", "ground_plane")  # models that come with Gazebo
-_THIN = 0.002  # thickness given to planes, in metres
+_BUILT_IN = ("sun", "ground_plane")  # models that are part of Gazebo
+_THIN = 0.002  # thickness of the boxes that replace planes, in metres
 _DEPTH = 20  # maximum nesting depth of models
-_PLANE = 30.0  # maximum side of a plane, in metres
+_PLANE = 30.0  # maximum side length of imported planes, in metres
 
 
 def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a world or a model. Raise `AssetError` if it is damaged or refers to a missing file."""
+    """Read an SDF world or model. Raise `AssetError` if it is damaged or refers to a missing file."""
     root = _root(path)
     reader = _WorldReader(path, options)
     top = root.find("world")
@@ -51,7 +51,7 @@ def read_sdf(path: Path, options: HouseOptions) -> SourceScene:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    name: str  # name of the outermost model
+    name: str  # name of the outermost enclosing model
     frame: Floats  # transform from the link to the world, shape (4, 4)
     folder: Path
     loose: bool
@@ -69,7 +69,6 @@ class _WorldReader:
         self._meshes: dict[Path, list[tuple[str, Surface]]] = {}
 
     def unknown_kinds(self) -> tuple[ImportDecision, ...]:
-        """Return report lines about shapes that cannot be read."""
         return tuple(
             left_out(f"{n} of shape <{kind}>", "it cannot be read") for kind, n in self._unknown.items()
         )
@@ -77,7 +76,7 @@ class _WorldReader:
     def models(
         self, parent: ET.Element, frame: Floats, folder: Path, depth: int, *, static: bool, name: str = ""
     ) -> Iterator[ScenePiece]:
-        """Yield the pieces of all models in a world or a model. `name` is the name of the outermost model."""
+        """Yield the pieces of all models in a world or model. `name` is the name of the outermost model."""
         if depth > _DEPTH:
             raise AssetError(f"{self._path} nests models more than {_DEPTH} deep; does one include itself?")
         for element in parent.findall("include"):
@@ -91,7 +90,7 @@ class _WorldReader:
     ) -> Iterator[ScenePiece]:
         uri = (element.findtext("uri") or "").strip()
         built_in = uri.rpartition("/")[2].lower().replace(" ", "_")
-        if built_in == "ground_plane":  # only its height is used, because the house gets its own floor
+        if built_in == "ground_plane":  # only the height matters, because the house has its own floor
             ground = trimesh.creation.box((_PLANE, _PLANE, _THIN)).apply_translation((0, 0, -_THIN / 2))
             surface = primitive(ground, np.array(PLAIN)).moved(frame @ _pose(element, self._path))
             yield ScenePiece(built_in, surface, seen=False, solid=False)
@@ -155,9 +154,9 @@ class _WorldReader:
         yield from (s.moved(frame @ np.diag([*scale, 1.0])) for _, s in self._meshes[file])
 
     def _find(self, uri: str, folder: Path | None) -> Path | None:
-        """Return the file or folder of a URI, or None if it is missing and may be left out."""
+        """Return the file or folder that a URI names, or None if it is missing and may be skipped."""
         scheme, _, rest = uri.rpartition("://")
-        if scheme.startswith("http"):  # Gazebo Fuel; the model may have been downloaded before
+        if scheme.startswith("http"):  # a Gazebo Fuel model, which may have been downloaded already
             rest = rest.rstrip("/").rpartition("/")[2]
         rest = rest.lstrip("/") if scheme == "model" else rest
         folders = [*([] if folder is None else [folder, folder.parent]), *self._folders]
@@ -174,7 +173,7 @@ class _WorldReader:
 
 def _root(path: Path) -> ET.Element:
     try:
-        # Gazebo accepts comments before the XML declaration.
+        # Remove the XML declaration, because Gazebo allows comments before it.
         root = ET.fromstring(re.sub(r"<\?xml[^>]*\?>", "", read_text(path), count=1))
     except (OSError, UnicodeDecodeError, ET.ParseError) as error:
         raise AssetError(f"cannot read {path} as SDF: {error}; is it complete?") from error
@@ -191,7 +190,7 @@ def _model_file(folder: Path) -> Path:
         except (OSError, UnicodeDecodeError, ET.ParseError):
             named = []
         named.sort(key=lambda sdf: [int(n) for n in re.findall(r"\d+", sdf.get("version", ""))], reverse=True)
-        for sdf in named:  # the newest version comes first
+        for sdf in named:  # sorted from the newest version to the oldest
             if (file := folder / (sdf.text or "").strip()).is_file():
                 return file
     if (folder / "model.sdf").is_file():
@@ -200,13 +199,13 @@ def _model_file(folder: Path) -> Path:
 
 
 def _pose(element: ET.Element, path: Path, model: ET.Element | None = None, depth: int = 0) -> Floats:
-    """Return the transform (4, 4) from an element to its model or link, given by <pose>: x y z roll pitch yaw.
+    """Return the transform (4, 4) that the <pose> of an element specifies.
 
     Args:
-        element: A model, link, joint or other element.
-        path: File named in error messages.
-        model: The element in which the target of `relative_to` is looked up.
-        depth: Number of `relative_to` references followed so far.
+        element: A model, link, joint or other element, whose pose consists of x, y, z, roll, pitch and yaw.
+        path: The file that error messages mention.
+        model: The element that contains the target of `relative_to`.
+        depth: Number of `relative_to` references that have been followed so far.
     """
     pose = element.find("pose")
     attributes = {} if pose is None else pose.attrib

@@ -1,1 +1,1 @@
-"""Homes generated from a seed: rooms, doors, windows, furniture and bins. Every process generates the same bytes."""
+"""Generate furnished homes from a seed. A seed gives the same files in every process."""

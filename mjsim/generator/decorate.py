@@ -1,4 +1,4 @@
-"""Decoration: pictures, curtains, lamps, rugs, and radiators under windows."""
+"""Decorate rooms with pictures, curtains, lamps, rugs and radiators."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,12 @@ from mjsim.generator.space import BLINDS, WALL_GAP, PiecePose, Space
 from mjsim.generator.values import BACK, SIDES, HomePlan, Side, Window
 from mjsim.house.catalogue.generated_names import stream
 
-LOW = 1.15  # maximum height of furniture below a picture, in metres
-BESIDE_TILES = 0.3  # minimum distance between kitchen tiles and a picture, in metres
-LAMPS_APART = 0.8  # minimum distance between two lamps, in metres
+LOW = 1.15  # maximum height of furniture below a wall decoration, in metres
+BESIDE_TILES = 0.3  # minimum distance between kitchen tiles and a wall decoration, in metres
+LAMPS_APART = 0.8  # minimum distance between a ceiling lamp and a pendant lamp, in metres
 LARGE = 15.0  # minimum floor area of a room that gets a large rug, in square metres
-LONG = 2.0  # minimum length of a free stretch of wall that must get a picture or the like, in metres
-MOST_HUNG = 4  # maximum number of wall decorations per room, since each picture has its own texture
+LONG = 2.0  # minimum length of free wall that is always decorated, in metres
+MOST_HUNG = 4  # maximum number of wall decorations per room, because each picture needs a texture
 _WALLS: dict[str, tuple[str, ...]] = {
     "hall": ("picture", "wall_mirror", "picture", "clock"),
     "kitchen": ("clock", "picture", "wall_shelf", "pinboard"),
@@ -43,7 +43,7 @@ _RUGS: dict[str, tuple[str, ...]] = {
 def decorate(
     spaces: Sequence[Space], uses: Mapping[str, str], plan: HomePlan, look: Appearance, seed: int
 ) -> None:
-    """Add decoration to all rooms. Of these pieces, only radiators take up floor space."""
+    """Add decoration to all rooms. Only radiators take up floor space."""
     for door in plan.doors:
         if door.is_front:
             space = next(s for s in spaces if s.room.key == door.rooms[0])
@@ -186,7 +186,7 @@ def _hang_on_walls(space: Space, use: str, look: Appearance, rng: np.random.Gene
         for side in (SIDES[i] for i in rng.permutation(4))
         for stretch in _stretches(space, side, *space.room.floor.wall(side))
     ]
-    # Start with the long stretches, because they would look bare without decoration.
+    # Start with long stretches of wall, which would look bare without decoration.
     found.sort(key=lambda stretch: stretch[2] - stretch[1] < LONG)
     for side, start, end in found:
         if hung >= MOST_HUNG or (rng.random() > 0.75 and end - start < LONG):
@@ -206,7 +206,7 @@ def _stretches(space: Space, side: Side, low: float, high: float) -> list[tuple[
     blocked = [(a, b) for s, a, b, _ in space.hung if s == side]
     deep = space.room.floor.along(side, low, high, 0.0, 0.4)
     tiled = [
-        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # tiles above the worktop
+        (*moved(part.spot, at.x, at.y, at.yaw), LOW + 1)  # keeps the wall tiles above the worktop free
         for piece, at in space.stood
         for part in piece.parts
         if "kitchen" in piece.kind

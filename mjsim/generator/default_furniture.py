@@ -1,8 +1,8 @@
-"""Lists of required and default furniture for each room use, limits on its amount, and rooms suitable for each bin."""
+"""Required and default furniture for each room use, and the rooms that suit each bin."""
 
 Options = tuple[str, ...]
 
-REQUIRED: dict[str, tuple[Options, ...]] = {  # one piece from each tuple is added to a room
+REQUIRED: dict[str, tuple[Options, ...]] = {  # each room gets one piece from each tuple
     "bedroom": (("double_bed", "double_bed"),),
     "child": (("single_bed", "bunk_bed"),),
     "studio": (("double_bed", "single_bed"),),
@@ -11,7 +11,7 @@ REQUIRED: dict[str, tuple[Options, ...]] = {  # one piece from each tuple is add
 }
 PLANTS: Options = ("bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
 _SHELVES: Options = ("bookcase", "low_bookcase", "cube_shelf", "ladder_shelf")
-# Each entry is a choice of furniture types and the probability of adding one of them if the room has space.
+# Each entry contains furniture types and the probability that one of them is added to a room with space.
 DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
     "bedroom": (
         (("chest_of_drawers", "dressing_table"), 1.0),
@@ -81,36 +81,36 @@ DEFAULTS: dict[str, tuple[tuple[Options, float], ...]] = {
         (("mirror_wardrobe", "low_bookcase", "armchair", "standing_mirror"), 0.6),
     ),
 }
-# Used if nothing else fits.
+# Furniture for rooms in which nothing else fits.
 FALLBACKS: Options = ("standing_mirror", "umbrella_stand", "snake_plant", "stool")
 MAX_PLANTS = 3
-ROUNDS = 3  # number of passes through the lists above
+ROUNDS = 3  # number of passes through the lists of default furniture
 MAX_OF_KIND = {
     "armchair": 2,
     "bush": 2,
     "bookcase": 2,
     "low_bookcase": 2,
     "sideboard": 2,
-}  # maximum number per room; 1 for types not listed
-# Minimum and maximum share of the floor covered by furniture.
+}  # maximum number of pieces per room; the default is 1
+# Minimum and maximum share of a room's floor that furniture covers.
 FURNISHED_SHARES = {"hall": (0.15, 0.25), "living_room": (0.31, 0.38), "studio": (0.33, 0.4)}
-# Room uses suitable for a kitchen, a table and a desk, in order of preference. "child" is a child's bedroom.
+# Room uses for a kitchen, a table and a desk, in order of preference. "child" is a child's bedroom.
 COOKING: Options = ("kitchen", "living_room", "studio", "dining_room")
 DINING: Options = ("dining_room", "kitchen", "living_room", "studio")
 WORKING: Options = ("office", "child", "bedroom", "studio", "living_room", "dining_room", "hall")
-BIN_SIZES = {  # width, depth and height of bins that stand on the floor, in metres
+BIN_SIZES = {  # width, depth and height of bins on the floor, in metres
     "recycling_bin": (0.48, 0.42, 0.5),
     "laundry_hamper": (0.51, 0.51, 0.55),
     "toy_box": (0.62, 0.47, 0.4),
     "bookshelf": (0.9, 0.34, 0.75),
 }
-BIN_ROOMS: dict[str, Options] = {  # room uses suitable for each bin, in order of preference
+BIN_ROOMS: dict[str, Options] = {  # suitable room uses for each bin, in order of preference
     "recycling_bin": ("kitchen", "utility", "hall", "studio", "living_room", "dining_room"),
     "laundry_hamper": ("bathroom", "shower_room", "utility", "bedroom", "hall", "studio"),
     "toy_box": ("child", "bedroom", "living_room", "studio", "hall", "office", "dining_room"),
     "bookshelf": ("living_room", "studio", "office", "dining_room", "hall", "bedroom", "child"),
 }
-SHOWN_NAMES = {  # names used in descriptions of locations, if they differ from the furniture type
+SHOWN_NAMES = {  # names of furniture types in descriptions of places
     "lounge": "sofa",
     "dining": "dining table",
     "straight_kitchen": "kitchen counter",

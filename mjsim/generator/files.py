@@ -1,4 +1,4 @@
-"""Files of a generated house: MJCF model, catalogue, recipe and textures."""
+"""Write the MJCF model, catalogue, recipe and textures of a generated house."""
 
 import json
 import math
@@ -13,14 +13,14 @@ from mjsim.generator.recipe import RECIPE, Recipe
 from mjsim.generator.shell import shell
 from mjsim.generator.values import Asset, Furnishing
 
-# House whose classes, materials, categories and objects are used by all generated houses.
+# Model that provides default classes, materials, categories and objects for all generated houses.
 STYLE = "houses/apartment"
-# Materials used by the default classes and by drawn shadows.
+# Materials that default classes and contact shadows use in every house.
 _ALWAYS = {"white", "ceiling", "shadow_box", "shadow_round", "shadow_edge"}
-_SHADOWS = 15.0  # range of shadows in metres; a shorter range is sharper but causes speckles on round objects
-# Number of drop points per square metre of floor, low enough to fit into a furnished home.
+_SHADOWS = 15.0  # range of shadows in metres; shorter ranges cause speckles on round objects
+# Number of drop points for objects per square metre of floor, low enough for furnished homes.
 POINTS_PER_M2 = 0.32
-POINTS = (8, 40)  # minimum and maximum number of drop points
+POINTS = (8, 40)  # minimum and maximum number of drop points in a house
 _HEAD = """\
 <mujoco model="{name}">
 <compiler angle="radian" texturedir="textures"/>
@@ -46,12 +46,12 @@ _HEAD = """\
 
 
 def house_files(recipe: Recipe, furnishing: Furnishing, models: Path) -> Mapping[str, bytes]:
-    """Return the files of a house, including its recipe, by path. Every process generates the same bytes.
+    """Return the contents of a house's files by path. Every process generates the same bytes.
 
     Args:
         recipe: Recipe of the house.
         furnishing: Furniture and bins of the house.
-        models: Folder of the models that come with the package.
+        models: Folder with the models in this package.
     """
     plan = recipe.plan
     world = "\n".join([*shell(plan), *_furniture(furnishing)])
@@ -98,9 +98,9 @@ def _furniture(furnishing: Furnishing) -> Iterable[str]:
 
 
 def used_materials(world: str, own: list[str], brought: Iterable[Asset], models: Path) -> list[str]:
-    """Return the MJCF of the materials that a world uses, with their textures.
+    """Return the MJCF elements of all materials and textures that a world uses.
 
-    A material of the apartment is used only if neither `own` nor `brought` defines one of the same name.
+    Materials in `own` and `brought` take precedence over materials of the apartment with the same name.
     """
     elements = [ET.fromstring(text) for text in own]
     for asset in brought:

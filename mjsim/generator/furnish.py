@@ -1,4 +1,4 @@
-"""Rule-based placement of furniture and bins in a home plan: first required furniture, then default furniture."""
+"""Place furniture and bins in a floor plan according to rules."""
 
 import itertools
 import math
@@ -33,17 +33,17 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 ATTEMPTS = 6
-SIZES = 4  # number of sizes tried for each piece
-BARE = 0.285  # if furniture covers a smaller share of a home's floor, more is added
-LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor covered by furniture
-MAX_FAILURES = 4  # number of pieces that may fail to fit before a room counts as full
-# The screen of a wash corner would block a door. The cooker of a kitchenette should not be next to one.
+SIZES = 4  # number of sizes that are tried for each piece of furniture
+BARE = 0.285  # minimum covered share of a home's floor, below which more furniture is added
+LEAST, MOST = 0.26, 0.44  # minimum and maximum share of the floor that furniture covers
+MAX_FAILURES = 4  # number of failed placements after which a room counts as full
+# A wash corner has a screen that would block a door, and a kitchenette has a cooker, so both avoid doors.
 AWAY_FROM_DOORS = ("wash_corner", "kitchenette")
 AXES: tuple[tuple[Side, ...], ...] = (("south", "north"), ("east", "west"))
 
 
 class FurnishedHome:
-    """A home that is being furnished."""
+    """A home in the process of being furnished."""
 
     def __init__(
         self, plan: HomePlan, bins: Sequence[str], look: Appearance, seed: int, attempt: int
@@ -63,7 +63,7 @@ class FurnishedHome:
         return "child" if is_child else room.use
 
     def rooms(self, uses: Iterable[str]) -> list[Space]:
-        """Return the rooms with one of these uses, in the order of the uses."""
+        """Return all rooms with the given uses, ordered by use."""
         return [space for use in uses for space in self.spaces if self.uses[space.room.key] == use]
 
     def put(
@@ -92,7 +92,7 @@ class FurnishedHome:
                 self.mounts.append(BinPlacement(key, space.room.key, place, position, turns))
 
     def put_bin(self, receptacle: str) -> bool:
-        """Place a floor-standing bin in the first room with enough space. Return False if no room has space."""
+        """Place a bin on the floor of the first room with enough space. Return False if no room has space."""
         if receptacle not in BIN_SIZES:
             return any(mount.receptacle == receptacle for mount in self.mounts)
         w, d, h = BIN_SIZES[receptacle]
@@ -109,7 +109,7 @@ class FurnishedHome:
         return False
 
     def add_required_furniture(self) -> None:
-        """Add the furniture that every home has. Raise `HouseError` if a piece does not fit."""
+        """Add the furniture that every home needs. Raise `HouseError` if a piece does not fit."""
         if not self.rooms(("bathroom", "shower_room")):
             self._put_first(("wash_corner",), ("studio", "bedroom", "living_room"), "a place to wash")
         cooking = next((space.room.use for space in self.rooms(COOKING)), "")
@@ -170,7 +170,7 @@ class FurnishedHome:
                 self.put(space, "armchair")
 
     def add_default_furniture(self) -> None:
-        """Furnish each room until enough of its floor is covered. Add more if the whole home is still too bare."""
+        """Add default furniture to each room, and more of it if too little of the home's floor is covered."""
         for space in self.spaces:
             self._put_defaults(space)
         for space in self.spaces:
@@ -180,7 +180,7 @@ class FurnishedHome:
                 _ = any(self.put(space, kind) for kind in FALLBACKS)
 
     def check(self) -> None:
-        """Raise `HouseError` if a room is empty, or if too little or too much of the floor is covered by furniture."""
+        """Raise `HouseError` if a room is empty, or if furniture covers too little or too much floor."""
         share = sum(space.area for space in self.spaces) / self.plan.area
         if not LEAST <= share <= MOST:
             raise HouseError(f"{share:.0%} of the floor is furnished in seed {self.seed}")
@@ -224,22 +224,22 @@ class FurnishedHome:
 
 
 def furnish(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> Furnishing:
-    """Place furniture, decoration and bins in a plan. The result depends only on the arguments.
+    """Place furniture, decoration and bins in a floor plan. Equal arguments give equal results.
 
     Args:
-        plan: Rooms, doors and windows.
-        bins: Receptacles of the apartment's catalogue.
-        palette: The colours of the home.
+        plan: The floor plan, with rooms, doors and windows.
+        bins: Catalogue keys of the bins.
+        palette: Colours of the furniture.
         seed: Seed of the random streams. Each room and purpose has its own stream.
 
     Raises:
-        HouseError: A required piece does not fit. Another plan may work.
+        HouseError: A required piece does not fit into this floor plan.
     """
     return furnish_home(plan, bins, palette, seed).furnishing()
 
 
 def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: int) -> FurnishedHome:
-    """Furnish a home, and return it with its rooms' spaces. Raise `HouseError` if a required piece does not fit."""
+    """Furnish a home in several attempts. Raise `HouseError` if required furniture does not fit."""
     look = draw_appearance(palette, stream(seed, "look"))
     for attempt in range(ATTEMPTS):
         home = FurnishedHome(plan, bins, look, seed, attempt)
@@ -256,7 +256,7 @@ def furnish_home(plan: HomePlan, bins: Sequence[str], palette: Palette, seed: in
 
 
 def placed(room: str, piece: Piece, pose: PiecePose, look: Appearance) -> list[Placement]:
-    """Return the placements of a piece, or of all members of a group."""
+    """Return the placements of a piece of furniture, or of all members if it is a group."""
     found = []
     for member, x, y, yaw in flattened(piece, pose.x, pose.y, pose.yaw):
         turns = round(yaw / (math.pi / 2))

@@ -1,4 +1,4 @@
-"""Generation of homes from a seed: plan, doors, windows and furniture."""
+"""Generate the floor plan, doors, windows and furniture of a home from a seed."""
 
 from mjsim.generator.furnish import furnish
 from mjsim.generator.openings import add_openings
@@ -9,17 +9,17 @@ from mjsim.generator.values import Furnishing, HomePlan
 from mjsim.house.catalogue.generated_names import VERSION, stream
 from mjsim.values.errors import HouseError
 
-ATTEMPTS = 40  # maximum number of plans that are tried
+ATTEMPTS = 40  # maximum number of floor plans that are tried
 _BINS = ("dish_bin", "laundry_hamper")  # bins in every home
-# Further bins, of which a studio has only one.
+# Additional bins, from which each home gets a random selection.
 _MORE_BINS = ("bookshelf", "recycling_bin", "toy_box", "office_box")
 
 
 def generate(seed: int, rooms: int) -> tuple[Recipe, Furnishing]:
-    """Generate the house of a seed. Plans that cannot be furnished are discarded and replaced.
+    """Generate the house for a seed. Floor plans that cannot be furnished are discarded.
 
     Raises:
-        HouseError: No plan was found, or none of `ATTEMPTS` could be furnished.
+        HouseError: No floor plan was found, or none of the `ATTEMPTS` plans could be furnished.
     """
     reason = ""
     for attempt in range(ATTEMPTS):
@@ -35,7 +35,7 @@ def generate(seed: int, rooms: int) -> tuple[Recipe, Furnishing]:
 
 
 def furnish_plan(seed: int, plan: HomePlan) -> Furnishing:
-    """Furnish a plan. Raise `HouseError` if a required piece does not fit."""
+    """Furnish a floor plan. Raise `HouseError` if a required piece of furniture does not fit."""
     count = min(4, max(1, round(plan.area / 15) - 1))
     more = stream(seed, "bins").choice(_MORE_BINS, count, replace=False)
     return furnish(plan, (*_BINS, *sorted(str(key) for key in more)), draw_palette(seed), seed)

@@ -1,4 +1,4 @@
-"""Cache of generated homes, with one folder per home."""
+"""A disk cache of generated homes, with one folder per home."""
 
 import dataclasses
 import functools
@@ -19,14 +19,14 @@ from mjsim.values.errors import HouseError
 
 
 def load_catalogue(house: str = "apartment") -> Catalogue:
-    """Read and check the catalogue of a house, generating the house first if necessary.
+    """Load and validate the catalogue of a house. If necessary, generate the house first.
 
     Args:
-        house: Name of a folder under `models/houses`, path of a `catalogue.toml` or its folder, seed of a generated
-            house (`generated:7`, `generated:7?rooms=5`), or path of its recipe.
+        house: Name of a folder under `models/houses`, path of a `catalogue.toml` file or its folder, seed of
+            a generated house (`generated:7`, `generated:7?rooms=5`), or path of a recipe.
 
     Raises:
-        AssetError: The catalogue or a file it names is missing or invalid.
+        AssetError: The catalogue or a file to which it refers is missing or invalid.
         HouseError: The house cannot be generated.
 
     Example:
@@ -37,10 +37,12 @@ def load_catalogue(house: str = "apartment") -> Catalogue:
 
 
 def ensured(house: HouseRef, _depth: int = 0) -> HouseRef:
-    """Generate a home, or the home that a house extends, unless it is cached. Return the reference with its files.
+    """Generate a home unless it is cached. Return a reference that contains the path of its files.
+
+    If the house extends a generated home, that home is generated.
 
     Raises:
-        HouseError: The recipe is malformed or of another version, or the home cannot be generated or written.
+        HouseError: The recipe is invalid, or the home cannot be generated or written.
     """
     if house.kind in ("generated", "recipe"):
         return dataclasses.replace(house, file=_generated_catalogue(house, models_root()))
@@ -54,7 +56,7 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
     key = hashlib.sha256(identity + _digest(models).encode()).hexdigest()[:24]
     folder = cache_base() / "houses" / key
     if not (folder / CATALOGUE).is_file():
-        # Imported late, because OR-Tools loads slowly.
+        # Imported only when needed, because OR-Tools loads slowly.
         from mjsim.generator.generated import furnish_plan, generate
 
         if isinstance(made_of, Recipe):
@@ -66,7 +68,7 @@ def _generated_catalogue(house: HouseRef, models: Path) -> Path:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write all files atomically. If another process has already written the folder, keep that one."""
+    """Write a folder atomically. If another process has written it in the meantime, keep that version."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with work_folder(folder.parent) as work:
@@ -87,7 +89,7 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
 
 @functools.cache
 def _digest(models: Path) -> str:
-    """Hash everything except the name that determines a home: code, styles and library versions."""
+    """Return a hash of the code, styles and library versions that determine generated homes."""
     random_streams = Path(__file__).parents[1] / "house" / "catalogue" / "generated_names.py"
     style = [models / STYLE / name for name in ("defaults.xml", "materials.xml", CATALOGUE)]
     code = digest_of(Path(__file__).parent, random_streams, *style)

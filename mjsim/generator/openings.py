@@ -1,4 +1,4 @@
-"""Placement of doors, door leaves and windows in a plan."""
+"""Place doors, door leaves and windows in a floor plan."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -22,17 +22,17 @@ from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
 # Lengths are in metres.
-CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear widths of inner doors and of the front door
-WIDE_CLEAR = (1.4, 1.6, 1.8)  # possible clear widths of passages
-TOP, WIDE_TOP = 2.05, 2.2  # heights of doors and of passages
-JAMB = 0.12  # minimum length of wall between an opening and a corner
+CLEAR, CLEAR_FRONT = 0.92, 0.95  # clear width of inner doors and of the front door
+WIDE_CLEAR = (1.4, 1.6, 1.8)  # possible clear widths of open passages
+TOP, WIDE_TOP = 2.05, 2.2  # height of doors and of open passages
+JAMB = 0.12  # minimum distance between a door and a corner of the room
 LEAF_DEPTH = 0.06
 LEAST_GLASS = 1 / 10  # minimum ratio of window area to floor area in rooms that need daylight
 WINDOW_TOP = 2.2
-BESIDE_SHOWER = 1.85  # minimum length of a bathroom wall that has a window next to a shower
+BESIDE_SHOWER = 1.85  # minimum length of a wall with both a window and a shower
 NARROW_SILL, LOW_SILL, USUAL_SILL, KITCHEN_SILL = 1.4, 0.4, 0.95, 1.1
 SECOND_WAY, SECOND_WINDOW = 0.25, 0.45  # probabilities of an extra door and of a second window
-EXTRA_WAYS = (  # pairs of rooms that an extra door may connect, which creates a loop
+EXTRA_WAYS = (  # pairs of rooms between which an extra door may be added
     ("kitchen", "living_room"),
     ("dining_room", "living_room"),
     ("dining_room", "kitchen"),
@@ -45,7 +45,7 @@ EXTRA_WAYS = (  # pairs of rooms that an extra door may connect, which creates a
 
 
 def add_openings(seed: int, programme: Programme, rooms: Sequence[Room], attempt: int = 0) -> HomePlan:
-    """Add doors and windows to rooms. Raise `HouseError` if a required one does not fit."""
+    """Add doors and windows to rooms. Raise `HouseError` if a required door or window does not fit."""
     rng = stream(seed, "openings", str(attempt))
     ways = [*programme.ways, *_extra_ways(programme, rooms, rng)]
     by_key = {room.key: room for room in rooms}
@@ -62,7 +62,7 @@ def add_openings(seed: int, programme: Programme, rooms: Sequence[Room], attempt
 
 
 def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
-    """Return the side of `a` at the wall shared with `b`, and the wall's start and end. None if they share no wall."""
+    """Return the wall that two rooms share, as (side of `a`, start, end), or None if they share no wall."""
     for side in SIDES:
         across = a.floor.along(side, *a.floor.wall(side), -2 * WALL, 0.0)
         if b.floor.overlaps(across) and not b.floor.overlaps(a.floor):
@@ -73,9 +73,10 @@ def shared_wall(a: Room, b: Room) -> tuple[Side, float, float] | None:
 
 
 def wall_stretches(room: Room, side: Side, rooms: Sequence[Room]) -> list[tuple[float, float, bool]]:
-    """Divide a room's wall into stretches (start, end, is_outside), from corner to corner of the room's cell.
+    """Divide a wall of a room into inner and outer stretches (start, end, is_outside).
 
-    A cell is the room's floor together with the adjacent halves of its inner walls, so cells cover a home without gaps.
+    The stretches reach from corner to corner of the room's cell, which is the floor together with the
+    adjacent halves of its walls. The cells of all rooms cover a home without gaps.
     """
     start, end = (value + sign * WALL / 2 for value, sign in zip(room.floor.wall(side), (-1, 1), strict=True))
     cuts = []
@@ -107,7 +108,7 @@ def _extra_ways(programme: Programme, rooms: Sequence[Room], rng: np.random.Gene
 
 
 def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Generator) -> Door | None:
-    """Place a door so that it overlaps no other door and, if possible, is not close to one. None if it does not fit."""
+    """Place a door between two rooms, if possible away from other doors. Return None if it does not fit."""
     wall = shared_wall(a, b)
     if wall is None:
         return None
@@ -116,7 +117,7 @@ def _door(a: Room, b: Room, way: Way, doors: Sequence[Door], rng: np.random.Gene
     near, far = low + JAMB + width / 2, max(low, high) - JAMB - width / 2
     if far < near - 1e-6 or width < CLEAR - 1e-6:
         return None
-    # A door near a corner leaves more wall for furniture.
+    # Most doors are placed near a corner, which leaves more wall for furniture.
     ends = [near, far] if rng.random() < 0.5 else [far, near]
     between = list(near + max(0.0, far - near) * rng.random(6))
     places = [*ends, *between] if rng.random() < 0.7 else [*between, *ends]
@@ -183,7 +184,7 @@ def _windows(plan: HomePlan, room: Room, rng: np.random.Generator) -> list[Windo
             if width < 0.55 or (not needs_light and free_high - free_low < BESIDE_SHOWER):
                 continue
             if not needs_light:
-                shift = round(shift)  # at one end, so that a shower fits into the other corner
+                shift = round(shift)  # at one end of the wall, so that a shower fits at the other end
             at = free_low + 0.2 + width / 2 + shift * (room_for - width)
             windows.append(Window(room.key, side, round(at, 3), round(width, 3), sill, WINDOW_TOP))
             break

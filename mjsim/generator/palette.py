@@ -1,4 +1,4 @@
-"""Colours of a home's furniture, and of the walls and floor of each room."""
+"""Choose the colours of furniture, walls and floors in a home at random."""
 
 import colorsys
 from collections.abc import Iterator, Mapping
@@ -9,7 +9,7 @@ from mjsim.generator.values import HomePlan, Palette, Rgb, Room
 from mjsim.house.catalogue.generated_names import stream
 
 WET = ("bathroom", "shower_room", "utility")
-_WOODS: tuple[tuple[Rgb, ...], ...] = (  # each row is the palette of one home
+_WOODS: tuple[tuple[Rgb, ...], ...] = (  # each row contains the wood colours of one home
     ((0.80, 0.58, 0.36), (0.93, 0.80, 0.60), (0.66, 0.46, 0.28)),
     ((0.50, 0.33, 0.22), (0.80, 0.58, 0.36), (0.38, 0.25, 0.17)),
     ((0.93, 0.80, 0.60), (0.93, 0.92, 0.89), (0.80, 0.58, 0.36)),
@@ -24,9 +24,9 @@ _PLANKS: tuple[Rgb, ...] = (
     (0.72, 0.66, 0.60),
     (0.76, 0.56, 0.38),
 )
-# Mean colours of wallpaper textures.
+# Average colours of the wallpaper textures.
 _GROUNDS: Mapping[str, Rgb] = {"damask": (0.95, 0.95, 0.95), "polka_dots": (0.98, 0.9, 0.72)}
-_HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # hues of walls and fabrics
+_HUES = (0.02, 0.08, 0.11, 0.14, 0.25, 0.38, 0.48, 0.55, 0.60, 0.66, 0.92)  # hues for walls and fabrics
 
 
 def draw_palette(seed: int) -> Palette:
@@ -52,7 +52,7 @@ def draw_palette(seed: int) -> Palette:
 
 
 def surfaces(seed: int, plan: HomePlan) -> list[str]:
-    """Return MJCF materials for the facade, the front door, and the walls and floor of each room."""
+    """Return MJCF materials for the facade, the front door, and all walls and floors."""
     rng = stream(seed, "surfaces")
     hue, planks = _hue(rng), str(rng.choice(["oak_planks", "pine_planks"]))
     tone = _PLANKS[int(rng.integers(len(_PLANKS)))]
@@ -69,7 +69,7 @@ def surfaces(seed: int, plan: HomePlan) -> list[str]:
 
 
 def rgba(colour: Rgb) -> str:
-    """Format a colour for MJCF."""
+    """Format an opaque colour for MJCF."""
     return " ".join(f"{value:.3f}" for value in colour) + " 1"
 
 

@@ -1,7 +1,8 @@
-"""Floor plans computed by a constraint solver: rectangular rooms that fill a rectangular or L-shaped outline.
+"""Compute floor plans of rectangular rooms with a constraint solver.
 
-The solver has no objective: any layout close to the target areas is accepted. Variety comes from the programme. Solving
-time is counted in deterministic units, with one worker and a fixed seed, so that each process finds the same layout.
+The rooms fill a rectangular or L-shaped outline. The solver has no objective, so it accepts any layout close
+to the target areas, and variety comes from the programme. It uses one worker, a fixed seed and a
+deterministic time limit, so that every process finds the same layout.
 """
 
 import math
@@ -17,12 +18,12 @@ from mjsim.generator.values import WALL, Rectangle, Room
 from mjsim.house.catalogue.generated_names import stream
 from mjsim.values.errors import HouseError
 
-GRID = 0.2  # cell size in metres
-TRIES = 500  # maximum number of programmes that are tried
-EFFORT = 0.025  # solver time per programme, in deterministic seconds
+GRID = 0.2  # cell size of the floor plan grid, in metres
+TRIES = 500  # maximum number of room programmes that are tried
+EFFORT = 0.025  # time limit of the solver per programme, in deterministic seconds
 SLACK, LARGE_SLACK = 0.25, 0.45  # relative tolerance of room areas in small and in large homes
-LARGE = 9  # minimum number of rooms of a large home
-VOID = 1.2  # minimum side of the corner cut out of an L-shaped outline, in metres
+LARGE = 9  # minimum number of rooms in a large home
+VOID = 1.2  # minimum side length of the cut-out corner in an L-shaped outline, in metres
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class _Box:
 
 
 def draw_rooms(seed: int, rooms: int, attempt: int = 0) -> tuple[Programme, tuple[Room, ...]]:
-    """Draw a programme from a seed, and lay out its rooms. Each value of `attempt` gives a different layout.
+    """Draw room requirements from a seed, and find a floor plan. Each `attempt` gives a different plan.
 
     Raises:
         HouseError: No layout was found, or the number of rooms is out of range.
@@ -110,7 +111,7 @@ def _add_room(
     w, h = box.size
     gross = model.new_int_var(0, outline[0] * outline[1], "")
     model.add_multiplication_equality(gross, (w, h))
-    # Floor area between the walls, in hundredths of a cell.
+    # Floor area between the walls, in hundredths of a grid cell.
     floor = 100 * gross - round(100 * WALL / GRID) * (w + h) + round(100 * (WALL / GRID) ** 2)
     cell = 100 / GRID**2
     model.add(floor >= math.ceil(cell * max(needs.area[0], area[0])))

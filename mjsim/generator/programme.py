@@ -1,4 +1,4 @@
-"""Programme of a home: its rooms, their target areas, and the doors between them."""
+"""Choose the rooms of a home at random, with their target areas and the doors between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from mjsim.values.errors import HouseError
 
 @dataclass(frozen=True)
 class RoomNeeds:
-    """Requirements of a room type. The sources are listed in docs/generated-houses.md."""
+    """Requirements for a room type. Their sources are listed in docs/generated-houses.md."""
 
     label: str
-    area: tuple[float, float]  # minimum and maximum area, in square metres
+    area: tuple[float, float]  # minimum and maximum floor area, in square metres
     side: float  # minimum length of the shorter side, in metres
     aspect: float  # maximum ratio of the longer to the shorter side
     daylight: bool  # True if the room needs an outer wall with a window
@@ -58,7 +58,7 @@ _SMALL: Mapping[int, Sequence[tuple[str, ...]]] = {
     ),
 }
 _CORE = ("hall", "living_room", "kitchen", "bedroom", "bathroom")
-# Additional rooms of larger homes, with their relative probabilities.
+# Additional rooms in larger homes, with their relative probabilities.
 _MORE = {
     "bedroom_2": 3.0,
     "office": 2.0,
@@ -68,8 +68,8 @@ _MORE = {
     "utility": 1.2,
 }
 _LIVELY = ("living_room", "studio", "hall")
-HALL_PER_DOOR = (1.2, 1.9)  # minimum and maximum floor area of a hall per door, in square metres
-DOOR, WIDE = 1.3, 2.0  # minimum length of a shared wall with a door and with an open passage, in metres
+HALL_PER_DOOR = (1.2, 1.9)  # range of a hall's floor area per door, in square metres
+DOOR, WIDE = 1.3, 2.0  # minimum length of a wall with a door, and of a wall with a passage, in metres
 
 
 @dataclass(frozen=True)
@@ -82,30 +82,30 @@ class Way:
 
     @property
     def wall(self) -> float:
-        """Minimum length of the shared wall, in metres."""
+        """The minimum length of the wall that the two rooms share, in metres."""
         return WIDE if self.is_wide else DOOR
 
 
 @dataclass(frozen=True)
 class Programme:
-    """Requirements of a floor plan."""
+    """Requirements that a floor plan has to meet."""
 
-    areas: Mapping[str, float]  # target area of each room in square metres, by room key
+    areas: Mapping[str, float]  # target floor area of each room in square metres, by room key
     ways: tuple[Way, ...]  # doors and passages that connect all rooms
-    hub: str  # the room with the front door
+    hub: str  # key of the room with the front door
 
 
 def use_of(key: str) -> str:
-    """Return the use of a room, which is its key without the number."""
+    """Return the use of a room, which is the room key without its number."""
     return key.rstrip("0123456789").rstrip("_")
 
 
 def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
-    """Draw rooms, their areas, and doors between them. Raise `HouseError` if the number of rooms is out of range."""
+    """Choose rooms, areas and doors at random. Raise `HouseError` if the number of rooms is out of range."""
     if not ROOMS[0] <= rooms <= ROOMS[1]:
         raise HouseError(f"a home of {rooms} rooms cannot be generated; ask for {ROOMS[0]} to {ROOMS[1]}")
     keys = _keys(rooms, rng)
-    # Large rooms tend to occur in the same home, and so do small ones.
+    # The rooms of a home tend to be either all large or all small.
     size = rng.uniform(0.1, 0.7) if rooms < 9 else rng.uniform(0.1, 0.4)
     areas = {}
     for key in keys:
@@ -113,7 +113,7 @@ def draw_programme(rooms: int, rng: np.random.Generator) -> Programme:
         areas[key] = low + (high - low) * float(np.clip(rng.normal(size, 0.15), 0.03, 0.97))
     hub = next(key for key in ("hall", *_LIVELY) if key in keys)
     ways = _ways(keys, hub, rng)
-    if hub == "hall":  # the size of a hall depends on its number of doors
+    if hub == "hall":  # the area of a hall depends on its number of doors
         doors = sum("hall" in (way.a, way.b) for way in ways)
         areas[hub] = float(np.clip(rng.uniform(*HALL_PER_DOOR) * doors, *NEEDS[hub].area))
     return Programme(areas, tuple(ways), hub)

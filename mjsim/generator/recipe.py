@@ -1,4 +1,4 @@
-"""Recipe of a generated house: seed, floor plan and generator version."""
+"""Recipe files, which store a generated house by its seed, floor plan and generator version."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ RECIPE = "recipe.json"
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stored house. It includes the floor plan, since another version of the solver may find a different one."""
+    """A generated house with its floor plan, which other versions of the solver might not find again."""
 
     version: int
     seed: int
@@ -21,16 +21,16 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """Name of the house in recorded data."""
+        """The name of the house in recorded data."""
         return str(GeneratedName(self.seed, len(self.plan.rooms)))
 
     def encoded(self) -> bytes:
-        """Return the recipe as JSON. Equal recipes give the same bytes."""
+        """Serialize the recipe as JSON. Equal recipes give the same bytes."""
         return msgspec.json.format(msgspec.json.encode(self), indent=1) + b"\n"
 
 
 def read_recipe(path: Path) -> Recipe:
-    """Read a recipe. Raise `HouseError` if it is invalid or belongs to another generator version."""
+    """Read a recipe file. Raise `HouseError` if it is invalid or belongs to another generator version."""
     try:
         text = read_bytes(path)
         version = msgspec.json.decode(text, type=dict).get("version")
@@ -42,7 +42,7 @@ def read_recipe(path: Path) -> Recipe:
 
 
 def floor_plan_of(model: Path) -> HomePlan:
-    """Read a house's plan from the recipe next to its MJCF file. Raise `HouseError` if there is no recipe."""
+    """Read a floor plan from the recipe next to an MJCF file. Raise `HouseError` if there is no recipe."""
     path = model.parent / RECIPE
     if not path.is_file():
         raise HouseError(f"{model} has no {RECIPE} next to it; only generated houses ({PREFIX}7) have one")

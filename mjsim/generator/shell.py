@@ -1,6 +1,7 @@
-"""MJCF of the floors, walls, ceilings, doors and windows of a plan, based on the apartment's default classes.
+"""Convert a floor plan to MJCF elements of the floors, walls, ceilings, doors and windows.
 
-Each room has its own half of a shared wall, in its own colour. Outer walls are outside the rooms.
+The elements use the default classes of the apartment. A wall between two rooms consists of two halves, each
+in the colour of its room. Outer walls are outside the rooms.
 """
 
 import math
@@ -37,7 +38,7 @@ class _Hole:
 
 
 def shell(plan: HomePlan) -> Iterator[str]:
-    """Yield MJCF elements of the world body: a body and a site for each room, and panels with the view outside."""
+    """Yield the MJCF elements of all rooms, and panels that show the view outside."""
     for room in plan.rooms:
         cell = room.floor.grown(HALF)
         (x, y), w, d = cell.center, cell.width / 2, cell.depth / 2
@@ -88,10 +89,10 @@ class _RoomShell:
                 yield _Hole(w.center - w.width / 2, w.center + w.width / 2, w.sill, w.top)
 
     def _bands(self, holes: list[_Hole]) -> Iterator[tuple[tuple[float, float], str]]:
-        """Return the height range and material of each band of the walls.
+        """Yield the height range and the material of each horizontal band of a wall.
 
-        A texture starts in the middle of each box. To hide seams, tiles end below windows, and wallpaper is used only
-        on walls without openings.
+        Textures are centred on each box, so they have seams around openings. To hide the seams, tiles end
+        below windows, and wallpaper is used only on walls without openings.
         """
         paper = f"wall_{self._room.key}"
         if self._room.use in WET:
@@ -101,7 +102,7 @@ class _RoomShell:
             yield (0.0, CEILING_HEIGHT), f"{paper}_plain" if holes else paper
 
     def _extension(self, side: Side, end: float, sign: int) -> float:
-        """Return how far an outer wall extends to close a corner of the house, in metres. 0 if it does not."""
+        """Return the length by which an outer wall extends to close a corner of the house, in metres."""
         edge = {"south": "y0", "north": "y1", "west": "x0", "east": "x1"}[side]
         across = getattr(self._room.floor.grown(HALF), edge)
         points = [(end + sign * 0.05, across + beyond) for beyond in (-0.05, 0.05)]
@@ -114,7 +115,7 @@ class _RoomShell:
         self, side: Side, along: tuple[float, float], up: tuple[float, float], out: tuple[float, float],
         material: str, kind: str = "wall",
     ) -> str:  # fmt: skip
-        """Return a box along a wall. It extends from `out[0]` to `out[1]` outwards from the wall's inner face."""
+        """Return a box along a wall, at depths from `out[0]` to `out[1]` behind the wall's inner face."""
         box = self._room.floor.along(side, *along, -out[1], -out[0])
         (x, y), z = box.center, sum(up) / 2
         length, depth = (box.width, box.depth) if _NORMAL[side] == "y" else (box.depth, box.width)
@@ -172,7 +173,7 @@ class _RoomShell:
             bars.append(((window.center - 0.025, window.center + 0.025), (sill, top)))
         for along, up in bars:
             yield self._slab(side, along, up, (0.08, 0.15), "frame", "trim")
-        # The sill ends slightly above the wall below it, so that they do not flicker.
+        # The sill ends slightly above the wall below, so that the two surfaces do not flicker.
         board = (left - 0.03, right + 0.03), (sill - 0.03, sill + 0.004)
         yield self._slab(side, *board, (-0.04, 0.15), "frame", "trim")
 

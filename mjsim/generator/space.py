@@ -1,4 +1,4 @@
-"""Search for furniture poses in a room that keep doors, windows and walkways clear."""
+"""Find furniture poses in a room that keep doors, windows and walkways clear."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,39 +13,39 @@ from mjsim.generator.furniture.piece import Piece, Spot, moved
 from mjsim.generator.values import BACK, SIDES, HomePlan, Room, Side
 
 # Lengths are in metres.
-BODY = 0.36  # body radius for which walkways must be wide enough
-# Body radii of people, including the planner's clearance. Each body must reach all floor on which it fits.
+BODY = 0.36  # body radius that must fit through all walkways
+# Body radii with clearance. A body must be able to reach all parts of the floor on which it fits.
 PERSON_RADII = (0.25, 0.265, 0.28, 0.29, 0.3)
-POCKET = 0.005  # maximum area of unreachable floor that is ignored, in square metres
-STEP = 0.1  # distance between the poses tried along a wall
-BESIDE = 0.6  # width of the floor next to a door that bins avoid if possible
-DOORWAY = 1.0  # depth of the free floor in front of a door
-SNUG, APART = 0.09, 0.62  # gaps between these two widths are avoided, because people would get stuck
+POCKET = 0.005  # maximum area of unreachable floor that is tolerated, in square metres
+STEP = 0.1  # distance between poses that are tried along a wall
+BESIDE = 0.6  # width of the floor next to a door that bins should avoid
+DOORWAY = 1.0  # maximum depth of the free floor in front of a door
+SNUG, APART = 0.09, 0.62  # range of gap widths that are avoided, because people would get stuck
 BEFORE_LEAF = 0.45  # depth of the free floor in front of an open door leaf
-WALL_GAP = 0.01  # gap between furniture and the wall behind it
-BEFORE_WINDOW = 0.6  # depth of the zone in front of a window in which no furniture is higher than the sill
+WALL_GAP = 0.01  # gap between a piece of furniture and the wall behind it
+BEFORE_WINDOW = 0.6  # depth of the zone in front of a window where furniture is lower than the sill
 CURTAIN = 0.3  # extra width of that zone on each side of a window with curtains
-# Extra width on each side of a window with a blind, because leaves extend beyond a plant's obstacle.
+# Extra width of that zone on each side of a window with a blind, because leaves of plants may overhang.
 LEAVES = 0.1
-BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # room uses with blinds instead of curtains
+BLINDS = ("kitchen", "bathroom", "shower_room", "utility")  # room uses with blinds
 AROUND = 0.76  # width of the free floor around a free-standing piece
-NEAR = BODY + 0.15  # maximum distance from the centre of a person's body to a piece that the person uses
+NEAR = BODY + 0.15  # maximum distance between a person's centre and a piece that the person uses
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
-TRIES = 14  # number of poses of a piece for which walkways are checked
-_CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids for walkways and for unreachable floor
+TRIES = 14  # maximum number of poses per piece for which walkways are checked
+_CELL, _FINE = 0.05, 0.0125  # cell sizes of the grids that detect blocked walkways and unreachable floor
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PiecePose:
-    """Pose of a piece in the house."""
+    """The pose of a piece of furniture in the house."""
 
     x: float  # x coordinate of the piece's origin, in metres
     y: float
     turns: int  # number of counter-clockwise quarter turns
     side: Side | None  # wall behind the piece, or None
-    along: float = 0.0  # position of the piece's middle along this wall, in metres
+    along: float = 0.0  # position of the piece's centre along this wall, in metres
 
     @property
     def yaw(self) -> float:
@@ -54,30 +54,30 @@ class PiecePose:
 
 @dataclass
 class Space:
-    """A room with the pieces placed so far.
+    """A room with the furniture that has been placed so far.
 
-    Rectangles are x0, y0, x1, y1 in metres. Those in `solids` and `windows` are followed by a height in metres.
+    Rectangles are (x0, y0, x1, y1) in metres, followed by a height in `solids` and `windows`.
     """
 
     room: Room
     rng: np.random.Generator
     solids: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    # Obstacles that people bump into, without overhanging leaves.
+    # Obstacles that people can bump into, without overhanging parts.
     hit: list[Spot] = field(default_factory=list)
     keep: list[Spot] = field(default_factory=list)  # floor that must stay free
     use: list[Spot] = field(default_factory=list)  # floor that must stay free and reachable
     near: list[Spot] = field(default_factory=list)  # obstacles that people must be able to approach
-    corners: list[Spot] = field(default_factory=list)  # floor next to doors, which bins avoid if possible
+    corners: list[Spot] = field(default_factory=list)  # floor next to doors, which bins should avoid
     doors: list[tuple[float, float]] = field(default_factory=list)  # a point in front of each door
     windows: list[tuple[float, float, float, float, float]] = field(default_factory=list)
-    # Wall decoration: side, start, end and bottom.
+    # Occupied parts of the walls as (side, start, end, bottom).
     hung: list[tuple[Side, float, float, float]] = field(default_factory=list)
     stood: list[tuple[Piece, PiecePose]] = field(default_factory=list)
     area: float = 0.0  # floor area covered by furniture, in square metres
 
     @classmethod
     def of(cls, plan: HomePlan, room: Room, rng: np.random.Generator) -> "Space":
-        """Return a room without furniture."""
+        """Create the space for a room that contains no furniture yet."""
         space, floor = cls(room, rng), room.floor
         for door in plan.doors_of(room.key):
             side, half = door.side_in(room.key), door.width / 2
@@ -109,13 +109,13 @@ class Space:
         return self.area / self.room.floor.area
 
     def depth(self, side: Side) -> float:
-        """Distance in metres between a wall and the opposite wall."""
+        """Return the distance between a wall and the opposite wall, in metres."""
         return self.room.floor.depth if side in ("south", "north") else self.room.floor.width
 
     def put(
         self, piece: Piece, sides: Sequence[Side] = SIDES, avoid: Sequence[Spot] = ()
     ) -> PiecePose | None:
-        """Place a piece at the best pose along some walls, outside `avoid`. Return it, or None if nothing fits."""
+        """Place a piece at its best pose along the given walls. Return the pose, or None if none fits."""
         free = piece.stands == "free"
         places = self._free_poses() if free else self._wall_poses(piece, sides)
         if not len(places):
@@ -148,7 +148,7 @@ class Space:
         zones: Iterable[Spot],
         hit: Iterable[Spot],
     ) -> None:
-        """Record a piece that has been placed."""
+        """Record a piece of furniture at its final pose."""
         for spot, low, part in zip(spots, hit, piece.parts, strict=True):
             self.solids.append((*spot, part.top))
             self.hit.append(low)
@@ -157,7 +157,7 @@ class Space:
         self.stood.append((piece, place))
 
     def _wall_poses(self, piece: Piece, sides: Sequence[Side]) -> Floats:
-        """Return all poses along walls, shape (n, 4): x, y, quarter turns, and position along the wall, in metres."""
+        """Return all poses along the walls, in rows of x, y, quarter turns, and position along the wall."""
         floor, half = self.room.floor, piece.size[0] / 2
         found = [np.empty((0, 4))]
         for side in sides:
@@ -178,14 +178,14 @@ class Space:
         return np.concatenate(found)
 
     def _free_poses(self) -> Floats:
-        """Return poses on a grid in two orientations, in the format of `_wall_poses`."""
+        """Return poses on a grid in two orientations, in the same format as `_wall_poses`."""
         floor = self.room.floor
         xs, ys = np.arange(floor.x0, floor.x1, 2 * STEP), np.arange(floor.y0, floor.y1, 2 * STEP)
         grid = np.stack(np.meshgrid(xs, ys, (0.0, 1.0), (0.0,), indexing="ij"), axis=-1)
         return grid.reshape(-1, 4)
 
     def _fits(self, boxes: Floats, tops: Floats, uses: Floats, free: bool) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the free poses. `boxes` (n, k, 4) are parts, and `uses` (n, u, 4) is floor for use."""
+        """Return a mask (n,) of the poses at which neither `boxes` nor `uses` overlap anything."""
         floor = self.room.floor
         slack = AROUND if free else -1e-6
         low, high = np.array([floor.x0, floor.y0]) + slack, np.array([floor.x1, floor.y1]) - slack
@@ -218,18 +218,18 @@ class Space:
         return np.asarray(score)
 
     def connected(self, spots: Iterable[Spot], zones: Iterable[Spot] = (), near: Iterable[Spot] = ()) -> bool:
-        """Return True if a person can get from every door to all pieces and to all free floor.
+        """Return True if a person can reach all pieces and all free floor from every door.
 
         Args:
             spots: Obstacles of an additional piece.
-            zones: Floor needed to use that piece.
-            near: Obstacles of that piece that a person must be able to approach.
+            zones: Floor that is needed to use the additional piece.
+            near: Obstacles of the additional piece that a person must be able to approach.
         """
         floor, spots = self.room.floor, [*self.hit, *spots]
         _, islands, *_ = _islands(self._distance(spots, _CELL), BODY)
         targets: list[tuple[Spot, ...]] = [((x - 0.25, y - 0.25, x + 0.25, y + 0.25),) for x, y in self.doors]
         targets += [(zone,) for zone in (*self.use, *zones)]
-        # Grow rectangles along one axis at a time. Growing along both would include corners farther away than NEAR.
+        # Extend rectangles along one axis at a time, because their corners would otherwise be too far away.
         targets += [(_grown(spot, NEAR, 0), _grown(spot, 0, NEAR)) for spot in (*self.near, *near)]
         common: set[int] | None = None
         for boxes in targets:

@@ -1,8 +1,9 @@
-"""Values exchanged by the parts of the generator. All lengths are in metres.
+"""Data types that are shared by the modules of the house generator. All lengths are in metres.
 
-The plan lies in x (east) and y (north). A `Room` is the free floor between its walls, and neighbouring rooms are `WALL`
-apart. Furniture is written in its own frame: the origin on the floor in the middle of the back edge, +x along the wall,
-+y into the room, +z up. Counter-clockwise `quarter_turns` turn that frame into the house's (see `BACK`).
+In floor plans, x points east and y points north. A `Room` is the free floor between its walls, and
+neighbouring rooms are `WALL` apart. Each piece of furniture has its own frame. The origin is on the floor in
+the middle of the back edge, +x points along the wall, +y into the room, and +z up. The frame is rotated
+counter-clockwise by a number of `quarter_turns` (see `BACK`).
 """
 
 from collections.abc import Mapping
@@ -10,12 +11,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 WALL = 0.12
-OUTER_WALL = 0.21  # distance from the edge of the floor to the outside of an outer wall
+OUTER_WALL = 0.21  # distance from the floor's edge to the outer face of an outer wall
 CEILING_HEIGHT = 2.6
 
 Side = Literal["south", "east", "north", "west"]
 SIDES: tuple[Side, ...] = ("south", "east", "north", "west")
-# Number of quarter turns of a piece whose back is to the wall.
+# Number of quarter turns of a piece whose back faces the given wall.
 BACK: Mapping[Side, int] = {"south": 0, "east": 1, "north": 2, "west": 3}
 Rgb = tuple[float, float, float]
 
@@ -46,11 +47,11 @@ class Rectangle:
         return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
 
     def grown(self, by: float) -> "Rectangle":
-        """Return the rectangle with every side moved outwards by a distance, or inwards if it is negative."""
+        """Return the rectangle with all sides moved outwards by a distance, which may be negative."""
         return Rectangle(self.x0 - by, self.y0 - by, self.x1 + by, self.y1 + by)
 
     def overlaps(self, other: "Rectangle", slack: float = 1e-6) -> bool:
-        """Return True if the rectangles share an area, not just an edge."""
+        """Return True if the rectangles overlap. Sharing an edge does not count."""
         return (
             self.x0 < other.x1 - slack
             and other.x0 < self.x1 - slack
@@ -59,15 +60,15 @@ class Rectangle:
         )
 
     def contains(self, x: float, y: float) -> bool:
-        """Return True if a point is inside or on the border."""
+        """Return True if a point is inside the rectangle or on its border."""
         return self.x0 <= x <= self.x1 and self.y0 <= y <= self.y1
 
     def wall(self, side: Side) -> tuple[float, float]:
-        """Return the start and end of the wall on a side. They are x coordinates for south and north, otherwise y."""
+        """Return the start and end coordinates of a wall, in x for south and north walls, otherwise in y."""
         return (self.x0, self.x1) if side in ("south", "north") else (self.y0, self.y1)
 
     def along(self, side: Side, start: float, end: float, near: float, far: float) -> "Rectangle":
-        """Return the rectangle from `start` to `end` along a wall, and from `near` to `far` away from it."""
+        """Return the rectangle between two positions along a wall and between two distances from it."""
         if side == "south":
             return Rectangle(start, self.y0 + near, end, self.y0 + far)
         if side == "north":
@@ -81,19 +82,20 @@ class Rectangle:
 class Room:
     """A room with a rectangular floor.
 
-    Keys are `hall`, `living_room`, `kitchen`, `dining_room`, `bedroom`, `bedroom_2`, `bedroom_3`, `bathroom`,
-    `shower_room`, `office`, `utility` and `studio`. Uses are the keys without numbers.
+    The possible keys are `hall`, `living_room`, `kitchen`, `dining_room`, `bedroom`, `bedroom_2`,
+    `bedroom_3`, `bathroom`, `shower_room`, `office`, `utility` and `studio`. The use of a room is its key
+    without the number.
     """
 
     key: str
     use: str
-    label: str  # name shown to participants
+    label: str  # name that is shown to participants
     floor: Rectangle
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """An open door leaf, flat against a wall of `room`. Furniture must not cover `floor`."""
+    """An open door leaf that rests against a wall of `room`. Furniture must not cover `floor`."""
 
     room: str
     side: Side
@@ -102,10 +104,10 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Door:
-    """A doorway between two rooms, or the closed front door, which belongs to one room.
+    """A doorway between two rooms, or the closed front door of the home.
 
-    The door is in the wall `side` of the first room. Its `center` is an x coordinate for south and north walls,
-    otherwise a y coordinate.
+    The front door belongs to one room only. A door is in the wall `side` of its first room. Its `center` is
+    an x coordinate for south and north walls, otherwise a y coordinate.
     """
 
     rooms: tuple[str, ...]
@@ -125,7 +127,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Window:
-    """A window in an outer wall. Furniture in front of it is lower than the sill. For `center`, see `Door`."""
+    """A window in an outer wall. Furniture in front of a window is lower than its sill."""
 
     room: str
     side: Side
@@ -137,7 +139,7 @@ class Window:
 
 @dataclass(frozen=True)
 class HomePlan:
-    """Rooms with their doors and windows."""
+    """The floor plan of a home, with rooms, doors and windows."""
 
     rooms: tuple[Room, ...]
     doors: tuple[Door, ...]
@@ -160,14 +162,14 @@ class HomePlan:
 
 @dataclass(frozen=True)
 class Asset:
-    """A material or texture of a piece of furniture.
+    """A MuJoCo material or texture that furniture uses.
 
-    Materials of `models/houses/apartment/materials.xml` need no asset. Assets of the same name must be equal,
-    so names should begin with the furniture type, as in `rug_stripes_3f2a`.
+    Materials in `models/houses/apartment/materials.xml` need no asset. Assets with the same name must be
+    equal, so names should begin with the furniture type, as in `rug_stripes_3f2a`.
 
     Attributes:
-        xml: One `<material .../>` or `<texture .../>`. A texture names a file of the package, or has an `image`.
-        image: PNG bytes of a texture that is drawn for this house, written as `textures/<name>.png`.
+        xml: A `<material .../>` or `<texture .../>` element. A texture names a packaged file or has an image.
+        image: PNG bytes of a texture for this house only. They are written to `textures/<name>.png`.
     """
 
     name: str
@@ -177,9 +179,9 @@ class Asset:
 
 @dataclass(frozen=True)
 class Palette:
-    """Colours of a house, chosen once so that its furniture matches."""
+    """The colours of a home's furniture, which match each other."""
 
-    woods: tuple[Rgb, ...]  # wood colours, the main one first
+    woods: tuple[Rgb, ...]  # wood colours, starting with the main colour
     fronts: tuple[Rgb, ...]  # colours of painted doors and drawers
     fabrics: tuple[Rgb, ...]  # colours of upholstery, bedding and curtains
     accents: tuple[Rgb, ...]  # colours of small bright objects
@@ -188,35 +190,35 @@ class Palette:
 
 @dataclass(frozen=True)
 class Placement:
-    """A piece of furniture placed in a room. Its geoms are MJCF in the piece's own frame."""
+    """A piece of furniture in a room, with its MJCF geoms in the frame of the piece."""
 
-    name: str  # type of furniture, such as "sofa"; bodies are named by room, type and number
+    name: str  # type of furniture, such as "sofa"
     room: str
     geoms: str
     position: tuple[float, float, float]
     quarter_turns: int
-    footprint: Rectangle | None  # rectangle in the house's frame, or None for pieces that hang or lie flat
+    footprint: Rectangle | None  # covered floor, or None for pieces that hang or lie flat
     assets: tuple[Asset, ...] = ()
-    turn: float = 0.0  # additional yaw in radians, such as that of a chair next to a desk
+    turn: float = 0.0  # additional yaw in radians, for example of a chair at a desk
 
 
 @dataclass(frozen=True)
 class BinPlacement:
-    """Pose of a bin. Its origin is in the middle of its base, and people use it from its local -y side.
+    """The pose of a bin in a room. The origin is the centre of its base, and its front faces along -y.
 
-    The bin is rotated by `quarter_turns` + 2, so that its back is to the south wall at 0, as for furniture.
+    The bin is rotated by `quarter_turns` + 2, so that its back faces the south wall at 0 quarter turns.
     """
 
     receptacle: str  # catalogue key of the receptacle
     room: str
-    place: str  # description shown to participants, such as "on the counter, beside the sink"
+    place: str  # description that is shown to participants, such as "on the desk"
     position: tuple[float, float, float]
     quarter_turns: int
 
 
 @dataclass(frozen=True)
 class Furnishing:
-    """All furniture and bins in a plan."""
+    """All furniture and bins in a home."""
 
     placements: tuple[Placement, ...]
     mounts: tuple[BinPlacement, ...]

@@ -1,1 +1,1 @@
-"""Houses: catalogues, compiled models, episode scenes, visibility and validation."""
+"""Load, compile and validate houses, and build the scenes of episodes."""

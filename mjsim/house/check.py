@@ -1,4 +1,4 @@
-"""Checks behind the command `mjsim check`, for a house, a receptacle, an object or an episode."""
+"""The checks that the `mjsim check` command runs on houses, receptacles, objects and episodes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -25,13 +25,13 @@ from mjsim.values.errors import AssetError, EpisodeError, PhysicsError, Sampling
 
 @dataclass(frozen=True, eq=False)
 class CheckReport:
-    """Report on a checked house, receptacle, object or episode."""
+    """The result of checking a house, a receptacle, an object or an episode."""
 
-    kind: str  # `house`, `receptacle`, `object` or `episode`
-    path: str  # the checked name or path
-    findings: tuple[Finding, ...]  # errors before warnings
-    facts: Mapping[str, str] = field(default_factory=dict)  # further information: name -> text
-    views: tuple[Drawing, ...] = ()  # drawings for the report's picture, or none if nothing compiled
+    kind: str  # what was checked: `house`, `receptacle`, `object` or `episode`
+    path: str  # name or path that was checked
+    findings: tuple[Finding, ...]  # problems that were found, errors first
+    facts: Mapping[str, str] = field(default_factory=dict)  # other facts to show in the report: name -> text
+    views: tuple[Drawing, ...] = ()  # drawings of the model, or empty if it does not compile
 
     def __post_init__(self) -> None:
         ordered = sorted(self.findings, key=lambda f: f.severity != "error")
@@ -46,12 +46,12 @@ Load = Callable[[str], Catalogue]
 
 
 def check_path(name: str, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
-    """Check a house (by name, catalogue or folder), an MJCF file, or an episode.
+    """Check a house, an MJCF file or an episode. A house may be given by its name, folder or catalogue.
 
     Args:
         name: Name or path to check.
-        house: Name of a house to check an episode against, instead of the episode's own house.
-        load: Loader of houses. `mjsim.load_catalogue` also generates them.
+        house: Name of the house to check an episode against. The default is the episode's own house.
+        load: Function that loads a house by its name. `mjsim.load_catalogue` also supports generated houses.
     """
     path = Path(name)
     if path.suffix == ".json":
@@ -64,7 +64,7 @@ def check_path(name: str, house: str | None = None, load: Load = Catalogue.load)
 
 
 def check_house_name(name: str, load: Load = Catalogue.load) -> CheckReport:
-    """Check a house with its receptacles and objects, and try to sample episodes in it."""
+    """Check a house with its receptacles and objects, and check that an episode can be sampled in it."""
     try:
         catalogue = load(name)
     except AssetError as error:
@@ -118,7 +118,7 @@ def _check_sampling(house: CompiledHouse) -> tuple[int, list[Finding]]:
 
 
 def check_episode_file(path: Path, house: str | None = None, load: Load = Catalogue.load) -> CheckReport:
-    """Check an episode against its own house, or against the house `house`."""
+    """Check whether an episode is valid in its own house, or in the house with the name `house`."""
     try:
         episode = Episode.load(path)
     except EpisodeError as error:

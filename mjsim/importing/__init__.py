@@ -1,6 +1,6 @@
-"""Importers for objects in mesh files, houses from other simulators, and episodes (docs/import.md).
+"""Import objects from mesh files, and houses and episodes from other simulators (docs/import.md).
 
-The extra `import` must be installed.
+The `import` extra of this package must be installed.
 """
 
 from importlib.util import find_spec
@@ -11,7 +11,7 @@ EXTRA = ("coacd", "collada", "fast_simplification", "manifold3d", "networkx", "P
 
 
 def require_extra() -> None:
-    """Raise `AssetError` if a library of the extra is missing. Otherwise, some would fail later, inside trimesh."""
+    """Raise an AssetError if a library of the `import` extra is not installed."""
     if missing := [name for name in EXTRA if find_spec(name) is None]:
         raise AssetError(
             f"importing needs {', '.join(missing)}: pip install 'mjsim[import]' adds what is missing"

@@ -1,7 +1,7 @@
-"""Reader for rearrangement episodes of other benchmarks: misplaced objects and their distances from their goals.
+"""Read rearrangement episodes of other benchmarks to find their misplaced objects.
 
-RoomR (AI2-THOR rearrangement) gives start and goal poses. Housekeep gives the receptacle of each object and the
-receptacles where it belongs.
+A RoomR file (AI2-THOR rearrangement) contains start and goal poses. A Housekeep file contains the receptacle
+of each object and the receptacles where the object belongs.
 """
 
 import gzip
@@ -21,9 +21,9 @@ import numpy as np
 from mjsim.support.files import MAX_INPUT, read_bytes
 from mjsim.values.errors import EpisodeError, brief
 
-# Distance in metres above which an object counts as moved; RoomR poses vary by less between runs.
+# Distance in metres above which an object counts as moved. Poses in RoomR vary by less between runs.
 MOVED = 0.05
-HOUSE = 60.0  # largest plausible distance in metres; objects that fell out of the scene are farther away
+HOUSE = 60.0  # largest plausible distance in metres; only objects that fell out of the scene are farther away
 IN_PLACE, MISPLACED, OPENED = "in place", "misplaced", "opened"
 
 
@@ -35,8 +35,8 @@ class EpisodeObject:
     episode: str
     name: str
     kind: str
-    state: str  # `in place`, `misplaced`, or `opened` for a drawer or door
-    # Horizontal distance to the goal in metres; None if not misplaced or unknown.
+    state: str  # `in place` or `misplaced` for an object, `opened` for a drawer or door
+    # Horizontal distance to the goal in metres, or None if the object is in place or its goal is unknown.
     distance: float | None = None
 
 
@@ -77,9 +77,9 @@ class _HousekeepFile(msgspec.Struct):
 
 
 class _NoClass(pickle._Unpickler):
-    """Unpickler that accepts only plain containers, numbers and strings.
+    """An unpickler that accepts only plain containers, numbers and strings.
 
-    It extends Python's slow unpickler, because the C one allocates memory for as many values as a file claims to have.
+    It extends the unpickler in Python, because the one in C allocates as much memory as a file asks for.
     """
 
     def find_class(self, module: str, name: str) -> NoReturn:
@@ -87,10 +87,10 @@ class _NoClass(pickle._Unpickler):
 
 
 def read_episodes(path: Path) -> list[EpisodeObject]:
-    """Read a file of RoomR (`.pkl`, `.pkl.gz`) or Housekeep (`.json`, `.json.gz`).
+    """Read an episode file of RoomR (`.pkl`, `.pkl.gz`) or of Housekeep (`.json`, `.json.gz`).
 
     Raises:
-        EpisodeError: The file cannot be read, is not valid, or contains a class. No code from the file is run.
+        EpisodeError: The file cannot be read, is invalid, or contains a class. Its code is never executed.
     """
     name = path.name.lower().removesuffix(".gz")
     reader = {".pkl": _read_roomr, ".json": _read_housekeep}.get(Path(name).suffix)
@@ -128,7 +128,7 @@ def _unpickled(data: bytes) -> Any:
         return _NoClass(io.BytesIO(data)).load()
     except EpisodeError:
         raise
-    except Exception as error:  # damaged or hostile pickles raise errors of any type
+    except Exception as error:  # A damaged or malicious pickle can raise any exception.
         raise EpisodeError(
             f"not a pickle of plain values ({type(error).__name__}); is it complete?"
         ) from error
@@ -174,7 +174,7 @@ def _housekeep_objects(episode: _Housekeep) -> Iterator[EpisodeObject]:
             if not where.any() or where @ right:
                 yield EpisodeObject(scene, number, name, kind, IN_PLACE)
                 continue
-            offsets = (receptacles[right > 0] - position)[:, [0, 2]]  # the y axis points up
+            offsets = (receptacles[right > 0] - position)[:, [0, 2]]  # The y axis points up.
             nearest = _distance(float(np.hypot(*offsets.T).min())) if len(offsets) else None
             yield EpisodeObject(scene, number, name, kind, MISPLACED, nearest)
     except ValueError as error:
@@ -188,5 +188,5 @@ def _distance(metres: float) -> float | None:
 
 
 def kind_of(name: str) -> str:
-    """Return an object's type in words. For example, `ButterKnife` and `butter_knife` give `butter knife`."""
+    """Convert the name of an object type to words. For example, `ButterKnife` becomes `butter knife`."""
     return " ".join(re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)).lower()

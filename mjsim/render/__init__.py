@@ -1,4 +1,4 @@
-"""Off-screen rendering with OpenGL. Submodules are imported at first use."""
+"""Off-screen rendering with OpenGL. Submodules are imported when they are first used."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Cameras: poses, view volumes, and culling of geoms outside the view."""
+"""Camera poses, view volumes, and culling of geoms outside the view."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,21 +13,21 @@ from mjsim.house.scene.avatar import EYE
 from mjsim.values.errors import RenderError
 from mjsim.values.person_parameters import PICTURE_ASPECT
 
-# Distances of the clipping planes in metres. The body keeps the eye farther than `NEAR` from all surfaces.
+# Distances from the eye to the clipping planes, in metres. The eye is never closer than `NEAR` to a surface.
 NEAR = 0.04
 FAR = 100.0
-_MARGIN = 0.01  # tolerance of culling, far above rounding errors in single precision, in metres
-_NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)  # geom type that the rasteriser does not draw
-# An integer, because comparing with the enumeration takes ten times as long
+_MARGIN = 0.01  # culling tolerance in metres, much larger than single-precision rounding errors
+_NOTHING = int(mujoco.mjtGeom.mjGEOM_NONE)  # geom type that MuJoCo does not draw
+# Converted to an integer, because comparing a value with an enumeration member takes ten times as long.
 _GEOM = int(mujoco.mjtObj.mjOBJ_GEOM)
 
 
 @dataclass(frozen=True, eq=False)
 class CameraPose:
-    """A pinhole camera."""
+    """The position, orientation and field of view of a pinhole camera."""
 
-    position: NDArray[np.float64]  # eye point in the house frame, in metres, shape (3,)
-    # camera axes in the house frame as columns: x right, y up, z backward, shape (3, 3)
+    position: NDArray[np.float64]  # position of the eye in the house frame, in metres, shape (3,)
+    # rotation matrix, shape (3, 3), whose columns are the right, up and backward axes in the house frame
     rotation: NDArray[np.float64]
     fovy: float  # vertical field of view, in radians
 
@@ -51,9 +51,9 @@ class CameraPose:
 
 
 def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the axes, shape (3, 3), of an upright camera that looks along `direction`.
+    """Return the rotation matrix (3, 3) of an upright camera that looks along `direction`.
 
-    For a vertical direction, the top of the image is towards +y.
+    If the direction is vertical, the top of the image points towards +y.
     """
     length = np.linalg.norm(direction)
     if not length > 0.0:
@@ -67,13 +67,13 @@ def look_rotation(direction: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class ViewVolume:
-    """View volume of a draw call."""
+    """The region of space that a camera shows, as a pyramid or (if orthographic) a box."""
 
-    position: NDArray[np.float64]  # eye point in metres, shape (3,)
-    rotation: NDArray[np.float64]  # camera axes as columns: right, up, backward, shape (3, 3)
-    half_height: float  # half height of the image at a distance of 1 m, or in metres if orthographic
-    near: float = NEAR  # distance of the near plane, in metres
-    far: float = FAR  # distance of the far plane, in metres
+    position: NDArray[np.float64]  # position of the eye in metres, shape (3,)
+    rotation: NDArray[np.float64]  # right, up and backward axes of the camera as columns, shape (3, 3)
+    half_height: float  # half the height of the view in metres; in perspective views, 1 m from the eye
+    near: float = NEAR  # distance from the eye to the near clipping plane, in metres
+    far: float = FAR  # distance from the eye to the far clipping plane, in metres
     orthographic: bool = False
 
     @classmethod
@@ -81,7 +81,7 @@ class ViewVolume:
         return cls(pose.position, pose.rotation, float(np.tan(pose.fovy / 2)))
 
     def metres(self, raw: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Convert reversed depth (1 near, 0 far) to distance along the optical axis in metres."""
+        """Convert reversed depths (1 near, 0 far) to distances along the optical axis, in metres."""
         depth = np.divide(self.near * self.far, self.near + raw.astype(np.float64) * (self.far - self.near))
         if self.orthographic:
             depth = self.far - raw.astype(np.float64) * (self.far - self.near)
@@ -91,7 +91,7 @@ class ViewVolume:
     def aim(self, scene: Any) -> None:
         top = self.half_height if self.orthographic else self.half_height * self.near
         forward = -self.rotation[:, 2]
-        for camera in scene.camera:  # MuJoCo averages the two cameras of a scene if it is not in stereo
+        for camera in scene.camera:  # without stereo, MuJoCo uses the average of a scene's two cameras
             camera.pos, camera.forward, camera.up = self.position, forward, self.rotation[:, 1]
             camera.frustum_center, camera.frustum_width = 0.0, 0.0
             camera.frustum_bottom, camera.frustum_top = -top, top
@@ -103,10 +103,11 @@ class ViewVolume:
 
 
 def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) -> CameraPose:
-    """Return the pose of a camera of the model, or `camera` itself if it is a pose. `aspect` is width over height.
+    """Return the pose of a camera of the model. If `camera` already is a pose, return it unchanged.
 
-    The eye camera keeps the person's horizontal field of view at every aspect ratio. Other cameras keep their vertical
-    field of view, as in MuJoCo. Raises a RenderError for an unknown camera.
+    `aspect` is the width of the image divided by its height. The eye camera keeps the person's horizontal
+    field of view at every aspect ratio, and other cameras keep their vertical one. Raises a RenderError for
+    an unknown camera.
     """
     if isinstance(camera, CameraPose):
         return camera
@@ -122,16 +123,15 @@ def camera_pose(model: Any, data: Any, camera: str | CameraPose, aspect: float) 
 
 
 class Bounds(NamedTuple):
-    """Bounding spheres and boxes of a model's geoms, in the geoms' frames."""
+    """The bounding sphere and the bounding box of each geom in a model, in the geom's own frame."""
 
-    radii: NDArray[
-        np.float64
-    ]  # radii of spheres around the origins in metres, 0 for unbounded geoms, shape (ngeom,)
-    boxes: NDArray[np.float64]  # centres and half sizes of boxes in metres, shape (ngeom, 6)
+    # radius of the sphere around each geom's origin in metres, 0 if the geom is unbounded, shape (ngeom,)
+    radii: NDArray[np.float64]
+    boxes: NDArray[np.float64]  # centre and half sizes of each bounding box in metres, shape (ngeom, 6)
 
     @classmethod
     def of(cls, model: Any) -> "Bounds":
-        """Compute the bounds of a model. Planes of finite size are bounded, unlike in MuJoCo."""
+        """Compute the bounds of a model's geoms. Unlike in MuJoCo, planes of finite size have bounds."""
         radii, boxes = model.geom_rbound.copy(), model.geom_aabb.copy()
         plane = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
         finite = plane & (model.geom_size[:, :2] > 0.0).all(axis=1)
@@ -144,7 +144,10 @@ class Bounds(NamedTuple):
 def outside(
     view: ViewVolume, aspect: float, centres: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the spheres outside a view. Some near its corners are missed. Radius 0 means unbounded."""
+    """Return a mask (n,) of the spheres outside a view. It may miss some near the corners of the view.
+
+    Spheres of radius 0 count as unbounded, and are never outside.
+    """
     right, up, backward = ((centres - view.position) @ view.rotation).T
     ahead, reach = -backward, radii + _MARGIN
     vertical, horizontal = view.half_height, view.half_height * aspect
@@ -153,16 +156,16 @@ def outside(
         if view.orthographic:
             apart |= np.abs(offset) - half > reach
         else:
-            # Signed distance to the nearer side plane of the pyramid, times the length of its normal
+            # Signed distance to the nearer side plane of the pyramid, times the length of the plane's normal
             apart |= np.abs(offset) - half * ahead > reach * np.hypot(1.0, half)
     return np.asarray(apart & (radii > 0.0))
 
 
 @contextmanager
 def without(scene: Any, hidden: NDArray[np.bool_]) -> Iterator[None]:
-    """Temporarily hide geoms from a scene. `hidden` is a mask of shape (ngeom,)."""
+    """Hide geoms of a scene for the duration of a `with` block. `hidden` is a mask of shape (ngeom,)."""
     geoms = scene.geoms[: scene.ngeom]
-    # Geoms that do not belong to the model map to the extra entry at the end, which is False.
+    # Geoms that do not belong to the model use the extra entry at the end of the mask, which is False.
     owners = [geom.objid if geom.objtype == _GEOM else -1 for geom in geoms]
     chosen = [geoms[index] for index in np.flatnonzero(np.append(hidden, False)[owners])] if owners else []
     types = [geom.type for geom in chosen]

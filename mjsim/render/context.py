@@ -1,8 +1,8 @@
-"""The OpenGL context of the process, created at first use.
+"""The OpenGL context of the process, which is created when it is first used.
 
 Each use acquires a lock, makes the context current in the calling thread, and restores the previous context
-afterwards. Any thread can therefore draw, and the contexts of other libraries are not affected. A switch takes about
-0.03 ms.
+afterwards. Any thread can therefore draw, and the contexts of other libraries are not affected. Switching
+contexts takes about 0.03 ms.
 """
 
 import atexit
@@ -34,7 +34,7 @@ _SOFTWARE_RENDERERS = ("llvmpipe", "softpipe", "swrast", "software", "swiftshade
 
 @dataclass(frozen=True)
 class GlInfo:
-    """OpenGL driver of this process."""
+    """Information about the OpenGL driver that this process uses."""
 
     vendor: str  # value of GL_VENDOR
     renderer: str  # value of GL_RENDERER, which names the GPU or the software rasterizer
@@ -61,7 +61,7 @@ class _ProcessContext:
     def current(self) -> Iterator[None]:
         with self._lock:
             self._ensure()
-            if self._depth:  # already current: a nested use in the same thread
+            if self._depth:  # nested use: this thread has already made the context current
                 yield
                 return
             with _as_render_errors():
@@ -82,7 +82,7 @@ class _ProcessContext:
     def release(self, key: int) -> None:
         with self._lock:
             mujoco_context = self._owned.pop(key, None)
-            # A forked child must not use the parent's driver threads.
+            # A forked child process must not use the driver threads of its parent.
             if mujoco_context is None or self._gl is None or self._pid != os.getpid():
                 return
             with self.current():
@@ -92,13 +92,13 @@ class _ProcessContext:
         with self._lock:
             if self._gl is None or self._pid != os.getpid():
                 return
-            # Exit hooks run in reverse order: if dm_control was imported later, it has terminated the shared display.
+            # If dm_control was imported later, its exit hook has already terminated the shared display.
             if self._display_lives():
                 for key in list(self._owned):
                     self.release(key)
                 self._gl.free()
             else:
-                self._gl._context = None  # freed with the display, so the finalizer must not destroy it again
+                self._gl._context = None  # was freed with the display; the finalizer must not free it again
             self._gl = None
 
     def _display_lives(self) -> bool:
@@ -109,7 +109,7 @@ class _ProcessContext:
             return False
 
     def _ensure(self) -> None:
-        if self._failure is not None:  # a second attempt could hang again
+        if self._failure is not None:  # do not try again, because a second attempt could hang too
             raise self._failure
         if self._gl is None:
             try:
@@ -131,7 +131,7 @@ class _ProcessContext:
             return None
         egl = self._egl
         context = egl.eglGetCurrentContext()
-        # Our own context may still be current if a signal interrupted drawing before the context was released.
+        # Our own context may still be current if a signal interrupted drawing before it was released.
         if not context or context.address == self._gl._context.address:
             return None
         surfaces = egl.eglGetCurrentSurface(egl.EGL_DRAW), egl.eglGetCurrentSurface(egl.EGL_READ)
@@ -158,7 +158,7 @@ def _as_render_errors() -> Iterator[None]:
 
 
 def _opengl_errors() -> tuple[type[Exception], ...]:
-    # PyOpenGL is imported only when something is drawn.
+    # PyOpenGL may not have been imported yet, because it is loaded when the first image is drawn.
     module = sys.modules.get("OpenGL.error")
     return () if module is None else (module.Error,)
 
@@ -215,15 +215,15 @@ def _backend() -> ModuleType:
         raise RenderError(
             f"MUJOCO_GL={name!r} is not an OpenGL backend; unset it, or set it to {' or '.join(BACKENDS)}"
         )
-    os.environ.setdefault(VARIABLE, name)  # dm_control, if used, must draw with the same backend
+    os.environ.setdefault(VARIABLE, name)  # makes dm_control use the same backend
     try:
         return importlib.import_module(f"mujoco.{name}")
-    except Exception as error:  # a missing library surfaces as ImportError, AttributeError or OSError
+    except Exception as error:  # a missing library can raise an ImportError, AttributeError or OSError
         remedy = EGL_REMEDY if name == DEFAULT else f"install it, or unset {VARIABLE} to draw with {DEFAULT}"
         raise RenderError(f"cannot load the OpenGL backend {name!r} ({error}); {remedy}") from error
 
 
-# There is one context per process, as there is one EGL display.
+# Each process has only one context, because it has only one EGL display.
 _PROCESS = _ProcessContext()
 current_context = _PROCESS.current
 own = _PROCESS.own
@@ -231,9 +231,9 @@ release = _PROCESS.release
 
 
 def gl_info() -> GlInfo:
-    """Return the vendor, renderer and version of OpenGL in this process.
+    """Return information about the OpenGL driver that this process uses.
 
-    Without a GPU driver, OpenGL silently uses software rendering.
+    If there is no GPU driver, OpenGL silently falls back to software rendering.
 
     Raises:
         RenderError: No OpenGL context can be created.

@@ -1,4 +1,4 @@
-"""The report of `mjsim doctor`: versions, conflicting packages, and OpenGL."""
+"""The report that `mjsim doctor` prints about package versions, package conflicts and OpenGL."""
 
 import importlib
 import platform
@@ -36,8 +36,8 @@ MODULES = {
     "ortools": "ortools",
     "opencv-python-headless": "cv2",
     "pyopengl": "OpenGL",
-}  # module of each distribution that fails to import if the versions are incompatible
-# First Python version for which labmaze, a requirement of dm-control that only mazes need, has no wheels.
+}  # for each distribution, a module whose import fails if the installed versions are incompatible
+# First Python version without wheels of labmaze, which dm-control requires but uses only for mazes.
 WITHOUT_LABMAZE = (3, 13)
 INSTALL_DM_CONTROL = "pip install --no-deps dm-control"
 _REINSTALL = "its version does not fit the others; reinstall with pip install --upgrade mjsim"
@@ -45,22 +45,22 @@ _REINSTALL = "its version does not fit the others; reinstall with pip install --
 
 @dataclass(frozen=True)
 class EnvironmentReport:
-    """Package versions, conflicts and OpenGL driver of this machine."""
+    """A report about the Python packages and the OpenGL driver of this machine."""
 
-    python: str  # version of the interpreter
+    python: str  # version of the Python interpreter
     platform: str  # operating system and processor
-    versions: Mapping[str, str | None]  # version of each distribution, None if not installed
-    broken: Mapping[str, str]  # import error of each broken distribution
-    hidden: tuple[str, ...]  # advice about packages that are shadowed by others of the same name
+    versions: Mapping[str, str | None]  # installed version of each distribution, or None if it is missing
+    broken: Mapping[str, str]  # error message of each distribution that cannot be imported
+    hidden: tuple[str, ...]  # advice about packages that Python does not find or imports from a wrong folder
     cache: str  # folder and size of the compiled-code cache
-    egl_vendors: tuple[str, ...]  # names of EGL vendor files
-    gl: "GlInfo | None"  # driver, or None if no context can be created
-    problem: str | None  # reason why no context can be created, or None
+    egl_vendors: tuple[str, ...]  # file names of the installed EGL vendor files
+    gl: "GlInfo | None"  # OpenGL driver, or None if no OpenGL context can be created
+    problem: str | None  # reason why no OpenGL context can be created, or None
     advice: tuple[str, ...]  # suggested repairs
 
     @property
     def usable(self) -> bool:
-        """True if all packages that trials need can be imported, and frames can be drawn."""
+        """True if all packages required for trials can be imported and OpenGL can draw frames."""
         missing = {name for name, version in self.versions.items() if version is None}
         if sys.version_info >= WITHOUT_LABMAZE:
             missing.discard(DM_CONTROL)  # trials do not need dm-control
@@ -82,11 +82,11 @@ class EnvironmentReport:
 
 
 def environment_report() -> EnvironmentReport:
-    """Inspect this machine. Creates an OpenGL context if possible."""
+    """Inspect the packages and the OpenGL driver of this machine. Creates an OpenGL context if possible."""
     gl: GlInfo | None = None
     problem: str | None = None
     try:
-        # Imported here so that the report can show an import error of MuJoCo or NumPy.
+        # This import is here so that the report can include an import error of MuJoCo or NumPy.
         from mjsim.render.context import gl_info
 
         gl = gl_info()
@@ -128,7 +128,7 @@ def _cache() -> str:
 
 
 def egl_vendors(folder: Path = VENDOR_FOLDER) -> tuple[str, ...]:
-    """List the EGL vendor files in `folder`, in the order in which they are tried."""
+    """Return the names of the EGL vendor files in `folder`, in the order in which EGL tries them."""
     return tuple(sorted(path.name for path in folder.glob("*.json")))
 
 
@@ -165,7 +165,7 @@ def _how_to_install(name: str) -> str:
 def _import_error(module: str) -> str | None:
     try:
         importlib.import_module(module)
-    except Exception as error:  # libraries built for another NumPy raise exceptions of many types
+    except Exception as error:  # a library built for another NumPy version can raise any type of exception
         return f"{type(error).__name__}: {' '.join(str(error).split())}"
     return None
 

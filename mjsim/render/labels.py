@@ -1,4 +1,4 @@
-"""Instance and category labels of segmentation images."""
+"""Instance and category labels for segmentation images."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,25 +13,25 @@ from mjsim.values.errors import RenderError
 BACKGROUND = -1
 HOUSE, PERSON, RECEPTACLE = "house", "person", "receptacle"
 _PERSON_ROOT = "avatar/base"
-_SAME = 1e-6  # tolerance in metres when matching a geom between two models
+_SAME = 1e-6  # tolerance in metres for recognizing the same geom in two models
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Maps geom ids to instances and categories. The background, -1, stays -1."""
+    """A mapping from geom ids to instance numbers and category numbers. The background is always -1."""
 
-    # `house`, `person`, receptacle keys and object names, by instance number
+    # instance names, indexed by instance number: `house`, `person`, the receptacle keys and the object names
     instances: tuple[str, ...]
-    # `house`, `person`, `receptacle` and the objects' categories, by category number
+    # category names, indexed by category number: `house`, `person`, `receptacle` and the object categories
     categories: tuple[str, ...]
-    # instance number of each geom, then -1 for the background, shape (ngeom + 1,)
+    # instance number of each geom, followed by -1 for the background, shape (ngeom + 1,)
     instance_of_geom: NDArray[np.int32]
-    # category number of each instance, then -1 for the background
+    # category number of each instance, followed by -1 for the background
     category_of_instance: NDArray[np.int32]
 
     @classmethod
     def of(cls, scene: Scene) -> "Labels":
-        """Create the labels of a composed scene. Equal episodes have equal labels."""
+        """Create the labels for a composed scene. Scenes of equal episodes have equal labels."""
         model, keys = scene.model, tuple(scene.receptacles)
         instances = (HOUSE, PERSON, *keys, *scene.index.names)
         of_geom = np.zeros(model.ngeom + 1, np.int32)
@@ -57,14 +57,14 @@ class Labels:
         return np.asarray(self.category_of_instance[self.instance_of_geom[segmentation]])
 
     def pixel_counts(self, segmentation: NDArray[np.int32]) -> dict[str, int]:
-        """Return the number of pixels of each visible instance, by name, in an array of geom ids."""
+        """Count the pixels of each visible instance in an array of geom ids. Keys are instance names."""
         seen = self.instance_of_geom[segmentation].ravel()
         counts = np.bincount(seen[seen >= 0], minlength=len(self.instances))
         return {name: int(count) for name, count in zip(self.instances, counts, strict=True) if count}
 
 
 def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
-    """Find the geoms of a receptacle. If they were merged into the house, match them by their poses."""
+    """Return the ids of a receptacle's geoms. Geoms merged into the house are recognized by their poses."""
     model = scene.model
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{key}/receptacle")
     if body >= 0:
@@ -93,6 +93,6 @@ def _receptacle_geoms(scene: Scene, key: str) -> NDArray[np.intp]:
 def _descends(model: Any, root: int) -> NDArray[np.bool_]:
     inside = np.zeros(model.nbody, dtype=bool)
     inside[root] = True
-    for body in range(root + 1, model.nbody):  # MuJoCo lists parents before their children
+    for body in range(root + 1, model.nbody):  # in MuJoCo, a parent body precedes its children
         inside[body] = inside[model.body_parentid[body]]
     return inside

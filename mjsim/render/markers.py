@@ -1,4 +1,4 @@
-"""Markers: decorative geoms that are added to a scene for one frame. Walls hide all except x-ray markers."""
+"""Decorative geoms, called markers, that are added to a scene for a single frame."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from mjsim.render.cameras import ViewVolume, outside
 from mjsim.values.errors import RenderError
 
 MAX_MARKERS = 1024
-# A marker emits most of its colour and reflects a little light, so that it looks solid and similar in every room.
+# A marker emits most of its colour and reflects a little light. It therefore looks similar in every room.
 _EMITTED = 0.62
 _LIT = 0.32
-_HIDDEN_OPACITY = 0.3  # opacity of x-ray markers behind other geoms
+_HIDDEN_OPACITY = 0.3  # opacity of an x-ray marker that is behind other geoms
 _AMBIENT = 0.3  # ambient light that MuJoCo adds to a scene without lights
-_DEPTH_TOLERANCE = 1e-4  # tolerance for rounding errors when comparing the depths of two passes
-_OUTLINE = 1.4  # radius of an outline, relative to the radius of its sphere
+_DEPTH_TOLERANCE = 1e-4  # relative tolerance for rounding errors when the depths of two passes are compared
+_OUTLINE = 1.4  # radius of an outline as a multiple of the sphere's radius
 _OUTLINE_RGBA = (0.03, 0.06, 0.20, 1.0)
 _NO_OBJECT = int(mujoco.mjtObj.mjOBJ_UNKNOWN)
 _SHAPES = {
@@ -30,36 +30,36 @@ _SIZES = {"sphere": 1, "cylinder": 2, "box": 3}
 
 
 class MarkerLike(Protocol):
-    """Interface of a marker. A sphere with a true attribute `outlined` gets a dark outline in colour images."""
+    """The interface of markers. A sphere with a true attribute `outlined` is drawn with a dark outline."""
 
     @property
     def shape(self) -> str:
-        """`sphere`, `cylinder` (upright) or `box`."""
+        """The shape, which is `sphere`, `cylinder` (upright) or `box`."""
         ...
 
     @property
     def position(self) -> Sequence[float] | NDArray[np.float64]:
-        """Centre in the house frame, in metres, shape (3,)."""
+        """The centre in the house frame, in metres, shape (3,)."""
         ...
 
     @property
     def size(self) -> Sequence[float] | NDArray[np.float64]:
-        """Size in metres: radius (1,), radius and half length (2,), or half sizes (3,)."""
+        """The size in metres: a radius (1,), a radius and half the length (2,), or three half sizes (3,)."""
         ...
 
     @property
     def rgba(self) -> Sequence[float] | NDArray[np.float64]:
-        """Colour and opacity, 0 to 1, shape (4,)."""
+        """Red, green, blue and opacity, each from 0 to 1, shape (4,)."""
         ...
 
     @property
     def x_ray(self) -> bool:
-        """True if the marker is visible through walls, dimmed."""
+        """True if the marker shows faintly through walls."""
         ...
 
 
 def add_markers(scene: Any, markers: Sequence[MarkerLike], *, flat: bool = False) -> None:
-    """Append markers to a scene's geoms. With `flat`, they are opaque with their exact colour.
+    """Append markers to a scene's geoms. If `flat` is True, they are opaque and have their exact colour.
 
     Raises:
         RenderError: There are too many markers, or one has an unknown shape or invalid numbers.
@@ -83,10 +83,10 @@ def add_decorative_geom(
     position: NDArray[np.float64],
     rgba: NDArray[np.float32],
 ) -> Any:
-    """Append an upright matt geom that belongs to no model and does not appear in segmentation images."""
+    """Append an upright matt geom to a scene. It does not appear in segmentation images."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, shape, size, position, np.eye(3).ravel(), rgba)
-    # Initialization does not reset these, so a slot may still refer to a geom of another scene.
+    # MuJoCo's initialization does not reset these fields, which may still refer to another geom.
     geom.objtype, geom.objid = _NO_OBJECT, -1
     geom.category = mujoco.mjtCatBit.mjCAT_DECOR
     geom.emission = geom.specular = geom.shininess = geom.reflectance = 0.0
@@ -101,7 +101,7 @@ def blend_hidden(
     scene_depth: NDArray[np.float32],
     marker_depth: NDArray[np.float32],
 ) -> None:
-    """Blend `colour` into `frame` in place, wherever a marker is behind the scene.
+    """Blend the image `colour` into `frame` in place, at all pixels where a marker is behind another geom.
 
     Images have shape (h, w, 3). Depths have shape (h, w), with 1 at the near plane and 0 for the background.
     """
@@ -111,12 +111,12 @@ def blend_hidden(
 
 
 def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> list[MarkerLike]:
-    """Return the markers inside a view and their outlines. Raise a RenderError for an invalid marker."""
+    """Return the markers inside a view, followed by their outlines. Raise a RenderError if one is invalid."""
     if len(markers) > MAX_MARKERS:
         raise RenderError(f"{len(markers)} markers in a frame; at most {MAX_MARKERS} can be drawn")
     if not markers:
         return []
-    for marker in markers:  # checks markers outside the view too, so that errors do not depend on the view
+    for marker in markers:  # invalid markers outside the view raise an error too
         _numbers(marker, "rgba", 4)
     centres = np.array([_numbers(marker, "position", 3) for marker in markers])
     radii = np.array([np.linalg.norm(geom_size(marker)) for marker in markers])
@@ -126,7 +126,7 @@ def in_view(view: ViewVolume, aspect: float, markers: Sequence[MarkerLike]) -> l
 
 
 class _Outline:
-    """A larger dark sphere behind an outlined sphere, visible all around it."""
+    """The outline of a sphere, drawn as a larger dark sphere behind it."""
 
     shape, rgba, x_ray = "sphere", _OUTLINE_RGBA, False
 
@@ -138,7 +138,7 @@ class _Outline:
 
 
 def geom_size(marker: MarkerLike) -> NDArray[np.float64]:
-    """Return a marker's size as MuJoCo defines it, in metres, shape (3,). Raise a RenderError if it is invalid."""
+    """Return a marker's size as a MuJoCo geom size, in metres, shape (3,). Raise a RenderError if invalid."""
     if marker.shape not in _SHAPES:
         raise RenderError(f"marker shape {marker.shape!r} is unknown; use one of {sorted(_SHAPES)}")
     size = _numbers(marker, "size", _SIZES[marker.shape])

@@ -1,7 +1,7 @@
-"""Occlusion culling: skip geoms that are completely hidden by one wall, as most are in a house with several rooms.
+"""Occlusion culling, which skips geoms that are completely hidden behind a wall or another large box.
 
-Each large opaque box in view is replaced by the rectangle through its middle. A geom that is completely in the shadow
-of the rectangle, with the eye as the light source, is invisible because the box covers it.
+A box hides all geoms in the shadow that it would cast if the eye were a light source. The shadow is computed
+for the rectangle through the middle of the box that is parallel to its largest faces.
 """
 
 from typing import Any
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import Bounds, ViewVolume
 from mjsim.support.kernels import inlined, kernel
 
-_MIN_HALF_SIZE = 0.4  # minimum half size of a face that may hide geoms, in metres
-_TESTED = 40  # number of boxes that are tested, those that look largest first
-_MARGIN = 0.01  # tolerance, far above rounding errors in single precision, in metres
+_MIN_HALF_SIZE = 0.4  # a box may hide geoms if at least two of its half sizes exceed this length in metres
+_TESTED = 40  # maximum number of boxes that are tested per view; those that look largest are chosen
+_MARGIN = 0.01  # tolerance in metres, much larger than single-precision rounding errors
 
 
 class BoxOccluders:
-    """The large boxes of a model that may hide other geoms. `shown` is a mask of drawn geoms, shape (ngeom,)."""
+    """Large boxes of a model that may hide other geoms. `shown` is a mask (ngeom,) of the geoms to draw."""
 
     def __init__(self, model: Any, bounds: Bounds, shown: NDArray[np.bool_]) -> None:
         size = model.geom_size
@@ -38,7 +38,7 @@ class BoxOccluders:
         rotations: NDArray[np.float64],
         seen: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
-        """Return a mask (ngeom,) of the geoms in `seen` that are outside a perspective view or hidden by a box."""
+        """Return a mask (ngeom,) of the `seen` geoms that are outside a perspective view or behind a box."""
         result = np.zeros(len(seen), dtype=bool)
         if view.orthographic:
             return result
@@ -53,18 +53,18 @@ class BoxOccluders:
     def _shadows(
         self, view: ViewVolume, aspect: float, positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the planes that bound the boxes' shadows: inward normals (k, 5, 3), and distances in metres (k, 5).
+        """Return the planes of each shadow as inward normals (k, 5, 3) and distances in metres (k, 5).
 
-        Four planes go through the eye and the edges of the rectangle. The fifth is the rectangle's own.
+        The first four planes contain the eye and one edge of the rectangle. The fifth contains the rectangle.
         """
         ids, rows = self._ids, np.arange(len(self._ids))
-        axes = rotations.transpose(0, 2, 1)  # rows are the box's axes
+        axes = rotations.transpose(0, 2, 1)  # the rows of each matrix are the axes of a box
         size = self._model.geom_size[ids]
         one, two = (self._thin + 1) % 3, (self._thin + 2) % 3
         centre, normal = positions - view.position, axes[rows, self._thin]
         across, along = axes[rows, one] * size[rows, one, None], axes[rows, two] * size[rows, two, None]
         ahead = np.einsum("ij,ij->i", normal, centre)
-        # The near plane could cut open a box that is closer than this.
+        # Closer boxes are not used, because the near plane could cut them open.
         clear = 1.5 * view.near * np.sqrt(1.0 + view.half_height**2 * (1.0 + aspect**2))
         usable = (np.abs(ahead) - size[rows, self._thin] > clear) & _opaque(self._model, ids)
         distance = np.maximum(np.linalg.norm(centre, axis=1), 1e-6)

@@ -21,21 +21,21 @@ from mjsim.render.scene_settings import DirectionalLight
 from mjsim.values.errors import AssetError, RenderError
 
 SUPERSAMPLING = 3
-FILL = 0.92  # share of the picture's side that its subject fills
-# The camera looks from the front right (receptacles face -y), and from a higher position at flat objects.
+FILL = 0.92  # size of the subject as a fraction of the picture's side
+# The camera is to the front right of the subject (receptacles face -y), and higher up if the subject is flat.
 _AZIMUTH = np.deg2rad(28.0)
 _ELEVATION = np.deg2rad(32.0)
 _ELEVATION_FLAT = np.deg2rad(52.0)
-_FLAT = 0.3  # maximum height of a flat object, relative to its width
-# A main light from the upper left, and a weaker one for the shaded sides
+_FLAT = 0.3  # ratio of height to width below which an object counts as flat
+# The main light comes from the upper left. The weaker one brightens the shaded sides.
 _LIGHTS = (
     DirectionalLight((0.75, 0.35, -0.75), diffuse=0.62, ambient=0.42),
     DirectionalLight((-0.7, 0.6, -0.2), diffuse=0.28),
 )
 _DISTANCE = 5.0
 _PROFILE = RenderProfile("picture", skybox=False)
-_PAPER = 244  # grey level of the background
-_HEIGHT = 10.0  # height of the camera above the floor, in metres
+_PAPER = 244  # grey level of a floor plan's background, from 0 to 255
+_HEIGHT = 10.0  # height of the camera for floor plans above the floor, in metres
 _PLAN_LIGHTS = (DirectionalLight((0.25, -0.35, -1.0), diffuse=0.55, ambient=0.5),)
 _PLAN_PROFILE = RenderProfile("floorplan", supersampling=2.0, skybox=False)
 
@@ -69,7 +69,7 @@ def render_picture(path: Path, size: int = 96) -> NDArray[np.uint8]:
 
 
 def draw_picture(model: Any, size: int, name: str) -> NDArray[np.uint8]:
-    """Draw a compiled model as an RGBA image (size, size, 4) with straight alpha. `name` appears in errors."""
+    """Draw a compiled model as an RGBA image (size, size, 4) with straight alpha. Errors mention `name`."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if not 1 <= size <= 1024:
@@ -111,7 +111,7 @@ def _bounds(model: Any, data: Any) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
-    """Shift and scale the view so that the subject fills the picture. The second pass refines the first."""
+    """Shift and scale the view so that the subject fills the picture. A second pass refines the result."""
     for _ in range(2):
         mask = rasteriser.geometry(view)[0] >= 0
         if not mask.any():
@@ -133,7 +133,7 @@ def _framed(rasteriser: Rasteriser, view: ViewVolume, name: str) -> ViewVolume:
 
 
 def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> NDArray[np.uint8]:
-    """Average blocks of pixels, weighting colours by coverage so that the background does not bleed into edges."""
+    """Average blocks of pixels. Colours are weighted by coverage, which keeps the background out of edges."""
     weight = mask.astype(np.float32)
     covered = cv2.resize(weight, (size, size), interpolation=cv2.INTER_AREA)
     summed = cv2.resize(colour * weight[..., None], (size, size), interpolation=cv2.INTER_AREA)
@@ -144,14 +144,14 @@ def _reduce(colour: NDArray[np.uint8], mask: NDArray[np.bool_], size: int) -> ND
 
 @dataclass(frozen=True, eq=False)
 class FloorPlan:
-    """An orthographic picture from above. North (+y) is up."""
+    """An orthographic picture of a house from above. North (+y) is at the top."""
 
     rgb: NDArray[np.uint8]  # colour image, shape (height, width, 3), rows from the top
     bounds: tuple[float, float, float, float]  # drawn area (xmin, ymin, xmax, ymax), in metres
     pixels_per_metre: float
 
     def to_pixels(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Convert floor points in metres to columns and rows, both (k, 2). Pixel centres are at half-integers."""
+        """Convert floor points (k, 2) in metres to columns and rows. Pixel centres are half-integers."""
         points = np.asarray(xy, dtype=np.float64)
         corner = np.array([self.bounds[0], self.bounds[3]])
         return np.asarray((points - corner) * [self.pixels_per_metre, -self.pixels_per_metre])
@@ -165,14 +165,14 @@ def render_floorplan(
 ) -> FloorPlan:
     """Draw a house from above, without ceilings (geom group 1) and without the person.
 
-    `bounds` are (xmin, ymin, xmax, ymax) in metres.
+    `bounds` is the area (xmin, ymin, xmax, ymax) to draw, in metres.
     """
     xmin, ymin, xmax, ymax = bounds
     if not (np.isfinite(bounds).all() and xmin < xmax and ymin < ymax and pixels_per_metre > 0):
         raise RenderError(
             f"a floor plan needs bounds with min < max and a positive scale, got {bounds} m at {pixels_per_metre}/m"
         )
-    # Rounding before `ceil` removes float errors, so that 12.8 m at 60/m give 768 pixels and not 769.
+    # Rounding before `ceil` removes floating-point errors: 12.8 m at 60 pixels/m give 768 pixels, not 769.
     width, height = (int(np.ceil(round(s * pixels_per_metre, 6))) for s in (xmax - xmin, ymax - ymin))
     if max(width, height) * _PLAN_PROFILE.supersampling > MAX_SIDE:
         raise RenderError(
@@ -202,7 +202,7 @@ def _person_geoms(model: Any) -> NDArray[np.bool_]:
 
 
 def largest_scale(bounds: tuple[float, float, float, float]) -> float:
-    """Return the largest scale, in pixels per metre, at which an area (xmin, ymin, xmax, ymax) can be drawn."""
+    """Return the largest scale, in pixels per metre, at which the area `bounds` can be drawn."""
     xmin, ymin, xmax, ymax = bounds
     return (MAX_SIDE / _PLAN_PROFILE.supersampling - 1) / max(xmax - xmin, ymax - ymin)
 
@@ -210,9 +210,9 @@ def largest_scale(bounds: tuple[float, float, float, float]) -> float:
 def render_house_map(
     catalogue: Catalogue, bounds: tuple[float, float, float, float], pixels_per_metre: float = 40.0
 ) -> NDArray[np.uint8]:
-    """Draw a house without misplaced objects from above, as an RGBA image of shape (height, width, 4).
+    """Draw a house from above, without any misplaced objects. Return an RGBA image (height, width, 4).
 
-    `bounds` are (xmin, ymin, xmax, ymax) in metres.
+    `bounds` is the area (xmin, ymin, xmax, ymax) to draw, in metres.
 
     Raises:
         AssetError: The house does not compile.

@@ -9,17 +9,17 @@ MAX_SIDE = 8192  # largest side of a frame, in pixels
 
 @dataclass(frozen=True)
 class RenderProfile:
-    """Settings of the rasteriser.
+    """Settings that determine the quality and speed of rendering.
 
     Attributes:
-        name: Name in records and error messages.
-        supersampling: Factor, 1 to 4, by which frames are drawn larger before they are reduced.
-        samples: Multisamples per pixel, 0 for none.
-        shadow_size: Side of a shadow map in texels, 0 for no shadows.
+        name: Name of the profile in records and error messages.
+        supersampling: Factor from 1 to 4 by which a frame is drawn larger and then scaled down.
+        samples: Number of multisamples per pixel, or 0 for no multisampling.
+        shadow_size: Side length of a shadow map in texels, or 0 for no shadow maps.
         reflections: True if reflective materials mirror the scene.
         skybox: True if the model's skybox is drawn.
         textures: True if materials show their textures.
-        contact_shadows: True for dark spots under free objects near the floor, for profiles without shadow maps.
+        contact_shadows: True if dark spots under objects near the floor are drawn instead of real shadows.
     """
 
     name: str
@@ -45,10 +45,10 @@ class RenderProfile:
 
 DRAFT = RenderProfile("draft", skybox=False, textures=False)
 """Flat colours without textures."""
-# A frame of 640 x 480 is drawn at 800 x 600. On a CPU, this costs 8 ms, and multisampling would cost 40 ms.
+# A 640 x 480 frame is drawn at 800 x 600. This takes 8 ms on a CPU, while multisampling would take 40 ms.
 FAST = RenderProfile("fast", supersampling=1.25, contact_shadows=True)
 """Smooth edges and contact shadows, at little cost on a CPU."""
-# Smaller shadow maps cause speckled floors.
+# Smaller shadow maps would cause speckled floors.
 QUALITY = RenderProfile("quality", supersampling=1.5, samples=4, shadow_size=4096, reflections=True)
 """Multisampling, fine shadows and reflections."""
 
@@ -57,7 +57,7 @@ PROFILES = {profile.name: profile for profile in (DRAFT, FAST, QUALITY)}
 
 
 def resolve_profile(profile: str | RenderProfile) -> RenderProfile:
-    """Return the profile of a given name, or a given profile. Raise a RenderError for an unknown name."""
+    """Look up a profile by name, or return a given profile. Raise a RenderError for an unknown name."""
     if isinstance(profile, RenderProfile):
         return profile
     if profile not in PROFILES:

@@ -1,4 +1,4 @@
-"""Rasteriser of one model, with a colour pass and a geometry pass."""
+"""The rasteriser, which draws colour images, geom ids and depth images of a model."""
 
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, Self
@@ -29,21 +29,21 @@ TOP_DOWN_GROUPS = (0, 2)
 
 _Flag = mujoco.mjtRndFlag
 _BACKGROUND = -1
-_FAR_UP = 1e4  # height at which an object has no contact shadow, in metres
+_FAR_UP = 1e4  # height in metres to which hidden objects are moved so that they cast no contact shadow
 
 
 class Layer(NamedTuple):
-    """Drawn part of a scene, at the supersampled size and with rows from the bottom."""
+    """An image of a part of a scene at the supersampled size, with the bottom row first."""
 
     colour: NDArray[np.uint8]  # colour image, shape (h, w, 3)
     depth: NDArray[np.float32]  # reversed depth, 1 at the near plane, 0 for the background, shape (h, w)
 
 
 class Rasteriser:
-    """Draws frames of one model. Threads that share a rasteriser must update and draw inside one `current_context`.
+    """A rasteriser that draws images of one model.
 
-    `width` and `height` are the frame size in pixels. `groups` are the drawn geom groups. `lights` replace those of the
-    model.
+    `width` and `height` are in pixels. `groups` are the geom groups to draw. `lights` replace those of the
+    model. A thread that shares a rasteriser must update and draw in the same `current_context` block.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Rasteriser:
         self.close()
 
     def update(self, data: Any) -> None:
-        """Copy poses and colours of geoms from `data`. Raise a RenderError if it belongs to another model."""
+        """Copy the poses and colours of geoms from `data`. Raise a RenderError for data of another model."""
         if self.closed:
             raise RenderError("the renderer is closed; make a new one")
         if len(data.geom_xpos) != self._model.ngeom or len(data.qpos) != self._model.nq:
@@ -119,7 +119,7 @@ class Rasteriser:
             set_lights(self._scene, self._lights)
 
     def colour(self, view: ViewVolume, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Draw the last update as a frame of shape (height, width, 3), rows from the top."""
+        """Draw a colour image (height, width, 3) of the latest state, with the top row first."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         view.aim(scene)
@@ -138,7 +138,7 @@ class Rasteriser:
     def geometry(
         self, view: ViewVolume, markers: Sequence[MarkerLike] = ()
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Draw geom ids, -1 for background and markers, and reversed depth, both (height, width)."""
+        """Draw geom ids and reversed depths, both (height, width). The background and markers have id -1."""
         scene, model_geoms = self._scene, self._scene.ngeom
         scene.flags[:] = 0
         for flag in (_Flag.mjRND_SEGMENT, _Flag.mjRND_IDCOLOR, _Flag.mjRND_CULL_FACE):
@@ -148,7 +148,7 @@ class Rasteriser:
             add_markers(scene, markers)
             geoms = scene.geoms[: scene.ngeom]
             for index in range(model_geoms, scene.ngeom):
-                # Ids are drawn as colours, and geoms without an id are not drawn at all.
+                # MuJoCo draws the ids as colours, and would not draw a geom without an id.
                 geoms[index].segid = index
             kind = mujoco.mjtObj.mjOBJ_GEOM
             owners = [_BACKGROUND] + [g.objid if g.objtype == kind else _BACKGROUND for g in geoms]
@@ -169,7 +169,7 @@ class Rasteriser:
         hidden: NDArray[np.bool_],
         lowest: bool = False,
     ) -> Layer:
-        """Draw the scene without `hidden` geoms. Only the `lowest` layer has sky and contact shadows."""
+        """Draw the scene without `hidden` geoms. Only the `lowest` layer contains sky and contact shadows."""
         scene, model_geoms = self._scene, self._scene.ngeom
         set_flags(scene, self._profile)
         scene.flags[_Flag.mjRND_SKYBOX] &= lowest
@@ -188,7 +188,7 @@ class Rasteriser:
 
     @property
     def _aspect(self) -> float:
-        # Rounding may make the aspect ratios of the drawing and the frame differ.
+        # Because sizes are rounded, the drawing and the frame may have different aspect ratios.
         return max(width / height for width, height in (self._size, self._drawn))
 
     def _unseen(self, view: ViewVolume, profile: RenderProfile | None = None) -> NDArray[np.bool_]:
@@ -225,10 +225,10 @@ class Rasteriser:
 
 
 def reduced(drawn: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Scale a drawing to `size` (width, height), and flip it so that its rows start at the top."""
+    """Scale a drawing to `size` (width, height), and flip it so that the top row is first."""
     if drawn.shape[1::-1] == size:
         return np.asarray(cv2.flip(drawn, 0), dtype=np.uint8)
-    # Interpolation is three times as fast as area averaging, and looks almost the same for slight reductions.
+    # For small reductions, linear interpolation is three times as fast as area averaging and looks similar.
     slight = drawn.shape[1] < 1.5 * size[0]
     method = cv2.INTER_LINEAR_EXACT if slight else cv2.INTER_AREA
     return np.asarray(cv2.flip(cv2.resize(drawn, size, interpolation=method), 0), dtype=np.uint8)

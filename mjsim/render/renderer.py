@@ -1,4 +1,4 @@
-"""Off-screen renderers for colour, depth and segmentation, and a faster one for stationary cameras."""
+"""Off-screen renderers: one for colour, depth and segmentation, and a faster one for stationary cameras."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ REST = 25  # number of frames without movement after which a geom counts as stat
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Images from one camera at one moment, rows from the top. Channels that were not requested are None."""
+    """The images of one camera at one moment, with the top row first. Images not requested are None."""
 
     camera: CameraPose
-    rgb: NDArray[np.uint8] | None  # colour, shape (height, width, 3)
-    # distance along the optical axis in metres, inf for the background, shape (height, width)
+    rgb: NDArray[np.uint8] | None  # colour image, shape (height, width, 3)
+    # distance of each pixel along the optical axis in metres, inf for the background, shape (height, width)
     depth: NDArray[np.float32] | None
-    segmentation: NDArray[np.int32] | None  # geom ids, -1 for the background, shape (height, width)
+    segmentation: NDArray[np.int32] | None  # geom id at each pixel or -1, shape (height, width)
 
 
 class OffScreenRenderer:
-    """Base class of renderers. Close a renderer after use, or use it as a context manager.
+    """The base class of renderers. Close a renderer after use, or use it as a context manager.
 
     Args:
         model: Compiled model.
@@ -67,14 +67,14 @@ class OffScreenRenderer:
 
 
 class Renderer(OffScreenRenderer):
-    """Draws a model off-screen.
+    """A renderer that draws images of a model off-screen.
 
-    Any thread may use a renderer, but only one at a time. Frames are bit-identical across calls and processes on one
-    OpenGL driver (see `gl_info`). Call `mj_forward` after changing the data, because poses are not computed here.
+    Any thread may use a renderer, but only one thread at a time. Images are bit-identical across calls and
+    processes with the same OpenGL driver (see `gl_info`). Call `mj_forward` after changing the data.
 
     Raises:
-        RenderError: Raised by all drawing methods for an unknown camera, an invalid marker, data of another model, or
-            a closed renderer.
+        RenderError: Raised by all drawing methods for an unknown camera, an invalid marker, data of another
+            model, or a closed renderer.
     """
 
     @property
@@ -92,12 +92,12 @@ class Renderer(OffScreenRenderer):
     def rgb(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.uint8]:
-        """Draw a contiguous colour image of shape (height, width, 3), rows from the top.
+        """Draw a colour image as a contiguous array of shape (height, width, 3), with the top row first.
 
         Args:
             data: State of the renderer's model.
             camera: Name of a camera of the model, or a pose.
-            markers: Markers to draw. Geoms in front hide all except x-ray markers.
+            markers: Markers to draw. A marker behind a geom is hidden unless it is an x-ray marker.
         """
         with context.current_context():
             view = self._look(data, camera)
@@ -106,15 +106,15 @@ class Renderer(OffScreenRenderer):
     def depth(
         self, data: Any, camera: str | CameraPose = EYE, markers: Sequence[MarkerLike] = ()
     ) -> NDArray[np.float32]:
-        """Draw distances along the optical axis in metres, shape (height, width), inf for the background.
+        """Draw a depth image (height, width) of distances along the optical axis in metres.
 
-        Glass and markers count as solid."""
+        The background is inf. Glass and markers count as opaque."""
         with context.current_context():
             view = self._look(data, camera)
             return view.metres(self._rasteriser.geometry(view, markers)[1])
 
     def segmentation(self, data: Any, camera: str | CameraPose = EYE) -> NDArray[np.int32]:
-        """Draw geom ids, shape (height, width), -1 for the background. Glass counts as solid."""
+        """Draw an image (height, width) of geom ids, with -1 for the background. Glass counts as opaque."""
         with context.current_context():
             return self._rasteriser.geometry(self._look(data, camera))[0]
 
@@ -128,9 +128,9 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> Frame:
-        """Draw several images of the same moment, with depth and segmentation in one pass.
+        """Draw several types of images of the same moment. Depth and segmentation share one pass.
 
-        Markers are drawn only into the colour image."""
+        Markers appear only in the colour image."""
         (frame,) = self.frames(data, (camera,), markers, rgb=rgb, depth=depth, segmentation=segmentation)
         return frame
 
@@ -144,7 +144,7 @@ class Renderer(OffScreenRenderer):
         depth: bool = False,
         segmentation: bool = False,
     ) -> tuple[Frame, ...]:
-        """Draw the same moment from several cameras."""
+        """Draw images of the same moment from several cameras."""
         poses = [camera_pose(self._model, data, camera, self.width / self.height) for camera in cameras]
         with context.current_context():
             self._rasteriser.update(data)
@@ -160,7 +160,7 @@ class Renderer(OffScreenRenderer):
         return Frame(pose, colour, metres, ids if segmentation else None)
 
     def camera_pose(self, data: Any, camera: str | CameraPose = EYE) -> CameraPose:
-        """Return the pose of a camera. Raise a RenderError if it is unknown."""
+        """Return the pose of a camera. Raise a RenderError if the model has no such camera."""
         return camera_pose(self._model, data, camera, self.width / self.height)
 
     def _look(self, data: Any, camera: str | CameraPose) -> ViewVolume:
@@ -169,11 +169,11 @@ class Renderer(OffScreenRenderer):
 
 
 class LayeredRenderer(OffScreenRenderer):
-    """Draws a model off-screen, several times as fast as a `Renderer` while the camera is stationary.
+    """An off-screen renderer that is several times as fast as `Renderer` while the camera is stationary.
 
-    Moving geoms and markers are drawn over a cached image of stationary geoms, according to their depth. Moving geoms
-    behind others show faintly, as x-ray markers do. The cache is not used with shadow maps, reflections or
-    multisampling, or while a translucent geom moves.
+    It caches an image of the stationary geoms, and draws moving geoms and markers over this image where they
+    are nearer. Moving geoms behind other geoms show faintly, like x-ray markers. The cache is not used with
+    shadow maps, reflections or multisampling, or while a translucent geom moves.
     """
 
     def __init__(self, model: Any, **options: Any) -> None:
@@ -182,13 +182,13 @@ class LayeredRenderer(OffScreenRenderer):
         self._layered = not (profile.shadow_size or profile.reflections or profile.samples)
         self._camera: CameraPose | None = None
         self._translucent = _translucent(model)
-        self._still = np.full(model.ngeom, REST)  # number of frames since each geom moved
+        self._still = np.full(model.ngeom, REST)  # number of frames since each geom last moved
         self._poses = np.full((model.ngeom, 12), np.nan)
         self._moving: NDArray[np.bool_] | None = None
         self._rest: Layer | None = None
 
     def rgb(self, data: Any, camera: CameraPose, markers: Sequence[MarkerLike] = ()) -> NDArray[np.uint8]:
-        """Draw a colour image (height, width, 3). Pass the same `camera` object while the camera is stationary."""
+        """Draw a colour image (height, width, 3). Pass the same `camera` object until the camera moves."""
         with context.current_context():
             self._rasteriser.update(data)
             view, still = ViewVolume.of(camera), camera is self._camera
@@ -213,7 +213,7 @@ class LayeredRenderer(OffScreenRenderer):
         view: ViewVolume,
         markers: Sequence[MarkerLike],
     ) -> None:
-        """Blend translucent markers into a drawing in place. Opaque copies of them provide the depth."""
+        """Blend translucent markers into `frame` in place. Opaque copies are drawn to obtain their depth."""
         for opacity in sorted({marker.rgba[3] for marker in markers if marker.rgba[3] < 1.0}):
             solid = [_Solid(marker) for marker in markers if marker.rgba[3] == opacity]
             layer = self._rasteriser.layer(view, solid, hidden=np.ones_like(self._translucent))

@@ -1,4 +1,4 @@
-"""Settings of MuJoCo's renderer: drawn geoms, lights, effects and buffer sizes."""
+"""Settings of MuJoCo's renderer: visible geoms, lights, effects and buffer sizes."""
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,15 +16,15 @@ _Flag = mujoco.mjtRndFlag
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Directional light that replaces the model's lights."""
+    """A directional light that replaces the lights of a model."""
 
-    direction: tuple[float, float, float]  # direction of the rays, need not be normalized
-    diffuse: float  # intensity on a perpendicular surface
-    ambient: float = 0.0  # intensity on all surfaces
+    direction: tuple[float, float, float]  # direction of the light rays, a vector of any length
+    diffuse: float  # intensity of the light on a surface perpendicular to the rays
+    ambient: float = 0.0  # intensity of the light on all surfaces
 
 
 def checked_size(pixels: int) -> int:
-    """Return a frame's width or height. Raise a RenderError if it is not an integer from 1 to `MAX_SIDE`."""
+    """Return `pixels` as an int. Raise a RenderError if it is not an integer from 1 to `MAX_SIDE`."""
     if not isinstance(pixels, int | np.integer) or not 1 <= pixels <= MAX_SIDE:
         raise RenderError(f"frame sides must be integers from 1 to {MAX_SIDE} pixels, got {pixels!r}")
     return int(pixels)
@@ -43,7 +43,7 @@ def visual_option(groups: Collection[int], profile: RenderProfile) -> Any:
 
 @contextmanager
 def buffer_settings(model: Any, size: tuple[int, int], samples: int, shadow_size: int) -> Iterator[None]:
-    """Temporarily set the buffer sizes in a model, from which a new MuJoCo context reads them."""
+    """Set the buffer sizes that a new MuJoCo context reads from the model, and restore them afterwards."""
     general, quality = model.vis.global_, model.vis.quality
     kept = general.offwidth, general.offheight, quality.offsamples, quality.shadowsize
     general.offwidth, general.offheight = size

@@ -1,7 +1,7 @@
-"""Contact shadows: soft dark spots under free objects near the floor, as a fast replacement for shadow maps.
+"""Contact shadows, which are soft dark spots under objects near the floor. They replace slower shadow maps.
 
-A spot is a flat box with a soft round texture, added to the scene for one frame. It is as wide as the object above it,
-and fades as the object is lifted. It affects neither depth nor segmentation.
+A spot is a flat box with a soft round texture that is added to the scene for one frame. It is slightly wider
+than the object above it and fades as the object is lifted. It affects neither depth nor segmentation images.
 """
 
 from typing import Any
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from mjsim.render.cameras import ViewVolume, outside
 from mjsim.render.markers import add_decorative_geom
 
-# Material with a round texture whose alpha fades outwards. Houses without it have no contact shadows.
+# Name of a material with a round texture that fades outwards. Houses without it have no contact shadows.
 MATERIAL = "shadow_round"
-BORDER = 0.05  # width of a spot beyond the object in metres, because the texture is faint at the edge
-# Height of a spot above the object's lowest point, in metres. Spots must be above rugs (at most 5 mm, docs/models.md),
-# and below the bottom of a plate (7 mm).
+BORDER = 0.05  # distance in metres by which a spot extends beyond its object, because its edges are faint
+# Height of a spot above the object's lowest point, in metres. Spots must be above rugs (at most 5 mm, see
+# docs/models.md) and below the bottom of a plate (7 mm).
 LIFT = 0.006
 _THICKNESS = 1e-4
 REACH = 0.3  # height above which an object has no contact shadow, in metres
 
 
 class ContactShadows:
-    """Contact shadows of the free bodies of a model. `shown` is a mask of drawn geoms, shape (ngeom,)."""
+    """Contact shadows of the free bodies in a model. `shown` is a mask (ngeom,) of the geoms to draw."""
 
     def __init__(self, model: Any, shown: NDArray[np.bool_]) -> None:
         free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
@@ -39,7 +39,7 @@ class ContactShadows:
 
     @property
     def count(self) -> int:
-        """Maximum number of geoms that `add` appends."""
+        """The maximum number of geoms that `add` appends."""
         return len(self._starts)
 
     def add(
@@ -50,12 +50,12 @@ class ContactShadows:
         positions: NDArray[np.float64],
         rotations: NDArray[np.float64],
     ) -> None:
-        """Append the visible spots to a scene that has room for `count` more geoms."""
+        """Append all visible spots to a scene, which must have space for `count` more geoms."""
         if not len(self._starts) or self._material < 0:
             return
         low, high = self._boxes(positions[self._geoms], rotations[self._geoms])
         middle, half = (low + high) / 2, (high - low) / 2
-        height = np.maximum(low[:, 2], 0.0)  # boxes of tilted meshes extend into the floor
+        height = np.maximum(low[:, 2], 0.0)  # the bounding box of a tilted mesh may extend into the floor
         strength = np.clip(1.0 - height / REACH, 0.0, 1.0)
         centres = np.column_stack((middle[:, :2], height + LIFT))
         radii = np.hypot(half[:, 0], half[:, 1]) + 2 * BORDER
@@ -67,7 +67,7 @@ class ContactShadows:
         self, scene: Any, centre: NDArray[np.float64], half: NDArray[np.float64], strength: float
     ) -> None:
         rgba = (self._rgba * [1.0, 1.0, 1.0, strength]).astype(np.float32)
-        # A box, because the rasteriser draws translucent planes, such as rugs, before everything translucent.
+        # MuJoCo draws translucent planes such as rugs before other translucent geoms, so the spot is a box.
         box = mujoco.mjtGeom.mjGEOM_BOX
         geom = add_decorative_geom(scene, box, np.array([*half, _THICKNESS]), centre, rgba)
         geom.matid, geom.texcoord = self._material, 0

@@ -1,1 +1,1 @@
-"""Helpers used by all packages: files, compiled kernels, and the Python environment."""
+"""Utilities for files, compiled kernels and the Python environment."""

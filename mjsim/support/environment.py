@@ -1,4 +1,4 @@
-"""Checks of the Python environment: conflicting packages and the OpenGL backend."""
+"""Check for conflicting Python packages, and choose the OpenGL backend."""
 
 import importlib.util
 import os
@@ -8,16 +8,16 @@ from pathlib import Path
 
 PACKAGES = ("planner", "hud", "experiments")
 VARIABLE = "MUJOCO_GL"
-POSTPONED = "MJSIM_GL"  # environment variable that stores the value of MUJOCO_GL before `postpone_gl`
+POSTPONED = "MJSIM_GL"  # environment variable with the original value of MUJOCO_GL
 BACKENDS = ("egl", "osmesa", "glfw", "cgl")
 EGL_PACKAGES = ("libegl1", "libgl1", "libgles2", "libegl-mesa0", "libgl1-mesa-dri")
 DISABLED = ("disable", "disabled", "off", "false", "0")
-ENABLED = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL that let MuJoCo choose a backend
+ENABLED = ("enable", "enabled", "on", "true", "1")  # values of MUJOCO_GL with which MuJoCo chooses a backend
 DEFAULT = "egl"
 
 
 def hidden_package(name: str) -> str | None:
-    """Return how to correct the import of a package, or None if Python finds this project's package."""
+    """Return an error message if another package hides this project's package, or None."""
     own = Path(__file__).resolve().parents[2] / name
     spec = importlib.util.find_spec(name)
     folders = list(spec.submodule_search_locations or ()) if spec else []
@@ -33,7 +33,7 @@ def hidden_package(name: str) -> str | None:
 
 
 def shared_names() -> tuple[str, ...]:
-    """Return advice for each other distribution that installs a package with one of this project's names."""
+    """Return a warning for each distribution whose packages have the same names as those of this project."""
     installed = metadata.packages_distributions()
     return tuple(
         f"the distribution {other} installs a package {name} too: pip uninstall {other}, or install mjsim in an "
@@ -44,10 +44,10 @@ def shared_names() -> tuple[str, ...]:
 
 
 def postpone_gl() -> None:
-    """Prevent MuJoCo from loading OpenGL at import, in this process and its children.
+    """Prevent MuJoCo from loading OpenGL when it is imported, in this process and its child processes.
 
-    If `MUJOCO_GL` is unset, MuJoCo would load GLFW, which starts another Python process to inspect its library.
-    OpenGL is loaded when something is drawn.
+    Without this function and `MUJOCO_GL`, MuJoCo would load GLFW, which starts another Python process to
+    inspect its library. With it, OpenGL is loaded when the first image is drawn.
     """
     choice = os.environ.get(VARIABLE, "") or DEFAULT
     if choice.lower().strip() not in DISABLED and "mujoco" not in sys.modules:
@@ -55,6 +55,6 @@ def postpone_gl() -> None:
 
 
 def chosen_gl() -> str:
-    """Return the OpenGL backend that was requested before `postpone_gl`, in lower case."""
+    """Return the name of the OpenGL backend that `MUJOCO_GL` requested, or the default backend."""
     choice = (os.environ.get(POSTPONED) or os.environ.get(VARIABLE) or DEFAULT).lower().strip()
     return DEFAULT if choice in ENABLED else choice

@@ -1,7 +1,7 @@
-"""Size-limited reading, atomic writing, and digests of source code.
+"""Read files with a size limit, write files atomically, and compute digests of source code.
 
-Temporary files and folders are created next to their final path, with names that begin with `WORK`. Leftovers of
-killed processes are removed after a day, when another process writes into the same folder.
+Temporary files and folders are created next to their final path, and their names begin with `WORK`. Those of
+a killed process are removed after a day, as soon as another process writes to the same folder.
 """
 
 import contextlib
@@ -21,37 +21,37 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-MAX_INPUT = 256_000_000  # size limit of input files, in bytes
-# Timeouts for the next part of a stream and for the whole stream, in seconds
+MAX_INPUT = 256_000_000  # maximum size of input files, in bytes
+# Timeouts for the next part of a stream and for the whole stream, in seconds.
 MAX_SILENCE, MAX_WAIT = 8.0, 60.0
 WORK = ".mjsim-work-"
-MAX_AGE = 24 * 3600  # age at which temporary files of killed processes are removed, in seconds
+MAX_AGE = 24 * 3600  # age after which leftover temporary files are removed, in seconds
 
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # constants of Linux's renameat2
-ROOT = Path(__file__).parents[2]  # folder that contains the packages
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # constants for Linux's renameat2 call
+ROOT = Path(__file__).parents[2]  # folder that contains all packages
 PACKAGES = ("experiments", "hud", "mjsim", "planner")
 
 
 def check_input(path: Path) -> None:
-    """Raise an OSError if a path is a pipe or device, or a file larger than `MAX_INPUT`."""
+    """Raise an OSError if a path is a pipe, a device, or a file that is larger than `MAX_INPUT`."""
     found = path.stat()
     if not (
         stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)
-    ):  # opening a folder raises its own error
+    ):  # opening a folder later raises a clearer error
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     if found.st_size > MAX_INPUT:
         raise OSError(errno.EFBIG, f"larger than {MAX_INPUT // 10**6} MB", str(path))
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file. Raise an OSError if it is missing, too large, or not a regular file."""
+    """Read a binary file. Raise an OSError if it is missing, too large or not a regular file."""
     check_input(path)
     with path.open("rb") as file:
         return file.read(MAX_INPUT)
 
 
 def read_stream(stream: int) -> bytes:
-    """Read a file descriptor, such as a pipe, to its end. Raise an OSError if it is too large or times out."""
+    """Read all data from a file descriptor. Raise an OSError on a timeout or if there is too much data."""
     text, ends = bytearray(), time.monotonic() + MAX_WAIT
     while True:
         silence = min(MAX_SILENCE, ends - time.monotonic())
@@ -65,12 +65,12 @@ def read_stream(stream: int) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Read a UTF-8 file, with or without a byte order mark. Raise an OSError if that fails."""
+    """Read a UTF-8 text file. Raise an OSError or a UnicodeDecodeError if that fails."""
     return read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
 
 
 def read_json(text: str) -> Any:
-    """Parse strict JSON. Raise a ValueError for a repeated key, NaN or infinity."""
+    """Parse strict JSON. Raise a ValueError if it contains a repeated key, NaN or infinity."""
     return json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_reject_constant)
 
 
@@ -88,10 +88,10 @@ def _reject_constant(constant: str) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path next to `path`. Rename it to `path` on success, otherwise remove it.
+    """Replace a file atomically. Yield a temporary path, which is renamed to `path` on success.
 
-    The temporary path has the same suffix, because image and video encoders derive the format from it. Symbolic links
-    are followed.
+    If an exception is raised, the temporary file is removed. It has the same suffix as `path`, because image
+    and video encoders derive the format from the suffix. Symbolic links are followed.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -115,7 +115,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def work_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new folder inside `parent`. Remove it afterwards unless it was moved."""
+    """Yield a new temporary folder inside `parent`, which is removed afterwards unless it has been moved."""
     _tidy(parent, _today())
     folder = Path(tempfile.mkdtemp(dir=parent, prefix=f"{WORK}{os.getpid()}-"))
     try:
@@ -128,7 +128,7 @@ def work_folder(parent: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-@functools.lru_cache(maxsize=64)  # each process scans a folder only once a day
+@functools.lru_cache(maxsize=64)  # each process scans a folder once a day
 def _tidy(folder: Path, _day: int) -> None:
     remove_leftovers(folder)
 
@@ -138,11 +138,11 @@ def _today() -> int:
 
 
 def remove_leftovers(folder: Path, max_age: float = MAX_AGE, prefix: str = WORK) -> None:
-    """Remove temporary files and folders that have not changed for `max_age` seconds."""
+    """Remove temporary files and folders that have not changed for at least `max_age` seconds."""
     with os.scandir(folder) as entries:
         paths = [Path(entry) for entry in entries if entry.name.startswith(prefix)]
     for path in paths:
-        with contextlib.suppress(OSError):  # another process may remove it first
+        with contextlib.suppress(OSError):  # another process may remove the path first
             changed = max(part.lstat().st_mtime for part in (path, *path.rglob("*")))
             if time.time() - changed < max_age:
                 continue
@@ -158,12 +158,12 @@ def write_text_atomically(path: Path, text: str) -> None:
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Swap two paths on the same file system, atomically if the file system supports it."""
+    """Swap two files or folders on one file system. The swap is atomic if the file system supports it."""
     libc, names = ctypes.CDLL(None, use_errno=True), (os.fsencode(one), os.fsencode(other))
     if libc.renameat2(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
         return
     error = ctypes.get_errno()
-    if error not in (errno.EINVAL, errno.ENOSYS):  # the file system cannot exchange
+    if error not in (errno.EINVAL, errno.ENOSYS):  # these two mean that swapping is not supported
         raise OSError(error, os.strerror(error), str(one), None, str(other))
     with work_folder(one.parent) as aside:
         other.rename(aside / "other")
@@ -172,7 +172,7 @@ def exchange(one: Path, other: Path) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Return True if a path is an existing file. Invalid paths, such as those with a null character, give False."""
+    """Return True if a path is an existing file. Invalid paths give False instead of an error."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -181,12 +181,12 @@ def is_file(path: Path) -> bool:
 
 @functools.cache
 def source_digest(*places: str) -> str:
-    """Return a digest of Python modules and folders, given relative to `ROOT`. By default, of all packages."""
+    """Return a digest of the Python files at the given paths below `ROOT`, or in all packages by default."""
     return digest_of(*(ROOT / place for place in places or PACKAGES))
 
 
 def digest_of(*places: Path) -> str:
-    """Return 16 hexadecimal digits that identify the relative paths and contents of Python files."""
+    """Return a digest with 16 hexadecimal digits of the paths and contents of files."""
     digest = hashlib.sha256()
     for place in places:
         for path in [place] if place.is_file() else sorted(place.rglob("*.py")):

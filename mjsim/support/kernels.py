@@ -19,17 +19,17 @@ from mjsim.support.files import ROOT, digest_of
 F = TypeVar("F", bound=Callable[..., Any])
 
 MARK = b"@kernel\n"
-UNUSED = 30 * 24 * 3600  # age at which unused machine code is deleted, in seconds
+UNUSED = 30 * 24 * 3600  # age after which unused cache folders are deleted, in seconds
 
-# Division by zero gives infinity or NaN, as in NumPy. Raising exceptions instead would make trials a tenth slower.
+# As in NumPy, division by zero gives infinity or NaN. Raising an exception would make trials 10% slower.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _IMPORT = re.compile(r"^from ((?:mjsim|planner|experiments)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 
 
 def kernel(function: F) -> F:
-    """Compile a function at its first call, or load its machine code from the disk cache.
+    """Compile a function when it is first called, or load its machine code from the disk cache.
 
-    Without a writable cache folder, each process compiles the function again.
+    If the cache folder is not writable, each process compiles the function again.
     """
     import numba
 
@@ -37,16 +37,16 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Inline a function into each kernel that calls it. Use this for small functions with many array arguments."""
+    """Inline a function into the kernels that call it. Use this for small functions with many arguments."""
     import numba
 
     return cast(F, numba.njit(forceinline=True, **_OPTIONS)(function))
 
 
 def c_function(signature: str, function: Callable[..., Any]) -> Any:
-    """Compile a function of numbers to a C callback. `signature` has numba's syntax, such as `float64(int64)`.
+    """Compile a Python function to a C callback with a numba signature such as `float64(int64)`.
 
-    The function pointer is the result's attribute `ctypes`. It is valid as long as the result exists.
+    The attribute `ctypes` of the result is the function pointer. It is valid as long as the result exists.
     """
     import numba
 
@@ -58,10 +58,10 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
     folder, chosen = cache_folder(Path(function.__code__.co_filename)), config.CACHE_DIR
     if folder is not None:
-        config.CACHE_DIR = str(folder)  # numba reads it while decorating
+        config.CACHE_DIR = str(folder)  # numba reads this setting when the decorator is applied
         try:
             return compiler(cache=True)(function)
-        except RuntimeError:  # numba cannot cache it
+        except RuntimeError:  # numba cannot cache this function
             pass
         finally:
             config.CACHE_DIR = chosen
@@ -69,17 +69,17 @@ def _cached(compiler: Callable[..., Any], function: Callable[..., Any]) -> Any:
 
 
 def cache_base() -> Path:
-    """Return the parent of all cache folders: `NUMBA_CACHE_DIR` if set, otherwise the user's cache folder."""
+    """Return the parent of all cache folders, which is `NUMBA_CACHE_DIR` or the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     return Path(chosen) if chosen else user_cache_path("mjsim", appauthor=False)
 
 
 @functools.cache
 def cache_folder(source: Path) -> Path | None:
-    """Return the folder for the machine code of a module's kernels, or None if it is not writable.
+    """Return the cache folder for a module's compiled kernels, or None if it is not writable.
 
-    Its name contains a digest of all modules that the kernels use. numba itself detects changes in a kernel's own
-    file, but not in other kernels that it calls.
+    The name of the folder contains a digest of all modules that the kernels use. numba itself detects changes
+    in the file of a kernel, but not in other kernels that it calls.
     """
     base = cache_base()
     try:

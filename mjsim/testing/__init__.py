@@ -1,4 +1,4 @@
-"""Golden-frame comparison for tests of rendered images (docs/hud.md)."""
+"""Compare rendered images with golden frames in tests (docs/hud.md)."""
 
 import lazy_loader
 

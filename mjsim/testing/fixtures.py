@@ -1,4 +1,4 @@
-"""Pytest fixtures to import in a `conftest.py`."""
+"""Pytest fixtures that can be imported in a `conftest.py` file."""
 
 import re
 from collections.abc import Callable
@@ -15,10 +15,11 @@ GoldenFrame = Callable[..., Comparison]
 
 @pytest.fixture
 def golden_frame(request: pytest.FixtureRequest, tmp_path: Path) -> GoldenFrame:
-    """Return a function that compares a frame with `golden/<name>.png` next to the test file or in a parent folder.
+    """Return a function that compares a frame with the file `golden/<name>.png` near the test file.
 
-    `golden_frame(frame)` uses the name of the test, and `golden_frame(frame, "hall")` the name `hall`. Keyword
-    arguments are passed to `mjsim.testing.compare_frame`. Images of a failed comparison are written to `tmp_path`.
+    The folder `golden` is next to the test file or in a parent folder. `golden_frame(frame)` uses the name of
+    the test, and `golden_frame(frame, "hall")` uses the name `hall`. Keyword arguments are passed to
+    `mjsim.testing.compare_frame`. Images of a failed comparison are written to `tmp_path`.
     """
 
     def compare(frame: NDArray[np.uint8], name: str | None = None, **options: object) -> Comparison:

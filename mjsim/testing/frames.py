@@ -1,7 +1,7 @@
-"""Golden frames: stored images with which tests compare rendered frames.
+"""Golden frames, which are stored images that tests compare with rendered frames.
 
-`name.json` next to `name.png` contains a SHA-256 hash of the frame for each known OpenGL driver. On a known driver all
-pixels must be equal. On other drivers, the PSNR must exceed a limit.
+The file `name.json` next to `name.png` contains a SHA-256 hash of the frame for each known OpenGL driver. On
+a known driver, all pixels must be equal. On other drivers, the PSNR must exceed a limit.
 """
 
 import hashlib
@@ -22,24 +22,24 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import MjsimError
 
 UPDATE_VARIABLE = "MJSIM_UPDATE_GOLDEN"
-CLOSE_ENOUGH = 45.0  # default PSNR limit in dB
-_GAIN = 4  # factor that makes small differences visible
+CLOSE_ENOUGH = 45.0  # default minimum PSNR in dB
+_GAIN = 4  # contrast factor of difference images
 
 Image = NDArray[np.uint8]
 
 
 class FrameMismatchError(MjsimError, AssertionError):
-    """A frame differs from its golden frame, or the golden frame is missing."""
+    """Raised if a frame differs from its golden frame, or if the golden frame is missing."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Result of comparing a frame with its golden frame.
+    """The result of comparing a frame with its golden frame.
 
     Attributes:
         exact: True if all pixels are equal.
         known_driver: True if a hash is stored for this driver.
-        psnr: Peak signal-to-noise ratio in dB, or inf if all pixels are equal.
+        psnr: Peak signal-to-noise ratio in dB, which is inf if all pixels are equal.
         updated: True if the frame was stored as the golden frame.
     """
 
@@ -58,17 +58,18 @@ def compare_frame(
     output: str | Path | None = None,
     close_enough: float = CLOSE_ENOUGH,
 ) -> Comparison:
-    """Compare a frame with the golden frame at `golden`.
+    """Compare a frame with a golden frame.
 
     Args:
-        frame: RGB, uint8, shape (height, width, 3).
-        golden: PNG file. Its hashes are stored next to it as JSON.
-        key: Identifier of the driver and libraries that drew the frame. By default `driver_key()`. Use `drawing_key()`
-            for frames that were drawn without OpenGL.
+        frame: RGB image, uint8, shape (height, width, 3).
+        golden: Path of the golden frame, a PNG file. Its hashes are stored next to it as JSON.
+        key: Identifier of the driver and libraries that drew the frame. The default is `driver_key()`. Use
+            `drawing_key()` for frames that were drawn without OpenGL.
         update: True to store the frame as the golden frame. By default, True if the environment variable
             `MJSIM_UPDATE_GOLDEN` is set and not 0. Review stored frames before you commit them.
-        output: Folder for the actual, expected and difference images of a failure. By default a temporary folder.
-        close_enough: PSNR limit in dB if no hash is stored for `key`.
+        output: Folder for the actual, expected and difference images of a failure, by default a temporary
+            one.
+        close_enough: Minimum PSNR in dB if no hash is stored for `key`.
 
     Raises:
         FrameMismatchError: The frame differs, or the golden frame is missing. The message lists the images.
@@ -98,18 +99,18 @@ def compare_frame(
 
 
 def driver_key() -> str:
-    """Return an identifier of the OpenGL driver, OpenCV and the CPU, all of which affect a frame's pixels."""
+    """Return an identifier of the OpenGL driver, OpenCV and the CPU, which affect the pixels of a frame."""
     gl = gl_info()
     return f"{gl.renderer} | {gl.version} | {drawing_key()}"
 
 
 def drawing_key() -> str:
-    """Return an identifier of OpenCV and the CPU's vector instructions, which affect rounding in text and images."""
+    """Return an identifier of OpenCV and the CPU, which affect the rounding of drawn text and images."""
     return f"OpenCV {cv2.__version__} | {platform.machine()} {cv2.getCPUFeaturesLine()}"
 
 
 def psnr(a: Image, b: Image) -> float:
-    """Return the peak signal-to-noise ratio of two images in dB: inf if equal, -inf if their shapes differ."""
+    """Return the peak signal-to-noise ratio of two images in dB, or -inf if their shapes differ."""
     if a.shape != b.shape:
         return float("-inf")
     error = float(np.mean((a.astype(np.float64) - b) ** 2))
@@ -117,7 +118,7 @@ def psnr(a: Image, b: Image) -> float:
 
 
 def difference_image(a: Image, b: Image) -> Image:
-    """Return the absolute difference of two images of equal shape, multiplied by four."""
+    """Return the absolute difference of two images with the same shape, multiplied by four."""
     apart = np.abs(a.astype(np.int16) - b)
     return np.asarray(np.minimum(_GAIN * apart, 255), dtype=np.uint8)
 
@@ -162,7 +163,7 @@ def _hashes(golden: Path) -> Mapping[str, str]:
 
 
 def _store(frame: Image, path: Path, key: str) -> None:
-    # A changed image invalidates the hashes of other drivers.
+    # If the image has changed, the hashes of other drivers are no longer valid.
     same = path.is_file() and np.array_equal(_read(path), frame)
     hashes = {**(_hashes(path) if same else {}), key: _digest(frame)}
     if not same:

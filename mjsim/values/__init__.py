@@ -1,1 +1,1 @@
-"""Immutable values shared by all packages, and the exceptions of `mjsim`."""
+"""Immutable data types and exceptions that all packages share."""

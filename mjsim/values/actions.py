@@ -1,4 +1,4 @@
-"""Actions of the person, their results, and the events that they cause."""
+"""Actions of the person, their results, and events that they cause."""
 
 import enum
 import math
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from mjsim.values.errors import ActionError
 
-TIME_TOLERANCE = 1e-6  # tolerance in seconds for comparing times, which accumulate rounding errors
+TIME_TOLERANCE = 1e-6  # tolerance for comparing simulated times, in seconds
 
 
 @dataclass(frozen=True)
 class Move:
-    """Walk, turn and look for one control step. Velocities are in the person's own frame.
+    """An action that walks, turns and looks for one control step, with velocities in the body frame.
 
     Attributes:
         forward: Velocity along the heading, in m/s.
@@ -40,10 +40,10 @@ class Move:
 
 @dataclass(frozen=True)
 class Pick:
-    """Reach for an object and take it into a free hand.
+    """An action that picks up an object with a free hand.
 
     Attributes:
-        object: Instance name. None for the nearest object in reach.
+        object: Instance name of the object, or None for the nearest object in reach.
 
     Raises:
         ActionError: The name is not printable text.
@@ -57,10 +57,10 @@ class Pick:
 
 @dataclass(frozen=True)
 class Place:
-    """Put a carried object into its receptacle.
+    """An action that places a carried object in its receptacle.
 
     Attributes:
-        object: Instance name. None for the carried object with the nearest receptacle.
+        object: Instance name of the object, or None for the carried object with the nearest receptacle.
 
     Raises:
         ActionError: The name is not printable text.
@@ -79,17 +79,17 @@ def _check_name(name: str | None) -> None:
 
 @dataclass(frozen=True, eq=False)
 class FollowPath:
-    """Walk along a path while avoiding objects on the floor, then face the goal and pick or place.
+    """An action that walks along a path, avoids objects on the floor, and then picks or places an object.
 
     Attributes:
-        points: Floor polyline in metres, shape (k, 2), k >= 1.
-        goal: Position of the object or receptacle that the path leads to, in metres, shape (2,). It may be off the
-            path.
-        stop_distance: Distance from the goal in metres at which the walk ends, unless the path ends before.
-        then: Action after the person has turned to the goal. With None, the person neither turns nor acts.
-        until: Simulated time at which to stop, in seconds. None to walk to the end.
-        shown: True if the HUD shows the path. The part behind the person is removed.
-        tolerance: Distance from the path at which the walk stops, in metres.
+        points: Points of the path on the floor in metres, shape (k, 2), k >= 1.
+        goal: Position of the object or receptacle to which the path leads, in metres, shape (2,). It need not
+            be on the path.
+        stop_distance: Distance to the goal at which the walk ends, in metres, unless the path ends earlier.
+        then: Action that follows after the person has turned to the goal, or None to stop without turning.
+        until: Simulated time at which the person stops, in seconds, or None to walk to the end.
+        shown: True if the HUD shows the part of the path that lies ahead.
+        tolerance: Distance to the path beyond which the walk stops, in metres.
 
     Raises:
         ActionError: The points or the goal have a wrong shape, or a number is not finite.
@@ -104,7 +104,7 @@ class FollowPath:
     tolerance: float = 0.4
 
     def __post_init__(self) -> None:
-        try:  # kernels accept only float arrays
+        try:  # compiled kernels accept only float arrays
             for name in ("points", "goal"):
                 object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), np.float64))
         except (TypeError, ValueError) as error:
@@ -121,10 +121,10 @@ class FollowPath:
 
 @dataclass(frozen=True)
 class Wait:
-    """Stand still until the current pick or place ends. If there is none, stand still until a given time.
+    """An action that waits until the current pick or place ends, or until a given time if there is none.
 
     Attributes:
-        until: Simulated time at which to stop, in seconds. None for one control step.
+        until: Simulated time at which waiting ends, in seconds, or None for one control step.
 
     Raises:
         ActionError: The time is not a number.
@@ -142,13 +142,13 @@ StepAction = Move | Pick | Place
 Action = StepAction | FollowPath | Wait
 
 IDLE = Move()
-"""Action that stands still for one control step."""
+"""An action with which the person stands still for one control step."""
 WAIT = Wait()
-"""Wait for the current pick or place to end, or for one control step if there is none."""
+"""An action that waits until the current pick or place ends, or for one control step if there is none."""
 
 
 class Refusal(enum.Enum):
-    """Reason why a pick or place is infeasible. A refused action does not change the world (PAPER section 3.2)."""
+    """A reason why a pick or place is refused, which leaves the world unchanged (PAPER section 3.2)."""
 
     BUSY = "busy"
     NOTHING_IN_REACH = "nothing_in_reach"
@@ -165,11 +165,11 @@ class Refusal(enum.Enum):
 
 @dataclass(frozen=True)
 class ActionResult:
-    """Result of a `Pick` or `Place`, reported in its first control step.
+    """The result of a `Pick` or `Place`, which is reported in its first control step.
 
     Attributes:
         action: The requested action.
-        refusal: None if the motion has started, otherwise the reason why it has not.
+        refusal: Reason why the action was refused, or None if the motion has started.
         object: Instance name of the affected object, if any.
         receptacle: Key of the affected receptacle, if any.
     """
@@ -185,7 +185,7 @@ class ActionResult:
 
 
 class EventKind(enum.Enum):
-    """Type of a physical event: outcome of a pick or place, lost or displaced object, or anomaly (docs/metrics.md)."""
+    """A type of physical event. The types are described in docs/metrics.md."""
 
     PICKED = "picked"
     PICK_FAILED = "pick_failed"
@@ -198,11 +198,11 @@ class EventKind(enum.Enum):
 
 
 class Stop(enum.Enum):
-    """Reason why a multi-step action stopped."""
+    """A reason why an action with several control steps stopped."""
 
     DONE = "done"  # the action is complete
-    ARRIVED = "arrived"  # the path is complete, and the next step executes `FollowPath.then`
-    BLOCKED = "blocked"  # the walk makes no progress
+    ARRIVED = "arrived"  # the walk is complete, and `FollowPath.then` follows in the next step
+    BLOCKED = "blocked"  # the walk does not make progress
     CHANGED = "changed"  # the person has left the path, or an object has moved
     EVENT = "event"  # a `WorldEvent` occurred
     DUE = "due"  # the requested time or the maximum number of control steps is reached
@@ -210,9 +210,9 @@ class Stop(enum.Enum):
 
 @dataclass(frozen=True)
 class WorldEvent:
-    """A physical event."""
+    """A physical event, such as a picked or dropped object."""
 
-    time: float  # simulated time in seconds
+    time: float  # simulated time of the event, in seconds
     kind: EventKind
-    object: str  # instance name
-    receptacle: str | None = None  # receptacle key, if any
+    object: str  # instance name of the object
+    receptacle: str | None = None  # key of the receptacle, if any

@@ -1,4 +1,4 @@
-"""Episodes, which are disorganized houses with a start pose, and their JSON files."""
+"""Episodes, which consist of a disorganized house and a start pose, and their JSON format."""
 
 import dataclasses
 import json
@@ -13,13 +13,13 @@ from mjsim.support.files import read_json, read_text, write_text_atomically
 from mjsim.values.errors import EpisodeError, brief
 
 FORMAT_VERSION = 1
-CAPACITY = 2  # maximum number of objects that a person carries (PAPER section 2)
-POINTS = 40  # default number of points in a house where objects may be dropped
+CAPACITY = 2  # maximum number of objects that a person can carry (PAPER section 2)
+POINTS = 40  # default number of points in a house where objects can be dropped
 
 
 @dataclass(frozen=True)
 class StartPose:
-    """Initial pose of the person: x and y in metres, heading in radians."""
+    """The initial pose of the person, with x and y in metres and the heading in radians."""
 
     x: float
     y: float
@@ -28,25 +28,25 @@ class StartPose:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A misplaced object at rest on the floor."""
+    """A misplaced object that rests on the floor."""
 
-    name: str  # instance name, unique in the episode (`object_07`)
-    category: str  # category key in the catalogue (`dishes`)
-    model: str  # object model key in the catalogue (`mug`)
-    point: tuple[float, float]  # floor point (x, y) above which the object was dropped, in metres
-    position: tuple[float, float, float]  # origin after settling, in metres
-    quaternion: tuple[float, float, float, float]  # orientation after settling, wxyz
+    name: str  # unique instance name in the episode, such as `object_07`
+    category: str  # catalogue key of the category, such as `dishes`
+    model: str  # catalogue key of the object model, such as `mug`
+    point: tuple[float, float]  # floor point (x, y) onto which the object was dropped, in metres
+    position: tuple[float, float, float]  # position of the origin after settling, in metres
+    quaternion: tuple[float, float, float, float]  # wxyz quaternion after settling
 
 
 @dataclass(frozen=True)
 class Episode:
-    """A house, its misplaced objects, their targets and the start pose (PAPER section 4).
+    """A house with misplaced objects, their target receptacles and a start pose (PAPER section 4).
 
     Attributes:
-        house: Name of the house, or the path of its catalogue.
-        objects: Misplaced objects. N objects are at the first N sampled points.
-        receptacles: Receptacle keys of the house.
-        targets: Receptacle key of each object, by instance name.
+        house: Name of the house, or path of its catalogue.
+        objects: Misplaced objects. N objects are at the first N sampled points of the house.
+        receptacles: Keys of all receptacles in the house.
+        targets: Key of the target receptacle of each object, by instance name.
     """
 
     house: str
@@ -80,19 +80,19 @@ class Episode:
                 )
 
     def to_json(self) -> str:
-        """Serialize with full float precision and a fixed order of keys."""
+        """Serialize the episode as JSON, with full float precision and a fixed order of keys."""
         return json.dumps({"format": FORMAT_VERSION, **dataclasses.asdict(self)}, indent=2) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> "Episode":
-        """Parse the output of `to_json`.
+        """Create an episode from the output of `to_json`.
 
         Raises:
             EpisodeError: The text is not JSON, its format version is unknown, or fields are missing or ill-typed.
         """
         try:
             found = msgspec.json.decode(text, type=_Header).format
-            if found is True or found != FORMAT_VERSION:  # in Python, True equals 1
+            if found is True or found != FORMAT_VERSION:  # True equals 1 in Python
                 raise EpisodeError(
                     f"episode format {found!r} is not {FORMAT_VERSION}; sample it again with this version"
                 )

@@ -1,4 +1,4 @@
-"""Objects in a person's hands (the knapsack of PAPER section 3.3)."""
+"""The objects in a person's hands (the knapsack in section 3.3 of PAPER)."""
 
 from dataclasses import dataclass, replace
 
@@ -10,7 +10,9 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True)
 class Inventory:
-    """Instance names of the objects in the hands. A free hand is None. With `capacity` 1, the left hand stays free.
+    """The instance names of the objects in a person's hands, or None for a free hand.
+
+    If `capacity` is 1, only the right hand is used.
 
     Raises:
         ActionError: Both hands hold the same object.
@@ -34,7 +36,7 @@ class Inventory:
 
     @property
     def free_hands(self) -> tuple[int, ...]:
-        """Indices of the usable free hands: 0 for left, 1 for right."""
+        """The indices of the free hands that can be used: 0 for the left hand, 1 for the right hand."""
         usable = (LEFT, RIGHT) if self.capacity > 1 else (RIGHT,)
         return tuple(hand for hand in usable if self.hands[hand] is None)
 
@@ -42,7 +44,7 @@ class Inventory:
         return self.hands.index(name) if name in self.hands else None
 
     def take(self, hand: int, name: str) -> "Inventory":
-        """Return a copy with `name` in `hand`. Raise an ActionError if the hand is full or `name` is already held."""
+        """Return a copy with an object in a hand. Raise an ActionError if the hand is not free."""
         if self.hands[hand] is not None:
             raise ActionError(
                 f"hand {hand} already holds {self.hands[hand]!r}; release it before taking {name!r}"
@@ -50,7 +52,7 @@ class Inventory:
         return replace(self, left=name) if hand == LEFT else replace(self, right=name)
 
     def release(self, name: str) -> "Inventory":
-        """Return a copy without `name`. Raise an ActionError if neither hand holds it."""
+        """Return a copy without an object. Raise an ActionError if neither hand holds the object."""
         hand = self.hand_of(name)
         if hand is None:
             raise ActionError(f"no hand holds {name!r}; the hands hold {self.hands}")

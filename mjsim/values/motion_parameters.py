@@ -1,34 +1,34 @@
-"""Parameters of a person's motions. They are named tuples because compiled kernels accept these."""
+"""Parameters of a person's motions. They are named tuples, because compiled kernels accept named tuples."""
 
 from typing import NamedTuple
 
 
 class MotionParameters(NamedTuple):
-    """Parameters of picking and placing: turning, looking, reaching, lifting, lowering and withdrawing.
+    """Parameters of the motions with which a person picks and places objects.
 
     Attributes:
-        turn_gain: Yaw rate per heading error while turning to an object or receptacle, in 1/s.
-        turn_timeout: Longest duration of such a turn, in seconds.
-        object_tolerance: Heading error at which reaching may start, in radians.
-        receptacle_tolerance: Heading error at which placing may start, in radians.
-        standing_speed: Walking speed below which the person counts as standing, in m/s.
-        standing_turn_rate: Yaw rate below which the person counts as standing, in rad/s.
-        look_gain: Share of the pitch error that the head corrects in one control step.
-        look_speed: Fastest pitch rate of the head during a motion, in rad/s.
-        reach_time: Duration of the movement from the hand's posture to the grip, in seconds.
-        align_time: Pause at the grip before the lift, in seconds.
+        turn_gain: Yaw rate per heading error while the person turns to an object or receptacle, in 1/s.
+        turn_timeout: Maximum duration of such a turn, in seconds.
+        object_tolerance: Maximum heading error at which reaching may start, in radians.
+        receptacle_tolerance: Maximum heading error at which placing may start, in radians.
+        standing_speed: Walking speed below which the person counts as standing still, in m/s.
+        standing_turn_rate: Yaw rate below which the person counts as standing still, in rad/s.
+        look_gain: Fraction of the pitch error that the head corrects in one control step.
+        look_speed: Maximum pitch rate of the head during a motion, in rad/s.
+        reach_time: Duration of the movement from the resting posture to the grip, in seconds.
+        align_time: Duration of the pause at the grip before the lift, in seconds.
         lift_time: Duration of the movement from the floor to the carrying posture, in seconds.
-        lead: Head start of the horizontal or the vertical part of a reach or lift, as a share of its duration.
-        start_time: Time for a hand to start and stop, in seconds. It is added to the distance divided by the speed.
-        least_travel: Length below which a horizontal hand movement is skipped, in metres.
+        lead: Head start of the horizontal or vertical part of a reach or lift, as a fraction of its duration.
+        start_time: Time in seconds that a hand needs to start and stop, added to distance divided by speed.
+        least_travel: Distance below which a horizontal hand movement is skipped, in metres.
         travel_speed: Speed of a loaded hand above a receptacle, in m/s.
         descent_speed: Speed of a hand that lowers a load, in m/s.
         hover_gap: Gap between a moving load and everything below it, in metres.
-        hover_time: Pause above the slot before the descent, in seconds.
+        hover_time: Duration of the pause above the slot before the descent, in seconds.
         release_gap: Gap between a load and the surface below it when the hand opens, in metres.
         withdraw_steps: Number of control steps in which the open hand moves straight up.
         withdraw_step: Height by which the hand rises in each of these steps, in metres.
-        posture_gain: Speed of a hand that returns to its posture, divided by the remaining distance, in 1/s.
+        posture_gain: Speed of a hand that returns to its posture, per remaining distance, in 1/s.
         posture_speed: Speed limit of a hand that returns to its posture, in m/s.
         posture_acceleration: Acceleration limit of a hand that returns to its posture, in m/s^2.
     """
@@ -60,18 +60,18 @@ class MotionParameters(NamedTuple):
 
 
 class CarryingParameters(NamedTuple):
-    """Parameters of carrying: the height of loads, and how they avoid the house and each other.
+    """Parameters that keep carried loads clear of the house and of each other.
 
     Attributes:
-        least_height: Lowest height of a load's underside, in metres. It is higher than counters.
+        least_height: Minimum height of a load's underside, in metres. It is higher than counters.
         margin: Gap between a load and the house, in metres.
-        near: Shortest look-ahead time of the search for free space, in seconds.
-        far: Longest look-ahead time of this search, in seconds.
+        near: Minimum look-ahead time of the search for free space, in seconds.
+        far: Maximum look-ahead time of this search, in seconds.
         most_shift: Maximum sideways shift of a hand before it is pulled towards the body, in metres.
         stacking_gap: Vertical gap between two stacked loads, in metres.
-        stacking_distance: Distance over which the right load rises above the left one as they approach, in metres.
-        push_back: Speed at which a hand yields when its load touches something, added to the approach speed, in m/s.
-        return_rate: Share of a yielding hand's displacement that is undone per second, in 1/s.
+        stacking_distance: Distance over which the right load rises above the approaching left one, in metres.
+        push_back: Speed added to the approach speed when a hand yields to a contact of its load, in m/s.
+        return_rate: Fraction of a yielding hand's displacement that is undone per second, in 1/s.
         most_compliance: Maximum displacement of a yielding hand, in metres.
     """
 
@@ -88,20 +88,21 @@ class CarryingParameters(NamedTuple):
 
 
 class WalkingParameters(NamedTuple):
-    """Parameters of simulated participants who walk along a path.
+    """Parameters with which simulated participants walk along a path.
 
     Attributes:
-        look_ahead: Distance of the steering point ahead on the path, in metres. Larger values cut corners, smaller ones
-            cause wobbling.
-        look_beyond: Length of the path ahead that is checked for obstacles, in metres. It exceeds `sidestep_range`.
-        sidestep_range: Distance at which the person starts to walk around an object on the floor, in metres.
-        object_clearance: Gap between the body and the centre of such an object, in metres.
+        look_ahead: Distance to the steering point on the path, in metres. Larger values cut corners, and
+            smaller values cause wobbling.
+        look_beyond: Length of the path that is checked for obstacles, in metres. It exceeds `sidestep_range`.
+        sidestep_range: Distance at which the person starts to sidestep an object on the floor, in metres.
+        object_clearance: Distance between the body and the centre of such an object, in metres.
         sidestep_room: Distance to an object, per metre to the side, that is needed to pass it on the far side. It
             prevents repeated changes of side.
-        braking_share: Share of the acceleration limit that is planned for braking.
+        braking_share: Fraction of the acceleration limit that is planned for braking.
         turn_gain: Yaw rate per heading error, in 1/s.
         facing_tolerance: Heading error below which the person counts as facing the goal, in radians.
-        least_progress: Distance in metres below which a walk counts as blocked after `PersonParameters.patience`.
+        least_progress: Distance in metres that a walk has to cover within `PersonParameters.patience`.
+            Otherwise, it counts as blocked.
     """
 
     look_ahead: float = 0.25
@@ -115,14 +116,14 @@ class WalkingParameters(NamedTuple):
     least_progress: float = 0.05
 
 
-# Type of each parameter group, by its field in `PersonParameters`.
+# Types of the parameter groups, by their field names in `PersonParameters`.
 GROUPS: dict[str, type[MotionParameters] | type[CarryingParameters] | type[WalkingParameters]] = {
     "motion": MotionParameters,
     "carrying": CarryingParameters,
     "walking": WalkingParameters,
 }
 
-# Valid ranges, within which each pick or place ends within 30 s.
+# Valid ranges of parameters. With values in these ranges, every pick or place ends within 30 s.
 GROUP_RANGES: dict[str, tuple[float, float]] = {
     "motion.turn_timeout": (0.04, 4.0),
     "motion.look_gain": (0.01, 1.0),

@@ -1,4 +1,4 @@
-"""Observations of the complete state of a house (PAPER section 1), and records of control steps."""
+"""Observations of the state of a house and its person, and records of control steps."""
 
 import enum
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ _HEALTH = 7  # number of values in a `HealthSample`
 
 
 class ObjectStatus(enum.Enum):
-    """Location of an object: on the floor, in a hand or in its receptacle."""
+    """The status of an object, which is on the floor, in a hand or in its receptacle."""
 
     LOOSE = "loose"
     CARRIED = "carried"
@@ -23,20 +23,20 @@ class ObjectStatus(enum.Enum):
 
 @dataclass(frozen=True)
 class Observation:
-    """Current poses of the person and of every object.
+    """The poses of the person and of all objects at one point in time (PAPER section 1).
 
     Attributes:
-        time: Simulated time since reset, in seconds.
-        position: Position of the body axis on the floor, (x, y), in metres, shape (2,).
-        heading: Yaw of the body, in radians, 0 along +x, counter-clockwise.
-        pitch: Pitch of the head, in radians, positive upwards.
+        time: Simulated time since the last reset, in seconds.
+        position: Position (x, y) of the body axis on the floor, in metres, shape (2,).
+        heading: Yaw of the body in radians, counter-clockwise from the +x direction.
+        pitch: Pitch of the head in radians, which is positive upwards.
         eye: Position of the eye camera, in metres, shape (3,).
-        velocity: Planar velocity in the house frame, in m/s, shape (2,).
-        object_names: Instance names, in the episode's order.
-        object_positions: Object origins in metres, shape (n, 3).
-        object_quaternions: Orientations wxyz, shape (n, 4).
+        velocity: Horizontal velocity in the frame of the house, in m/s, shape (2,).
+        object_names: Instance names of the objects, in the order of the episode.
+        object_positions: Positions of the objects' origins in metres, shape (n, 3).
+        object_quaternions: Orientations of the objects as wxyz quaternions, shape (n, 4).
         object_status: Status of each object.
-        hands: Instance names in the left and the right hand, or None.
+        hands: Instance names of the objects in the left and the right hand, or None for a free hand.
         busy: True while a pick or place is in progress.
     """
 
@@ -62,14 +62,14 @@ class Observation:
 
 
 class StepStates(NamedTuple):
-    """States after n control steps, one per row. Kernels fill the arrays in place."""
+    """The states after n control steps, with one row per step. Compiled kernels fill the arrays in place."""
 
     time: NDArray[np.float64]  # simulated time in seconds, shape (n,)
-    position: NDArray[np.float64]  # the person's floor positions, in metres, shape (n, 2)
+    position: NDArray[np.float64]  # position of the person on the floor, in metres, shape (n, 2)
     heading: NDArray[np.float64]  # yaw of the body, in radians, shape (n,)
     pitch: NDArray[np.float64]  # pitch of the head, in radians, shape (n,)
-    object_position: NDArray[np.float64]  # object origins in metres, shape (n, k, 3)
-    object_quaternion: NDArray[np.float64]  # orientations wxyz, shape (n, k, 4)
+    object_position: NDArray[np.float64]  # positions of k objects in metres, shape (n, k, 3)
+    object_quaternion: NDArray[np.float64]  # wxyz quaternions of k objects, shape (n, k, 4)
     state_hash: NDArray[np.uint64]  # `World.state_hash` after each step, shape (n,)
     health: NDArray[np.float64]  # rows of `HealthSample` after each step, shape (n, 7)
 
@@ -104,11 +104,11 @@ class StepStates(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Executed control steps."""
+    """A record of one or more executed control steps."""
 
-    # action of a single step, or n moves, shape (n, 4): forward and left in m/s, turn and look in rad/s
+    # The action of a single step, or n moves (forward, left, turn, look) in m/s and rad/s, shape (n, 4).
     actions: StepAction | NDArray[np.float64]
-    passed: StepStates | None = None  # n - 1 states between the steps, or None for a single step
+    passed: StepStates | None = None  # the n - 1 states between the steps, or None for a single step
 
     def __len__(self) -> int:
         return 1 if self.passed is None else len(self.passed.time) + 1

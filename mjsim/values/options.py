@@ -1,4 +1,4 @@
-"""Options of the simulated world."""
+"""Options of the physics simulation."""
 
 import dataclasses
 import math
@@ -9,25 +9,25 @@ from mjsim.values.errors import ActionError
 
 FIDELITIES = ("full", "event")
 CAPACITIES = (1, 2)
-REST_STEPS = 4  # number of consecutive control steps below `settle_speed` after which an object is at rest
+REST_STEPS = 4  # number of slow control steps in a row after which an object is at rest
 
 
 @dataclass(frozen=True)
 class WorldOptions:
-    """Options of a world that do not depend on the person: time step, grip, settling and fidelity.
+    """Options of a simulated world that do not depend on the person.
 
     Attributes:
-        control_timestep: Duration of a control step in seconds, a multiple of the model's timestep.
-        grip_distance: Maximum distance between a hand and the grip site for a grip, in metres.
-        grip_error: Stretch of the weld between hand and object beyond which it slips, in metres.
+        control_timestep: Duration of a control step in seconds, which is a multiple of the model's timestep.
+        grip_distance: Maximum distance between a hand and an object's grip site for a grip, in metres.
+        grip_error: Stretch of the weld between hand and object beyond which the object slips, in metres.
         grip_patience: Time for which the stretch may exceed `grip_error`, in seconds.
-        settle_time: Longest time for a released object to come to rest, in seconds.
+        settle_time: Maximum time for a released object to come to rest, in seconds.
         settle_speed: Speed below which an object counts as being at rest, in m/s.
-        volume_margin: Distance outside a receptacle's volume at which an object's centre still counts as inside, in
+        volume_margin: Distance from a receptacle's volume up to which an object's centre counts as inside, in
             metres.
         fidelity: `full` simulates all motions with physics. `event` moves the person kinematically, and uses physics
             only for the fall of released objects (docs/simulation.md).
-        capacity: Number of objects that can be carried: 2, or 1 with only the right hand.
+        capacity: Number of objects that can be carried, which is 2, or 1 to use only the right hand.
 
     Raises:
         ActionError: A number is not positive and finite, the fidelity is unknown, or the capacity is not 1 or 2.

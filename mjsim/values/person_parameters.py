@@ -1,4 +1,4 @@
-"""Parameters of a person: speeds, reach, size, eyes and hands."""
+"""Parameters of a person, such as walking speed, reach and eye height."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ from mjsim.values.motion_parameters import (
     WalkingParameters,
 )
 
-PICTURE_ASPECT = 4 / 3  # aspect ratio (width over height) of the picture that fills a person's field of view
+PICTURE_ASPECT = 4 / 3  # width divided by height of the picture that fills the field of view
 
 
 def _number(default: float, low: float, high: float, unit: str) -> Any:
@@ -24,38 +24,39 @@ def _number(default: float, low: float, high: float, unit: str) -> Any:
 
 @dataclass(frozen=True)
 class PersonParameters:
-    """Parameters of one person, used by the world, the planner, the renderer and simulated participants.
+    """Parameters of a person, used by the simulator, planner, renderer and simulated participants.
 
-    Values without a source are choices of this project.
+    Values without a cited source were chosen for this project.
 
     Example:
         >>> round(PersonParameters(walking_speed=1.0).fastest_walk, 3)
         1.077
 
     Attributes:
-        walking_speed: Speed at which simulated participants walk, in m/s. Healthy adults prefer 0.94 to 1.43
+        walking_speed: Walking speed of simulated participants, in m/s. Healthy adults prefer 0.94 to 1.43
             m/s (Bohannon and Williams Andrews, Physiotherapy 97, 2011). `fastest_walk` is 14/13 of it.
-        walking_acceleration: Limit of the walking acceleration, in m/s^2.
+        walking_acceleration: Maximum acceleration while walking, in m/s^2.
         turning_speed: Maximum yaw rate of the body, in rad/s.
-        turning_acceleration: Limit of the angular acceleration of the body, in rad/s^2.
+        turning_acceleration: Maximum angular acceleration of the body, in rad/s^2.
         looking_speed: Maximum pitch rate of the head while walking, in rad/s.
-        reach: Maximum horizontal distance from the body's axis to an object's centre or a receptacle's volume for
-            picking or placing, in metres. It allows for bending forward with an outstretched arm.
-        body_radius: Radius of the trunk, in metres. Planned paths keep an additional 0.05 m from walls. Houses are
-            sampled for the default radius, so that all participants can use the same house.
-        eye_height: Height of the eyes, in metres. Those of standing adults are at 1.4 to 1.75 m (Pheasant and
-            Haslegrave, Bodyspace, 2006).
+        reach: Maximum horizontal distance at which the person can pick or place, in metres. It is measured
+            from the body axis to the object's centre or the receptacle's volume, and allows for bending with
+            an outstretched arm.
+        body_radius: Radius of the trunk, in metres. Planned paths keep an additional distance of 0.05 m from
+            walls. Houses are sampled for the default radius, so that all participants can use the same house.
+        eye_height: Height of the eyes, in metres. Typical values for standing adults are 1.4 to 1.75 m
+            (Pheasant and Haslegrave, Bodyspace, 2006).
         field_of_view: Horizontal field of view of pictures and of perception, in radians. Vertically, a participant
             sees what a 4:3 picture shows, which is 70 degrees by default.
-        viewing_distance: Maximum distance at which an object is noticed, in metres.
+        viewing_distance: Maximum distance at which a participant notices an object, in metres.
         looking_interval: Time between checks for visible objects while walking, in seconds.
-        reading_time: Time for which a participant stands and reads the HUD before each visit, in seconds. By default 0.
-            The mental preparation of a step requires 1.35 s (Card, Moran and Newell, CACM 23, 1980), and people read
-            238 words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
+        reading_time: Time that a participant spends reading the HUD before each visit, in seconds. The
+            default is 0. Mental preparation for a step takes 1.35 s (Card, Moran and Newell, CACM 23, 1980),
+            and people read 238 words per minute (Brysbaert, Journal of Memory and Language 109, 2019).
         patience: Time without progress after which a walking person steps back or looks for another way, in seconds.
-        motion: Parameters of picking and placing.
-        carrying: Parameters of carrying.
-        walking: Parameters of simulated participants' walking.
+        motion: Parameters for picking and placing.
+        carrying: Parameters for carrying objects.
+        walking: Parameters for walking along a path.
 
     Raises:
         PersonError: A value is not a number, or is out of range.
@@ -86,27 +87,27 @@ class PersonParameters:
     def __post_init__(self) -> None:
         for name, (low, high, unit) in RANGES.items():
             _check(name, getattr(self, name), low, high, unit)
-            object.__setattr__(self, name, float(getattr(self, name)))  # kernels accept only floats
+            object.__setattr__(self, name, float(getattr(self, name)))  # compiled kernels accept only floats
         for group in GROUPS:
             object.__setattr__(self, group, _checked(group, getattr(self, group)))
 
     @property
     def fastest_walk(self) -> float:
-        """Walking speed limit of `Move`, in m/s."""
+        """The maximum walking speed of a `Move`, in m/s."""
         return self.walking_speed * 14 / 13
 
     @property
     def vertical_field(self) -> float:
-        """Vertical field of view of a 4:3 picture, in radians."""
+        """The vertical field of view of a 4:3 picture, in radians."""
         return 2.0 * math.atan(math.tan(self.field_of_view / 2.0) / PICTURE_ASPECT)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all parameters as JSON-serializable values, with a nested table for each group."""
+        """Return all parameters as a JSON-serializable dictionary, with groups as nested dictionaries."""
         values: dict[str, Any] = {name: getattr(self, name) for name in RANGES}
         return values | {group: getattr(self, group)._asdict() for group in GROUPS}
 
     def unusual(self) -> str:
-        """Describe the parameters that differ from the defaults. Return an empty text if there are none."""
+        """Describe all parameters that differ from their defaults, or return an empty string."""
         default = PersonParameters()
         others = [
             (name, unit)
@@ -138,7 +139,7 @@ class PersonParameters:
         return cls(**{**values, **groups})
 
 
-# Lowest value, highest value and unit of each parameter.
+# Minimum, maximum and unit of each parameter.
 RANGES: dict[str, tuple[float, float, str]] = {
     f.name: (*f.metadata["range"], f.metadata["unit"])
     for f in dataclasses.fields(PersonParameters)

@@ -1,1 +1,1 @@
-"""Running episodes: the world, its state, and its two levels of fidelity."""
+"""The world of a running episode, its state, and its two levels of fidelity."""

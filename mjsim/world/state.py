@@ -1,9 +1,9 @@
-"""Reproducibility of runs: state hashes, checkpoints, and the versions that determine the physics.
+"""State hashes, checkpoints and software versions, which make runs reproducible.
 
-MuJoCo's state vector does not record which bodies sleep. Setting a state on live data is therefore not exact, but
-setting it after `mj_resetData` is. A run that takes a checkpoint therefore resets itself and restores its own state.
-From then on, it is bit-identical to a run that starts at the checkpoint. No checkpoint is taken during a pick or place,
-because a motion is a generator, whose state cannot be stored.
+MuJoCo's state vector does not record which bodies are asleep. A state is therefore restored exactly only
+after `mj_resetData`. For this reason, a run that takes a checkpoint also resets itself and restores its own
+state. From then on, it is bit-identical to a run that starts from the checkpoint. No checkpoint is taken
+during a pick or place, because a motion is a Python generator, which cannot be stored.
 """
 
 import functools
@@ -34,29 +34,29 @@ _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _HASHED = int(
     mujoco.mjtState.mjSTATE_FULLPHYSICS | mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_EQ_ACTIVE
 )
-# Attributes of a model that affect only its appearance, such as textures and colours.
+# Prefixes of model attributes that affect only the appearance, such as textures and colours.
 _LOOKS = (
     "tex_", "mat_", "light_", "cam_", "skin_", "mesh_normal", "mesh_texcoord", "mesh_facenormal", "name_",
 )  # fmt: skip
 _LOOKS_ANYWHERE = ("rgba", "matid", "facetexcoord", "texcoord", "path", "names_map", "signature")
-_NO_PHYSICS = ("render", "environments")  # folders of mjsim whose code does not affect states
+_NO_PHYSICS = ("render", "environments")  # subpackages of mjsim whose code does not affect the physics
 
 
 @dataclass(frozen=True, eq=False)
 class PersonState:
-    """Commands, grips and compliance of a person in full physics."""
+    """The part of a person's state in full physics that MuJoCo does not store."""
 
-    rig: RigState  # commands of the servos
+    rig: RigState  # commands to the person's servos
     grips: GripState  # object and grip in each hand
-    carrying: CarryingState  # compliance of the hands, and how long they have been strained
-    hand_velocities: NDArray[np.float64]  # velocities of the hands' targets in m/s, shape (2, 3)
+    carrying: CarryingState  # compliance of each hand and duration of its strain
+    hand_velocities: NDArray[np.float64]  # velocity of each hand's target in m/s, shape (2, 3)
 
 
 @dataclass(frozen=True, eq=False)
 class StateDetails:
-    """The part of a world's state that is stored outside MuJoCo."""
+    """The part of a world's state that MuJoCo does not store."""
 
-    hands: tuple[str | None, str | None]  # names of the objects in the left and the right hand
+    hands: tuple[str | None, str | None]  # names of the objects in the left and the right hand, or None
     status: tuple[ObjectStatus, ...]  # status of each object
     health: HealthState
     person: PersonState | None  # None for fidelity `event`
@@ -78,7 +78,7 @@ class WorldState:
 
     @classmethod
     def from_json(cls, physics: NDArray[np.float64], details: str) -> "WorldState":
-        """Restore a state from `physics` (n,) and the text of `details_json`. Raise a StateError if invalid."""
+        """Create a state from `physics` (n,) and the result of `details_json`, or raise a StateError."""
         try:
             values = json.loads(details)
             return cls(physics, msgspec.convert(values, StateDetails, dec_hook=lambda _, a: np.array(a)))
@@ -91,32 +91,32 @@ def checkpoint_hash(physics: NDArray[np.float64], details: str) -> int:
 
 
 class StateHash:
-    """Hash of a simulation's physics: time, positions, velocities, activations, commands and active welds."""
+    """A hash function for the state of a physics simulation, including its commands and active welds."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._buffer = np.zeros(mujoco.mj_stateSize(model, _HASHED))
 
     def of(self, data: mujoco.MjData) -> int:
-        """Return a 64-bit hash of the state."""
+        """Return a 64-bit hash of the simulation's state."""
         mujoco.mj_getState(self._model, data, self._buffer, _HASHED)
         return hash64(self._buffer.data)
 
 
 def hash64(content: Any) -> int:
-    """Return the first 64 bits of the SHA-1 hash of some bytes, as a checksum against accidental differences."""
+    """Return the first 64 bits of the SHA-1 hash of `content`, for use as a checksum."""
     return int.from_bytes(hashlib.sha1(content, usedforsecurity=False).digest()[:8], "little")
 
 
 def take_physics(model: mujoco.MjModel, data: mujoco.MjData) -> NDArray[np.float64]:
-    """Return MuJoCo's integration state, shape (n,)."""
+    """Return the integration state of a MuJoCo simulation, shape (n,)."""
     physics = np.zeros(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, physics, _STATE)
     return physics
 
 
 def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.float64]) -> None:
-    """Reset the data, and set them to a state (n,) that `take_physics` returned.
+    """Reset `data` and set it to a state (n,) that `take_physics` returned.
 
     Raises:
         StateError: The state belongs to another model, or is not finite.
@@ -135,7 +135,7 @@ def set_physics(model: mujoco.MjModel, data: mujoco.MjData, physics: NDArray[np.
 
 
 def model_fingerprint(model: mujoco.MjModel) -> str:
-    """Return a digest, 16 hex digits, of everything in a compiled model that affects the physics."""
+    """Return a digest (16 hexadecimal digits) of all values in a compiled model that affect the physics."""
     digest = hashlib.sha256()
     for part in (model, model.opt):
         for name in sorted(n for n in dir(part) if not n.startswith("_") and not _is_visual(n)):
@@ -149,7 +149,7 @@ def model_fingerprint(model: mujoco.MjModel) -> str:
 
 
 def engine_versions() -> dict[str, str]:
-    """Return the versions of all software that affects the physics, and the processor architecture."""
+    """Return the processor architecture and the versions of all software that affects the physics."""
     return {
         "mjsim": _installed_version(),
         "physics_code": _code_fingerprint(),
@@ -173,6 +173,6 @@ def _installed_version() -> str:
 
 @functools.cache
 def _code_fingerprint() -> str:
-    """Return a digest of this package's source code, because the code can change without a new version."""
+    """Return a digest of mjsim's source code, which may change without a new version number."""
     root = Path(__file__).parents[1]
     return digest_of(*(place for place in sorted(root.iterdir()) if place.name not in _NO_PHYSICS))

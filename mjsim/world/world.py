@@ -1,4 +1,4 @@
-"""The world of a running episode: one person in one house, stepped at a fixed control rate."""
+"""The world of a running episode, in which a person acts in a house at a fixed control rate."""
 
 import math
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class StepResult:
         result: Answer to a pick or place, or None for other actions.
         events: Physical events during the last control step. Any event stops the action.
         stopped: Reason why the action stopped.
-        steps: Executed control steps, and the states between them.
+        steps: Control steps that were executed, and the states between them.
     """
 
     observation: Observation
@@ -55,11 +55,11 @@ class StepResult:
 
 
 class World:
-    """A running episode.
+    """A running episode that can be advanced, reset, saved and restored.
 
-    During a pick or place (`Observation.busy`), a `Move` is ignored and a second `Pick` or `Place` is refused. A
-    refused action has the same effect as `IDLE`. Progress along a path is not part of the state: `restore` does not
-    change it, and `reset` clears it.
+    During a pick or place (`Observation.busy`), a `Move` is ignored and a second `Pick` or `Place` is
+    refused. A refused action has the same effect as `IDLE`. The progress along a path is not part of the
+    state. `reset` clears it, but `restore` does not change it.
 
     Attributes:
         scene: The composed episode, whose model is never modified.
@@ -80,13 +80,13 @@ class World:
     def __init__(
         self, scene: Scene, options: WorldOptions | None = None, *, walls: ArrayLike | None = None
     ) -> None:
-        """Start at the beginning of the episode.
+        """Create a world at the start of an episode.
 
         Args:
             scene: The composed episode.
-            options: Options of the world. By default, those of `WorldOptions()`.
-            walls: Edges (x, y, x, y), in metres, of the floor on which a person who follows a path may walk around
-                objects, shape (e, 4). By default, the whole floor.
+            options: Options of the world, by default `WorldOptions()`.
+            walls: Outline of the floor that a person on a path may use to walk around objects, as edges
+                (x, y, x, y) in metres, shape (e, 4). By default, the person may use the whole floor.
 
         Raises:
             AssetError: The scene has no person, or an object lacks a grip site.
@@ -106,11 +106,11 @@ class World:
 
     @property
     def data(self) -> mujoco.MjData:
-        """The state for rendering and ray casts. Do not change it, and read this property again after every step."""
+        """The `MjData` for rendering and ray casts. Do not modify it, and read it again after each step."""
         return self._tier.data
 
     def copy_data(self, into: mujoco.MjData | None = None) -> mujoco.MjData:
-        """Copy `data` to `into` or to a new object, so that it can be rendered while the world is stepped."""
+        """Return a copy of `data`, stored in `into` if given. It can be rendered while the world advances."""
         copied = mujoco.MjData(self.model) if into is None else into
         mujoco.mj_copyData(copied, self.model, self.data)
         return copied
@@ -121,36 +121,36 @@ class World:
 
     @property
     def health(self) -> Health:
-        """Extremes of the physics since the last reset."""
+        """The physics problems since the last reset, such as the deepest penetration."""
         return self._tier.health
 
     @property
     def health_sample(self) -> HealthSample:
-        """Health of the physics in the latest control step."""
+        """The physics problems in the latest control step."""
         return self._tier.health_sample
 
     @property
     def busy(self) -> bool:
-        """True during a pick or place."""
+        """True while a pick or place is in progress."""
         return self._tier.busy
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """Copy of the person's body state, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
+        """A copy of the body state, shape (BODY_SIZE,), with the layout of `mjsim.world.body.rig`."""
         return self._tier.body
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Copy of the positions of the left and the right hand in the body frame, in metres, shape (2, 3)."""
+        """A copy of the positions of the left and right hand in the body frame, in metres, shape (2, 3)."""
         return self._tier.hands
 
     @property
     def blocked(self) -> bool:
-        """True if the person makes no progress along a path, until the first step after backing off."""
+        """True if the person is blocked on a path and has not yet resumed walking after backing off."""
         return self._walker.blocked
 
     def reset(self) -> Observation:
-        """Return to the start of the episode. Repeating the same actions then leads to bit-identical states."""
+        """Return to the start of the episode. Repeating the same actions leads to bit-identical states."""
         self._tier.reset()
         self._walker.reset()
         return self._tier.observation()
@@ -160,7 +160,7 @@ class World:
         return self._tier.state_hash()
 
     def state(self) -> WorldState:
-        """Return the complete state, which `restore` accepts.
+        """Return the complete state of the world, which can be passed to `restore`.
 
         Raises:
             StateError: A pick or place is in progress.
@@ -174,28 +174,28 @@ class World:
     def restore(self, state: WorldState) -> Observation:
         """Continue from a state of this world, or of another world with the same scene and options.
 
-        This resets the physics. The world that the state was taken from continues identically only if it is also
-        restored (see `mjsim.world.state`).
+        This resets the physics. If the world from which the state was taken is to continue identically, the
+        state must be restored there too (see `mjsim.world.state`).
 
         Raises:
             StateError: The state belongs to another scene or to another fidelity.
         """
         try:
             self._tier.restore(state)
-        except (ValueError, IndexError) as error:  # an array has the wrong shape
+        except (ValueError, IndexError) as error:  # raised if an array has the wrong shape
             raise StateError(f"the state's details do not fit this version's worlds: {error}") from error
         return self._tier.observation()
 
     def step(self, action: Action, limit: int = MAX_STEPS) -> StepResult:
-        """Execute an action: one control step for `Move`, `Pick` and `Place`, up to `limit` steps for other actions.
+        """Execute an action for one control step, or for up to `limit` steps if it is a path or a wait.
 
         Args:
-            action: Action of the person.
+            action: Action that the person performs.
             limit: Maximum number of control steps, at least 1.
 
         Raises:
             ActionError: `action` is not an action.
-            PhysicsError: MuJoCo reported a warning, or the state is not finite. Call `reset` before the next step.
+            PhysicsError: MuJoCo reported a warning, or the state is not finite. Call `reset` before stepping.
         """
         if isinstance(action, FollowPath):
             return self._follow(action, limit)
@@ -242,7 +242,7 @@ class World:
         return StepResult(self._tier.observation(), result, events, Stop.EVENT if events else stopped, steps)
 
     def answer(self, action: Pick | Place) -> ActionResult:
-        """Return the answer that `step` would give to a pick or place now, without changing anything.
+        """Return the result that `step` would return for a pick or place, without executing the action.
 
         Raises:
             ActionError: `action` is neither a pick nor a place.

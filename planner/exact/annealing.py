@@ -1,4 +1,4 @@
-"""A first tour, by simulated annealing over the order of picks. Objects are placed optimally for each order."""
+"""Find a first tour by simulated annealing over the order in which objects are picked up."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ HOT, COLD = 0.5, 0.01  # first and last temperature, relative to the mean leg le
 
 @inlined
 def uniform(state: NDArray[np.uint64]) -> float:
-    """Return the next number in [0, 1) of SplitMix64 (Steele, Lea and Flood 2014), and advance its state."""
+    """Return a random number in [0, 1) from the generator SplitMix64 (Steele, Lea and Flood 2014)."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -24,9 +24,10 @@ def uniform(state: NDArray[np.uint64]) -> float:
 
 @kernel
 def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
-    """Return up to four ways to place objects before the next pick, each as (first bin, second bin, bin still held).
+    """Return up to four ways to place the objects in hand before the next pick.
 
-    `held` and `other` are the bins of the objects in hand. The number of bins, `m`, stands for no bin or no object.
+    Each way is (first bin, second bin, bin of the object that stays in hand). `held` and `other` are the bins
+    of the objects in hand. The value m, which is the number of bins, stands for no bin or no object.
     """
     never = (m, m, -1)
     if held == m:
@@ -40,7 +41,7 @@ def drops(m: int, held: int, other: int) -> tuple[tuple[int, int, int], ...]:
 
 @kernel
 def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
-    """Return the length from object i (-1: root) via bins `b` and `then` (m: none) to object x (-1: end)."""
+    """Return the path length from object i, or the root if i is -1, to object x via bins b and `then`."""
     m = inst.bins.shape[0]
     if b == m:
         if x < 0:
@@ -57,8 +58,8 @@ def length(inst: Instance, i: int, b: int, then: int, x: int) -> int:
 def decode(inst: Instance, order: NDArray[np.int64], start: int, costs: NDArray[np.int64]) -> int:
     """Return the length of the shortest tour with a given order of picks.
 
-    Entry [t, d] of `costs`, shape (n + 1, m + 1), becomes the lowest cost at pick t with an object for bin d in the
-    other hand (m: none). Row n is the end of the tour. Rows before `start` must be valid.
+    Entry [t, d] of `costs` (n + 1, m + 1) is set to the lowest cost at pick t with an object for bin d
+    in the other hand, or none if d = m. Row n is the end of the tour. Rows before `start` must be valid.
     """
     n, m = inst.to_bin.shape
     if start == 0:
@@ -88,7 +89,7 @@ def _advance(inst: Instance, i: int, x: int, before: NDArray[np.int64], after: N
     nothing = before[m] + over_c
     for d in range(m):
         after[d] = before[d] + over_c
-        if d != c:  # if d == c, both objects would be left at bin c
+        if d != c:  # if d == c, both objects are placed in bin c
             keep_own = min(keep_own, before[d] + from_i[d] + from_x[d])
         both = between[d] + min(from_i[d] + from_x[c], from_i[c] + from_x[d])
         nothing = min(nothing, before[d] + both)
@@ -146,9 +147,9 @@ def tour_actions(inst: Instance, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 @inlined
 def propose(order: NDArray[np.int64], candidate: NDArray[np.int64], state: NDArray[np.uint64]) -> int:
-    """Write a random neighbour of an order: two objects swapped, a section reversed, or an object moved.
+    """Change an order at random by swapping two objects, reversing a section, or moving an object.
 
-    Return the first position that may have changed.
+    The new order is written to `candidate`. Return the first position that may have changed.
     """
     n = order.size
     i = int(uniform(state) * n)
@@ -183,7 +184,7 @@ def anneal(inst: Instance, seed: int, moves: int) -> tuple[int, NDArray[np.int64
 def anneal_from(
     inst: Instance, seed: int, moves: int, first: NDArray[np.int64], hot: float, cold: float
 ) -> tuple[int, NDArray[np.int64]]:
-    """Anneal from a given order of picks. Temperatures are relative to the mean leg length.
+    """Improve an order of picks by simulated annealing. Temperatures are relative to the mean leg length.
 
     Return the length of the best tour and its order of picks.
     """
@@ -219,7 +220,7 @@ def anneal_from(
 
 
 def warm_order(instance: Instance, start: Start) -> NDArray[np.int64]:
-    """Return the order of a warm start, with each missing object inserted where it lengthens the tour least."""
+    """Return the order of a warm start, with missing objects inserted where they lengthen the tour least."""
     n = len(instance.home)
     order = [*start.order, *start.missing]
     costs = np.empty((n + 1, len(instance.bins) + 1), np.int64)

@@ -1,9 +1,9 @@
-"""Kernels that expand a layer of the search.
+"""Kernels that expand one layer of the search.
 
-Layer k contains states with k picked objects. The code of a state is U 2^12 + place, where U is the bit mask of the
-remaining objects. Place `b * m + d` means at bin b with an object for bin d in hand, `b * m + b` means at bin b with
-empty hands, and `m * m + i` means at object i with only that object in hand. Arriving at a second object is not a state
-of its own, because the next stop is one of two bins.
+Layer k contains the states in which k objects have been picked up. A state is encoded as U * 2^12 + place,
+where U is the bit mask of the remaining objects. The place is `b * m + d` at bin b with an object for bin d
+in hand, `b * m + b` at bin b with empty hands, and `m * m + i` at object i with only this object in hand.
+There are no states at a second object, because the person always goes on to one of two bins.
 """
 
 from typing import NamedTuple
@@ -18,17 +18,17 @@ from planner.exact.table import INFINITE, CostTable
 from planner.solvers import Deadline
 
 PLACE_BITS = 12
-SLICE = 1 << 12  # number of states expanded between two checks of the deadline, about 5 ms
-CARRYING, EMPTY = range(2)  # stages of the expansion of a layer
+SLICE = 1 << 12  # number of states expanded between two checks of the deadline, which takes about 5 ms
+CARRYING, EMPTY = range(2)  # stages of expanding a layer
 STAGE, DONE, OF, SMALLEST, STATES, END = range(6)  # indices into `progress`
 
 
 class Expanded(NamedTuple):
-    """Result of expanding a layer."""
+    """The result of expanding a layer."""
 
-    here: Nodes  # the layer, including states reached by placing an object in its bin
+    here: Nodes  # the expanded layer, including states reached by placing an object in its bin
     after: Nodes  # the next layer
-    smallest: int  # smallest total of the states dropped to save memory, or `INFINITE`
+    smallest: int  # smallest total of all states dropped to save memory, or `INFINITE`
     states: int  # number of expanded states
     end: int  # index of the state that ends the shortest complete tour, or -1
 
@@ -43,7 +43,7 @@ def row_of(table: CostTable, left: int) -> int:
 
 
 class LegEnd(NamedTuple):
-    """State at the end of a leg, before an object is picked up or placed."""
+    """The state at the end of a leg, before an object is picked up or placed."""
 
     left: int
     row: int
@@ -55,7 +55,7 @@ class LegEnd(NamedTuple):
 def offer_bin(
     inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, b: int, d: int, limit: int
 ) -> None:
-    """Add the state at bin b with an object for bin d in hand (d = b: none) if its total is below the limit."""
+    """Add a state at bin b to a layer if the total of the state is below the limit."""
     total = arrival.cost + table.bin[arrival.row, b, d]
     if total < limit:
         place = b * inst.bins.shape[0] + d
@@ -87,7 +87,7 @@ def offer_only(inst: Instance, table: CostTable, nodes: Nodes, arrival: LegEnd, 
 
 @kernel
 def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int) -> None:
-    """Add the successors of the root to the first two layers."""
+    """Add the states that directly follow the start of a tour to the first two layers."""
     n = inst.home.size
     left, row = (1 << n) - 1, table.bin.shape[0] - 1
     if inst.carried.size == 0:
@@ -107,7 +107,7 @@ def offer_roots(inst: Instance, table: CostTable, here: Nodes, after: Nodes, lim
 def expand(
     inst: Instance, table: CostTable, here: Nodes, after: Nodes, limit: int, width: int, deadline: Deadline
 ) -> Expanded | None:
-    """Add all successors of a layer's states. Return None if the deadline passes first."""
+    """Expand all states of a layer. Return None if the deadline passes first."""
     progress = np.array([0, 0, 0, INFINITE, 0, -1])
     while True:
         here, after = expand_some(inst, table, here, after, limit, width, progress)
@@ -127,7 +127,7 @@ def expand_some(
     width: int,
     progress: NDArray[np.int64],
 ) -> tuple[Nodes, Nodes]:
-    """Expand a slice of a layer: first the states with an object in hand, then those with empty hands."""
+    """Expand some states of a layer. States with an object in hand come before those with empty hands."""
     if progress[STAGE] == CARRYING and progress[DONE] == 0:
         progress[OF] = here.size[0]
         here = with_room(here, here.size[0])

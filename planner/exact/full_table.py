@@ -1,6 +1,6 @@
-"""The full table, which has a row for every subset of the objects, and shortest tours in it.
+"""Fill full tables, which have one row for every subset of the objects, and find shortest tours in them.
 
-Small tables are filled by NumPy if numba is not loaded yet, because loading it takes 0.5 s.
+Small tables are filled with NumPy unless numba is already loaded, because loading numba takes 0.5 s.
 """
 
 import sys
@@ -13,7 +13,7 @@ from planner.exact.table import CostTable, Solution, fill_layers, new_table, wal
 from planner.plan import Certificate, Proof
 
 COMPILER = "numba"
-SMALL_TABLE = 1 << 23  # bytes, enough for 14 objects and 6 bins; NumPy takes 50 ms, kernels 10 ms
+SMALL_TABLE = 1 << 23  # size in bytes of a table for 14 objects and 6 bins; NumPy takes 50 ms, kernels 10 ms
 
 
 def full_table_bytes(inst: Instance) -> int:
@@ -31,7 +31,7 @@ def by_table(inst: Instance) -> Solution:
 def filled_table(inst: Instance) -> CostTable:
     table = new_table(inst, np.arange(len(inst.home)))
     if COMPILER in sys.modules or full_table_bytes(inst) > SMALL_TABLE:
-        from planner.exact.table_kernels import fill  # imported late, because it loads numba
+        from planner.exact.table_kernels import fill  # imported here because it loads numba
 
         fill(inst, table)
     else:
@@ -42,7 +42,7 @@ def filled_table(inst: Instance) -> CostTable:
 def follow(inst: Instance, table: CostTable, row: int) -> tuple[int, list[int]]:
     """Return the length and the actions of a shortest tour in a full table.
 
-    `row` is the table row of the objects left at the root.
+    `row` is the table row of the objects that remain at the start.
     """
     actions: NDArray[np.int64] = np.empty(2 * len(inst.home) + 2, np.int64)
     if COMPILER in sys.modules:

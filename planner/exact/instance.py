@@ -1,4 +1,4 @@
-"""Routing problems for a capacity of one or two, as arrays for the kernels."""
+"""Convert routing problems with a capacity of one or two to arrays for the kernels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,29 +9,29 @@ from numpy.typing import NDArray
 from planner.plan import Visit, VisitKind
 from planner.problem import RoutingProblem
 
-FAR = 1 << 59  # a length greater than that of any tour
+FAR = 1 << 59  # length greater than that of any tour
 
 
 class Instance(NamedTuple):
-    """A problem with n objects, m bins and a root (the person's position), with distances in integer units.
+    """A routing problem with n objects, m bins and a root (the person's position), in integer units.
 
-    A leg that the capacity does not allow has the length `FAR`, so a capacity of one needs no separate kernels.
+    Legs that the capacity does not allow have the length `FAR`, so the same kernels handle both capacities.
     """
 
-    between: NDArray[np.int64]  # from object to object, shape (n, n); `FAR` from an object to itself
-    to_bin: NDArray[np.int64]  # from object to bin, shape (n, m)
-    from_bin: NDArray[np.int64]  # from bin to object, shape (m, n)
-    bins: NDArray[np.int64]  # from bin to bin, shape (m, m)
+    between: NDArray[np.int64]  # distances between objects, shape (n, n); `FAR` on the diagonal
+    to_bin: NDArray[np.int64]  # distances from objects to bins, shape (n, m)
+    from_bin: NDArray[np.int64]  # distances from bins to objects, shape (m, n)
+    bins: NDArray[np.int64]  # distances between bins, shape (m, m)
     home: NDArray[np.int64]  # bin of each object, shape (n,)
-    root: NDArray[np.int64]  # from root to object, shape (n,)
-    root_bin: NDArray[np.int64]  # from root to bin, shape (m,)
+    root: NDArray[np.int64]  # distances from the root to objects, shape (n,)
+    root_bin: NDArray[np.int64]  # distances from the root to bins, shape (m,)
     carried: NDArray[np.int64]  # bins of the objects carried at the root, at most two
     tie: int  # maximum difference between tours that count as equal, in units
-    unit: float  # length of a unit in metres
+    unit: float  # length of one unit in metres
 
 
 def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instance:
-    """Convert a problem with a capacity of one or two. `metric` contains its integer distances, shape (k, k).
+    """Convert a problem with a capacity of one or two. `metric` is its matrix of integer distances (k, k).
 
     Objects are the shipments, and bins are the delivery locations in ascending order.
     """
@@ -65,7 +65,7 @@ def make_instance(problem: RoutingProblem, metric: NDArray[np.int64]) -> Instanc
 def to_visits(
     instance: Instance, actions: Sequence[int], names: Sequence[str], carried: Sequence[str]
 ) -> list[Visit]:
-    """Convert actions to visits. An action k >= 0 picks object k, and -1 - b places all objects of bin b."""
+    """Convert actions to visits. Action k >= 0 picks up object k, and -1 - b places all objects of bin b."""
     held = list(zip(instance.carried.tolist(), carried, strict=True))
     visits: list[Visit] = []
     for action in actions:

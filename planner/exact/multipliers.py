@@ -1,4 +1,4 @@
-"""Lagrangian multipliers, fitted so that relaxed tours pick up each object about once."""
+"""Fit Lagrangian multipliers so that relaxed tours pick up each object about once."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, cast
@@ -13,24 +13,24 @@ from planner.exact.table_kernels import fill, fill_rows, walk
 from planner.exact.warm_start import Start
 from planner.solvers import NEVER, Deadline
 
-DECAY = 0.97  # share of the average violation that is kept at each step
+DECAY = 0.97  # factor by which earlier violations are reduced at each step
 MOMENTUM = 0.8
 FIRST_STEPS, FIRST_STEP_SIZES = 150, (1.0, 0.02)
 MAX_STEPS, MIN_STEPS, STEP_SIZES = 30, 4, (0.2, 0.03)
-STEP_ROWS = 60_000  # approximate number of rows filled in one fit of a large table
-SLICE = 1 << 13  # number of rows filled between two checks of the deadline, about 3 ms
+STEP_ROWS = 60_000  # approximate number of rows that are filled to fit a large table
+SLICE = 1 << 13  # number of rows filled between two checks of the deadline, which takes about 3 ms
 STEP, ROW, BEST = range(3)  # indices into `Ascent.progress`
 
 
 class Ascent(NamedTuple):
-    """State of a subgradient ascent of multipliers."""
+    """The state of a subgradient ascent that fits multipliers."""
 
     current: NDArray[np.float64]  # current multipliers, shape (n,)
     direction: NDArray[np.float64]  # last change of the multipliers, shape (n,)
     violation: NDArray[np.float64]  # average violation, as in `Bound`, shape (n,)
     best: NDArray[np.int64]  # multipliers with the best bound, shape (n,)
     sizes: NDArray[np.float64]  # length of each step relative to the gap, shape (steps,)
-    progress: NDArray[np.int64]  # number of steps, rows filled for the next step, best bound
+    progress: NDArray[np.int64]  # number of steps, number of rows filled for the next step, and best bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Bound:
     instance: Instance
     table: CostTable
     root: int  # lower bound at the root, in units
-    # average deviation from one pick of each object, with more weight on recent relaxed tours, shape (n,)
+    # Average deviation from one pick per object in relaxed tours, shape (n,). Recent tours have more weight.
     violation: NDArray[np.float64]
 
     @property
@@ -49,7 +49,7 @@ class Bound:
 
 
 def first_bound(instance: Instance, upper: int) -> Bound:
-    """Fit multipliers with all objects in one group, in about 10 ms. `upper` is the length of a known tour."""
+    """Fit multipliers with all objects in a single group. `upper` is the length of a known tour."""
     n = len(instance.home)
     table = new_table(instance, np.zeros(n, np.int64))
     bound = fit(instance, table, np.zeros(n), upper, FIRST_STEPS, FIRST_STEP_SIZES, NEVER)
@@ -57,7 +57,7 @@ def first_bound(instance: Instance, upper: int) -> Bound:
 
 
 def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
-    """Return the bound for the groups and multipliers of a warm start, by filling one table.
+    """Return the lower bound that results from the groups and multipliers of a warm start.
 
     To keep the table within `max_rows` rows, the last groups are merged with the first one.
     """
@@ -72,7 +72,7 @@ def warm_bound(instance: Instance, start: Start, max_rows: int) -> Bound:
 
 
 def grown(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
-    """Split groups and refit until the gap is closed, the table reaches `max_rows` rows, or the deadline passes.
+    """Split groups and refit until the gap is closed, the row limit is reached, or the deadline passes.
 
     Each split moves the object with the largest violation into a group of its own.
     """
@@ -108,8 +108,8 @@ def _one_apart(
 def counted_by_bin(bound: Bound, upper: int, max_rows: int, deadline: Deadline) -> Bound:
     """Group the objects by bin if this gives a better bound.
 
-    If bins are far apart, the tour length depends mainly on the number of visits to each bin, which a small table
-    counts only with such groups.
+    If bins are far apart, the tour length depends mainly on the number of visits to each bin. A small table
+    can count these visits only if the objects are grouped by bin.
     """
     group = np.unique(bound.instance.home, return_inverse=True)[1]
     if bound.root >= upper - bound.instance.tie or rows_of(group) > max_rows:
@@ -137,8 +137,9 @@ def fit(
 ) -> Bound | None:
     """Fit multipliers by subgradient ascent with momentum (Held, Wolfe and Crowder 1974).
 
-    The ascent starts from `multipliers`, and `table` receives the best table. `step_sizes` are those of the first and
-    the last step, relative to the gap to `upper`, the length of a known tour. Return None if the deadline passes first.
+    The ascent starts from `multipliers`, and `table` receives the best table. `step_sizes` are the sizes of
+    the first and the last step, relative to the gap between the bound and `upper`, the length of a known
+    tour. Return None if the deadline passes first.
     """
     n, first_size, last_size = len(instance.home), *step_sizes
     ascent = Ascent(
@@ -157,10 +158,10 @@ def fit(
 
 @kernel
 def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: int) -> bool:
-    """Continue an ascent in place until `rows` rows are filled. Return True if it is finished.
+    """Continue a subgradient ascent until `rows` table rows are filled. Return True if it is finished.
 
-    The table then contains the best multipliers and is filled for them. This is a single kernel because a thread that
-    returned to Python after each table would wait for the interpreter lock.
+    At the end, the table contains the best multipliers and the corresponding entries. The ascent is a single
+    kernel because a return to Python after each table would require waiting for the interpreter lock.
     """
     n, progress = inst.home.size, ascent.progress
     actions = np.empty(2 * n + 2, np.int64)
@@ -184,7 +185,7 @@ def climb(inst: Instance, table: CostTable, ascent: Ascent, upper: int, rows: in
 def _stepped(
     inst: Instance, table: CostTable, ascent: Ascent, upper: int, actions: NDArray[np.int64]
 ) -> bool:
-    """Take a step with a filled table, or restore the best multipliers. Return False if nothing has changed."""
+    """Take a step with a filled table, or restore the best multipliers. Return False if nothing changed."""
     progress, k = ascent.progress, ascent.progress[STEP]
     total, count = walk(inst, table, table.bin.shape[0] - 1, actions)
     value = total - table.multipliers.sum()
@@ -215,7 +216,7 @@ def step(
     direction: NDArray[np.float64],
     violation: NDArray[np.float64],
 ) -> bool:
-    """Raise the prices of objects that a relaxed tour picks up too often. Return False if there are none."""
+    """Adjust the prices of objects that are not picked up exactly once. Return False if there are none."""
     n = current.size
     surplus = np.full(n, -1.0)
     for action in actions:

@@ -1,4 +1,4 @@
-"""States of a search layer, with a hash index."""
+"""A layer of search states, with a hash table that finds a state by its code."""
 
 from typing import NamedTuple
 
@@ -9,19 +9,19 @@ from mjsim.support.kernels import inlined, kernel
 from planner.exact.table import INFINITE
 
 NO_PARENT = -1
-FIRST_ROOM = 1 << 12  # capacity of a new layer, in states
+FIRST_ROOM = 1 << 12  # initial capacity of a layer in states
 
 
 class Nodes(NamedTuple):
-    """States of a layer. The arrays have spare entries at the end."""
+    """The states of a search layer. The arrays contain unused entries at the end."""
 
     size: NDArray[np.int64]  # number of states, shape (1,)
     key: NDArray[np.int64]  # code of each state, as defined in `expand`
     cost: NDArray[np.int64]  # length of the shortest known path to each state
-    total: NDArray[np.int64]  # cost plus lower bound of the cost-to-go
-    # 2 x index of the previous state, plus 1 if it is in the same layer, or `NO_PARENT`
+    total: NDArray[np.int64]  # cost plus a lower bound on the cost-to-go
+    # Twice the index of the previous state, plus 1 if that state is in the same layer, or `NO_PARENT`
     parent: NDArray[np.int64]
-    slots: NDArray[np.int32]  # hash table of indices, -1 if empty; its length is a power of two
+    slots: NDArray[np.int32]  # hash table of state indices, -1 if empty; its length is a power of two
 
 
 @kernel
@@ -39,7 +39,7 @@ def new_nodes(room: int) -> Nodes:
 
 @inlined
 def slot_of(nodes: Nodes, key: int) -> int:
-    """Return the slot of a key, or the empty slot where it belongs."""
+    """Return the hash table slot of a key, or the empty slot where the key belongs."""
     mask = nodes.slots.size - 1
     mixed = np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)
     slot = int(mixed >> np.uint64(29)) & mask
@@ -69,7 +69,7 @@ def with_room(nodes: Nodes, more: int) -> Nodes:
 
 @inlined
 def offer(nodes: Nodes, key: int, cost: int, total: int, parent: int) -> None:
-    """Add a state, or update it if this path is shorter. The layer must have space."""
+    """Add a state, or update it if the new path is shorter. The layer must have free space."""
     slot = slot_of(nodes, key)
     k = nodes.slots[slot]
     if k < 0:
@@ -104,7 +104,7 @@ def smallest_but(values: NDArray[np.int64], size: int, count: int) -> int:
 
 @kernel
 def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
-    """Keep the `width` most promising states. Return them and the smallest total dropped, or `INFINITE`."""
+    """Return the `width` best states, and the smallest total among the dropped states or `INFINITE`."""
     size = nodes.size[0]
     if size <= width:
         return nodes, INFINITE
@@ -129,7 +129,7 @@ def keep_best(nodes: Nodes, width: int) -> tuple[Nodes, int]:
 
 @kernel
 def with_room_among(nodes: Nodes, more: int, width: int) -> tuple[Nodes, int]:
-    """Make space for `more` states, if needed by dropping states that cannot be among the best `width`."""
+    """Make space for `more` states. If necessary, drop states that cannot be among the best `width`."""
     smallest = INFINITE
     if nodes.size[0] + more > nodes.key.size and nodes.size[0] > 4 * width:
         nodes, smallest = keep_best(nodes, 2 * width)

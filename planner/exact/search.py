@@ -1,4 +1,4 @@
-"""Annealing, then a layered search that widens until the tour is proven or the budget is spent."""
+"""Find tours by annealing, then by beam searches of increasing width, until a tour is proven optimal."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from planner.plan import Certificate, Proof
 from planner.solvers import NEVER, Deadline
 
 ANNEALING_MOVES = 10_000
-# Effort for a first plan from a warm start, about 20 ms in total.
+# Limits for finding a first plan from a warm start, in about 20 ms
 WARM_MOVES, WARM_ROWS, WARM_WIDTH = 3_000, 1 << 14, 800
 WARM_TEMPERATURES = (0.1, 0.02)  # first and last temperature, relative to the mean leg length
 
@@ -30,10 +30,9 @@ def improving_tours(
     passes: tuple[tuple[int, int], ...],
     start: Start | None,
 ) -> Iterator[Solution]:
-    """Yield a first tour and bound, then the best ones after each pass of the search.
+    """Yield a first tour with a lower bound, then the best tour and bound after each pass of the search.
 
-    `work` is the maximum number of states to expand. The first tour is always found, but no pass begins after the
-    deadline.
+    `work` is the maximum number of states to expand. No pass begins after the deadline.
     """
     bound, upper, lower, actions = _first_tour(instance, seed, work, start)
     yield Solution(actions, min(lower, upper), _certificate(bound))
@@ -43,7 +42,7 @@ def improving_tours(
         width = min(wanted, work // rate)
         if lower >= upper - instance.tie or width < min(wanted, done + 1) or deadline.over():
             break
-        if rows >= BIN_ROWS and not by_bin:  # only once, before the first table of this size
+        if rows >= BIN_ROWS and not by_bin:  # group by bin once, before the first table of this size
             bound, by_bin = counted_by_bin(bound, upper, BIN_ROWS, deadline), True
         bound = grown(bound, upper, rows, deadline)
         result = beam_pass(bound, upper, width, work, deadline)
@@ -59,7 +58,6 @@ def improving_tours(
 def _first_tour(
     instance: Instance, seed: int, work: int, start: Start | None
 ) -> tuple[Bound, int, int, list[int]]:
-    """Return a bound, the length of a first tour, a lower bound on all tours, and the actions of the first tour."""
     if start is None:
         length, order = anneal(instance, seed, ANNEALING_MOVES)
         bound = first_bound(instance, int(length))
@@ -87,19 +85,19 @@ def _certificate(bound: Bound) -> Certificate:
 
 
 class Pass(NamedTuple):
-    """Result of one pass of the search."""
+    """The result of one pass of the search."""
 
     upper: int  # length of the best known tour
-    actions: list[int] | None  # actions of that tour if this pass found it
-    lower: int  # lower bound on all tours
+    actions: list[int] | None  # actions of the best known tour if this pass found it, or None
+    lower: int  # lower bound on tour lengths
     expanded: int  # number of expanded states
 
 
 def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: Deadline) -> Pass:
-    """Search all layers once for tours shorter than `upper`, keeping `width` states of each layer.
+    """Search all layers once for a tour shorter than `upper`, keeping the best `width` states of each layer.
 
-    Tours must be shorter by more than a tie. If more than `max_states` states were expanded or the deadline has passed,
-    the pass ends early with the lower bound of the root.
+    A new tour must be shorter by more than the tie tolerance. If more than `max_states` states were expanded
+    or the deadline has passed, the pass ends early and returns the lower bound of the root.
     """
     n, prices = len(bound.instance.home), bound.prices
     limit = upper - bound.instance.tie + prices
@@ -130,7 +128,6 @@ def beam_pass(bound: Bound, upper: int, width: int, max_states: int, deadline: D
 def _actions(
     bound: Bound, history: list[tuple[NDArray[np.int64], NDArray[np.int64]]], layer: int, end: int
 ) -> list[int]:
-    """Follow the parents back from the end of a tour, and return the tour's actions."""
     keys = []
     k = end
     while True:

@@ -14,24 +14,24 @@ from planner.problem import RoutingProblem, make_plan
 from planner.solvers import Deadline, SolveLimit
 
 TABLE_RATE = 500e6  # approximate speed at which a full table is filled, in bytes per second
-DEFAULT_WORK = 4_000_000  # default number of states to expand, about 4 s including tables
+DEFAULT_WORK = 4_000_000  # default number of states to expand, which takes about 4 s including tables
 MAX_OBJECTS = 40
 
 
 @dataclass(frozen=True)
 class ExactSolver:
-    """Planner that uses a full table, or annealing and a search, until the plan is proven or the budget is spent.
+    """A planner that finds optimal tours with a full table, or with annealing and a beam search.
 
-    `SolveLimit.work` counts the states that the search expands. A full table is always finished.
+    `SolveLimit.work` is the maximum number of states that the search expands. It does not limit full tables.
 
     Attributes:
-        name: Name in run records.
-        table_bytes: Maximum size of a full table in bytes. 0 disables full tables.
-        passes: For each pass, the maximum number of table rows of the bound and of states kept per layer.
+        name: Name of the planner in run records.
+        table_bytes: Maximum size of a full table in bytes. A value of 0 disables full tables.
+        passes: Limits of each pass: number of rows in the bound's table, and number of states kept per layer.
     """
 
     name: str = "exact"
-    table_bytes: int = 1 << 27  # enough for 18 objects and 6 bins, filled in 0.1 s
+    table_bytes: int = 1 << 27  # enough for 18 objects and 6 bins, which takes 0.1 s
     passes: tuple[tuple[int, int], ...] = (
         (600, 1_500),
         (2_500, 8_000),
@@ -44,13 +44,13 @@ class ExactSolver:
     )
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """Solve a problem. The plan is OPTIMAL if proven, else FEASIBLE with the best known bound.
+        """Solve a problem. The plan is OPTIMAL if proven, and otherwise FEASIBLE with the best known bound.
 
-        The default limit is 4 million states. `limit.work` is not passed to OR-Tools, which counts other work.
+        The default limit is 4 million states. If OR-Tools solves the problem, `limit.work` does not apply.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
-            from planner.ortools_solver import OrToolsSolver  # imported late, because it is slow to import
+            from planner.ortools_solver import OrToolsSolver  # imported here because it is slow to import
 
             return OrToolsSolver().solve(problem, limit=replace(limit, work=None))
         *_, best = self._plans(problem, seed, limit, table_at_once=True)
@@ -64,10 +64,10 @@ class ExactSolver:
         limit: SolveLimit | None = None,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Yield the annealed tour with a first bound, then every shorter tour or better bound.
+        """Yield a first plan from annealing, then every plan with a shorter tour or a better bound.
 
-        With a warm start, the first plan comes from a narrow search and is better. The last plan can differ from the
-        result of `solve` if it is not proven or if there are several optimal plans.
+        With a warm start, the first plan comes from a narrow search and is usually better. The last plan can
+        differ from the result of `solve` if it is not proven optimal or if there are several optimal plans.
         """
         limit = limit or SolveLimit()
         if not self.applies(problem):
@@ -85,7 +85,7 @@ class ExactSolver:
         return not self.why_not(problem)
 
     def why_not(self, problem: RoutingProblem) -> str:
-        """Return the reason why only OR-Tools can solve the problem, or an empty string."""
+        """Return the reason why this planner cannot solve a problem itself, or an empty string."""
         if problem.capacity > 2:
             return f"the capacity of {problem.capacity} is above 2"
         if len(problem.shipments) > MAX_OBJECTS:
@@ -104,7 +104,6 @@ class ExactSolver:
         table_at_once: bool,
         warm: WarmStart | None = None,
     ) -> Iterator[Plan]:
-        """Yield successively better plans, or only one if a table is filled at once."""
         started = time.perf_counter()
         metric = problem.integers.metric
         instance = make_instance(problem, metric)
@@ -131,8 +130,7 @@ class ExactSolver:
         tabled: bool,
         start: Start | None,
     ) -> Iterator[Solution]:
-        """Yield the annealed tour, then the result of the full table or those of the search."""
-        from planner.exact.search import improving_tours  # imported late, because kernels take 0.5 s to load
+        from planner.exact.search import improving_tours  # imported here because it takes 0.5 s to import
 
         deadline = Deadline(None if limit.seconds is None else started + limit.seconds, limit.stop)
         passes = () if tabled else self.passes

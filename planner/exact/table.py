@@ -1,21 +1,25 @@
-"""Cost-to-go tables over subsets of objects: exact ones, and relaxed ones that give lower bounds.
+"""Cost-to-go tables, which are either exact, or relaxed to give lower bounds.
 
-U is the set of objects not yet picked up, and c_j is the bin of object j. The cost-to-go is E(U, b) at bin b with empty
-hands, V(U, b, d) at bin b with one object for d in hand, where V(U, d, d) = E(U, d), Y(U, i) at object i with only that
-object in hand, and W(U, j, d) at object j with it and one for d in hand. Placing an object when its bin is reached
-costs nothing and is optimal in a metric.
+U is the set of objects that have not been picked up, and c_j is the bin of object j. The cost-to-go is
+
+    E(U, b)     at bin b with empty hands,
+    V(U, b, d)  at bin b with an object for bin d in hand, where V(U, d, d) = E(U, d),
+    Y(U, i)     at object i with only this object in hand, and
+    W(U, j, d)  at object j with this object and an object for bin d in hand.
+
+Placing an object as soon as its bin is reached is optimal if the triangle inequality holds.
 
     W(U, j, d) = min( D(j, d) + V(U, d, c_j),  D(j, c_j) + V(U, c_j, d) )
     V(U, b, d) = min( D(b, d) + E(U, d),       min_{j in U} D(b, j) + W(U - j, j, d) )
     Y(U, i)    = min( D(i, c_i) + E(U, c_i),   min_{j in U} D(i, j) + W(U - j, j, c_i) )
     E(U, b)    = min_{i in U} D(b, i) + Y(U - i, i);    E({}, b) = 0
 
-The relaxation (Christofides, Mingozzi and Toth 1981) puts objects into groups and counts the remaining objects of each
-group. Any object of a group may then be picked up, but not twice in a row. Each pick of j costs an additional
-multiplier. For any multipliers and groups, subtracting the multipliers of U gives a lower bound on the cost-to-go. The
-table is exact if each object is its own group and all multipliers are 0.
+The relaxation (Christofides, Mingozzi and Toth 1981) divides the objects into groups and counts the remaining
+objects of each group. Any object of a group may be picked up, but not twice in a row. Each pick of an object
+costs an additional multiplier. For any groups and multipliers, a lower bound on the cost-to-go is obtained by
+subtracting the multipliers of U. The table is exact if each object forms a group and all multipliers are 0.
 
-This module needs only NumPy. `planner.exact.table_kernels` computes the same numbers.
+This module needs only NumPy. `planner.exact.table_kernels` computes the same values faster.
 """
 
 import math
@@ -28,40 +32,40 @@ from numpy.typing import NDArray
 from planner.exact.instance import FAR, Instance
 from planner.plan import Certificate
 
-BIN_ROWS = 50_000  # maximum number of rows of a table grouped by bin, enough for 30 objects and 6 bins
-SPARE = 8  # number of entries after the last row, because kernels read eight at a time
-# Maximum leg and price at which tours of 40 objects fit into int32, and maximum price for int64, in units.
+BIN_ROWS = 50_000  # row limit of a table with one group per bin, enough for 30 objects and 6 bins
+SPARE = 8  # number of unused entries after the last row, because kernels read eight at a time
+# Maximum leg and price for which tours of 40 objects fit into int32, and maximum price for int64, in units
 LONGEST_32, DEAREST_32, DEAREST_64 = 1 << 21, 1 << 23, 1 << 53
-INFINITE = 1 << 60  # a length greater than any sum of legs
+INFINITE = 1 << 60  # length greater than any sum of legs
 
 
 class CostTable(NamedTuple):
-    """Cost-to-go of the relaxed problem, including multipliers, by number of remaining objects of each group.
+    """A table of the relaxed cost-to-go, including multipliers.
 
-    The row index is a mixed-radix number with one digit per group, which counts the group's remaining objects. If every
-    object is its own group, the row index is the bit mask of the remaining objects. Entries are int32 if all sums fit,
-    else int64.
+    The row index is a mixed-radix number. It contains one digit per group, which is the number of remaining
+    objects in that group. If every object forms its own group, the row index is the bit mask of the remaining
+    objects. Entries are int32 if all sums fit, and otherwise int64.
     """
 
     group: NDArray[np.int64]  # group of each object, numbered from 0, shape (n,)
-    size: NDArray[np.int64]  # number of objects of each group, shape (groups,)
-    stride: NDArray[np.int64]  # decrease of the row index when an object is picked up, shape (n,)
-    # each row contains, for every b, V(., b, d) and V(., d, b) for all d, followed by Y
+    size: NDArray[np.int64]  # number of objects in each group, shape (groups,)
+    stride: NDArray[np.int64]  # amount by which picking up an object reduces the row index, shape (n,)
+    # Each row contains V(., b, d) and V(., d, b) for all d, for one bin b after another, and then Y.
     entries: NDArray[np.integer[Any]]
     bin: NDArray[np.integer[Any]]  # view of E and V in `entries`, indexed [row, b, d], shape (rows, m, m)
-    # view of Y in `entries`, shape (rows, n); valid at i only in rows where one of i's group has been picked up
+    # View of Y in `entries`, shape (rows, n). Entry i is valid only if an object of i's group was picked up.
     object: NDArray[np.integer[Any]]
     multipliers: NDArray[np.int64]  # price of picking up each object, shape (n,)
-    dearest: int  # maximum absolute value of a multiplier for the type of the entries
+    dearest: int  # maximum absolute value of a multiplier for the data type of the entries
 
 
 @dataclass(frozen=True)
 class Solution:
-    """A tour, and a lower bound with its proof."""
+    """A tour, and a lower bound on tour lengths with its proof."""
 
-    # k >= 0 picks up object k, and -1 - b goes to bin b and places all objects that belong there
+    # Action k >= 0 picks up object k. Action -1 - b goes to bin b and places all objects that belong there.
     actions: list[int]
-    bound: int  # lower bound on all tours, in units
+    bound: int  # lower bound on tour lengths, in units
     certificate: Certificate
 
 
@@ -71,7 +75,7 @@ def rows_of(group: NDArray[np.int64]) -> int:
 
 
 def new_table(inst: Instance, group: NDArray[np.int64]) -> CostTable:
-    """Return an unfilled table without multipliers, given the group of each object, numbered from 0."""
+    """Return an unfilled table with multipliers of 0. `group` contains the group number of each object."""
     n, m = inst.to_bin.shape
     size = np.bincount(group).astype(np.int64)
     below = np.ones(len(size) + 1, np.int64)
@@ -97,7 +101,7 @@ def _longest(inst: Instance) -> int:
 
 
 def fill_layers(inst: Instance, table: CostTable) -> None:
-    """Fill all rows with NumPy, in order of the number of remaining objects. Each object must be its own group."""
+    """Fill all rows with NumPy, starting with the fewest objects. Each object must form its own group."""
     n, m = inst.to_bin.shape
     bins, objects = np.arange(m), np.arange(n)
     there = (np.arange(1 << n)[:, None] >> objects & 1).astype(bool)
@@ -109,20 +113,20 @@ def fill_layers(inst: Instance, table: CostTable) -> None:
         j = np.nonzero(there[rows])[1].reshape(-1, k)  # remaining objects, shape (rows, k)
         left, c, legs = rows[:, None] - (1 << j), inst.home[j], inst.to_bin[j]
         own = legs + table.bin[left[..., None], bins, c[..., None]]
-        second = np.minimum(own, drop[j][..., None] + table.bin[left, c])  # W, shape (rows, k, m)
-        empty = (legs + table.object[left, j][..., None]).min(axis=1)  # E, shape (rows, m)
-        carrying = (legs[..., None] + second[:, :, None]).min(axis=1)  # V, shape (rows, m, m)
+        second = np.minimum(own, drop[j][..., None] + table.bin[left, c])  # values of W, shape (rows, k, m)
+        empty = (legs + table.object[left, j][..., None]).min(axis=1)  # values of E, shape (rows, m)
+        carrying = (legs[..., None] + second[:, :, None]).min(axis=1)  # values of V, shape (rows, m, m)
         carrying = np.minimum(carrying, inst.bins + empty[:, None])
         carrying[:, bins, bins] = empty
-        alone = (inst.between[j] + second[..., inst.home]).min(axis=1)  # Y, shape (rows, n)
+        alone = (inst.between[j] + second[..., inst.home]).min(axis=1)  # values of Y, shape (rows, n)
         table.bin[rows], table.object[rows] = carrying, np.minimum(alone, drop + empty[:, inst.home])
 
 
 def walk(inst: Instance, table: CostTable, row: int, actions: NDArray[np.int64]) -> tuple[int, int]:
-    """Follow a best (relaxed) tour from the root. Return its length with multipliers and its number of actions.
+    """Follow a shortest tour in the table. Return its length with multipliers and its number of actions.
 
-    `row` is the table row of the objects left at the root. `actions`, of shape (2 n + 2,) or larger, receives the
-    actions (see `Solution`). `table_kernels` compiles this function.
+    `row` is the table row of the objects that remain at the start. The actions, as defined in `Solution`, are
+    written to `actions`, of shape (2 n + 2,) or larger. `table_kernels` compiles this function.
     """
     to_object, to_bin, at = inst.root, inst.root_bin, -1
     first = inst.carried[0] if inst.carried.size > 0 else -1  # bins of the objects in hand, -1 for none

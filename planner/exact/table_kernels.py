@@ -1,7 +1,7 @@
-"""Compiled kernels that fill a table of `planner.exact.table` and follow a best tour in it.
+"""Compiled kernels that fill cost-to-go tables and extract shortest tours from them.
 
-They compute eight sums and minima at a time. Without this, filling a table takes 2.4 times as long, because LLVM does
-not vectorize loops over about six bins. Array bounds are not checked.
+The kernels process eight entries at a time, because LLVM does not vectorize loops over as few as six bins.
+Filling a table one entry at a time would take 2.4 times as long. Array bounds are not checked.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from planner.exact import table as tables
 from planner.exact.instance import FAR, Instance
 from planner.exact.table import CostTable
 
-LANES = 8  # number of integers processed at once
+LANES = 8  # number of table entries processed at once
 
 Entries = NDArray[np.integer[Any]]
 
@@ -25,7 +25,7 @@ walk = kernel(tables.walk)
 
 
 def _min_plus(*, each: bool) -> Any:
-    """Generate `out[o + l] = min(out[o + l], a[i + l] + b[k])` for all lanes l, with `b[k + l]` if `each`."""
+    """Return an intrinsic for `out = min(out, a + b)` on eight entries, with a single `b` unless `each`."""
 
     def typed(_: Any, out: Any, _o: Any, a: Any, _i: Any, b: Any, _k: Any) -> Any:
         size = out.dtype.bitwidth // 8
@@ -67,20 +67,20 @@ def fill(inst: Instance, table: CostTable) -> None:
 
 
 class Legs(NamedTuple):
-    """Flat arrays of an instance's distances, used by `fill_rows`.
+    """The distances of an instance as flat arrays for `fill_rows`.
 
-    Rows over bins are padded to `lanes` entries, a multiple of eight.
+    Rows with one entry per bin are padded to `lanes` entries, which is a multiple of eight.
     """
 
-    to_bin: Entries  # from each object to all bins, shape (n lanes,)
-    from_bin: Entries  # from all bins to each object, plus its price, shape (n lanes,)
-    bins: Entries  # between bins, shape (m lanes,)
-    # from each object to its bin, then between objects plus the price of the next, shape ((1 + n) places,)
+    to_bin: Entries  # distances from each object to all bins, shape (n * lanes,)
+    from_bin: Entries  # distances from all bins to each object plus its price, shape (n * lanes,)
+    bins: Entries  # distances between bins, shape (m * lanes,)
+    # Distances from objects to their bins, then those between objects plus prices, shape ((1 + n) * places,)
     between: Entries
-    # index of each object in a row of `between`, where each bin starts at a multiple of eight, shape (n,)
+    # Index of each object in a row of `between`, shape (n,). Each bin starts at a multiple of eight.
     place: NDArray[np.int64]
     bin_of: NDArray[np.int64]  # bin of each group of eight entries in a row of `between`
-    far: int  # a length greater than that of any tour
+    far: int  # length greater than that of any tour
 
 
 @inlined
@@ -121,7 +121,7 @@ def legs_of(inst: Instance, table: CostTable) -> Legs:
 
 @kernel
 def left_of(table: CostTable, row: int) -> NDArray[np.int64]:
-    """Return the number of remaining objects of each group in a row, shape (groups,)."""
+    """Return the number of objects of each group that remain in a table row, shape (groups,)."""
     left = np.empty(table.size.size, np.int64)
     for g in range(left.size):
         left[g] = row % (table.size[g] + 1)
@@ -131,16 +131,16 @@ def left_of(table: CostTable, row: int) -> NDArray[np.int64]:
 
 @kernel
 def fill_rows(inst: Instance, table: CostTable, first: int, last: int) -> None:
-    """Fill the rows `first` to `last` - 1. All rows before them must be filled.
+    """Fill the table rows from `first` to `last` - 1. All previous rows must already be filled.
 
-    Bins, and the objects of a bin, are processed eight at a time. Lanes without a bin or an object are ignored.
+    Bins and the objects of each bin are processed eight at a time. The results of unused lanes are ignored.
     """
     n, m = inst.to_bin.shape
     wide, dtype, entries, width = lanes_for(m), table.entries.dtype, table.entries, 2 * m * m + n
     legs, left = legs_of(inst, table), left_of(table, first)
-    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # remaining objects; W without prices
-    empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # E and V of a row
-    holding = np.empty(legs.bin_of.size * LANES, dtype)  # Y of a row
+    picked, second = np.empty(n, np.int64), np.empty(n * wide, dtype)  # indices of objects, and values of W
+    empty, carrying = np.empty(wide, dtype), np.empty(m * wide, dtype)  # values of E and V in a row
+    holding = np.empty(legs.bin_of.size * LANES, dtype)  # values of Y in a row
     for row in range(first, last):
         second[:], empty[:], carrying[:] = legs.far, legs.far, legs.far
         count = 0
@@ -190,7 +190,7 @@ def _hold(
 
 @inlined
 def count_on(table: CostTable, left: NDArray[np.int64]) -> None:
-    """Update the number of remaining objects of each group from a row to the next one."""
+    """Advance the numbers of remaining objects per group to the next table row."""
     for g in range(left.size):
         left[g] += 1
         if left[g] <= table.size[g]:

@@ -1,4 +1,4 @@
-"""Costs of possible next visits, from one full table or one exhaustive pass."""
+"""Compute the costs of all possible next visits from a full table or by an exhaustive search."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from planner.exact.table import INFINITE, CostTable
 from planner.plan import Visit, VisitKind
 from planner.solvers import Deadline
 
-UNLIMITED = 1 << 40  # pass width at which all states are kept
+UNLIMITED = 1 << 40  # search width at which no states are dropped
 
 Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 
@@ -22,9 +22,10 @@ Costs = dict[Visit, int]  # length of the remaining tour in units, by next visit
 def costs_in(
     instance: Instance, table: CostTable, row: int, names: Sequence[str], carried: Sequence[str]
 ) -> Costs:
-    """Return the costs of all next visits from a table. A relaxed table gives lower bounds, including prices.
+    """Return the cost of each possible next visit. A relaxed table gives lower bounds that include prices.
 
-    `row` is the table row of the objects left at the root. `names` and `carried` are names of the instance's objects.
+    `row` is the table row of the objects that remain at the start. `names` contains the names of the
+    instance's objects, and `carried` the names of the carried objects.
     """
     held, home = instance.carried.tolist(), instance.home
     costs = {}
@@ -47,11 +48,11 @@ def costs_in(
 def costs_by_pass(
     bound: Bound, visits: Sequence[Visit], longest: int, max_states: int, deadline: Deadline
 ) -> Costs | None:
-    """Return the costs of all next visits in units. Costs up to `longest` are exact. Larger ones are not.
+    """Return the cost of each possible next visit in units. Costs above `longest` are not exact.
 
-    The pass visits every state on a tour of at most this length. A backward sweep then computes the shortest remaining
-    tour from each state. `visits` lists the possible next visits: places of carried objects, then picks. The result is
-    None if there are more than `max_states` states or the deadline has passed.
+    The search visits every state on a tour of at most this length. A backward sweep then computes the
+    shortest remaining tour from each state. `visits` lists the possible next visits, places first. The
+    result is None if there are more than `max_states` states or the deadline has passed.
     """
     instance, table = bound.instance, bound.table
     n = len(instance.home)
@@ -100,7 +101,7 @@ def after_second(
 
 @kernel
 def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the length of the remaining tour from each state of a layer, given those of the next layer."""
+    """Return the remaining tour length of each state in a layer, given the lengths for the next layer."""
     n, m = inst.to_bin.shape
     size = here.size[0]
     rest = np.full(size, INFINITE, np.int64)
@@ -136,7 +137,7 @@ def sweep(inst: Instance, here: Nodes, after: Nodes, after_rest: NDArray[np.int6
 def root_costs(
     inst: Instance, here: Nodes, rest: NDArray[np.int64], after: Nodes, after_rest: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Return the tour length for each possible next visit: places of carried objects, then picks."""
+    """Return the tour length for each possible next visit. Visits that place carried objects come first."""
     n, m = inst.to_bin.shape
     count = inst.carried.size
     everything = (1 << n) - 1

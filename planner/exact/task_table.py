@@ -1,7 +1,7 @@
-"""A full table for successive states of a task.
+"""A full table that is reused for successive states of a task.
 
-The table stays valid in all later states in which no object was moved, wherever the person is and whatever is carried.
-It is filled once 18 objects are left.
+The table remains valid until an object is moved. It does not depend on the person's position or the carried
+objects. It is filled as soon as at most 18 objects remain.
 """
 
 import time
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 
 class TableState(NamedTuple):
-    """A state of a task as a row of a full table. The instance has the person's current position as its root."""
+    """A task state as a row of a full table. The root of the instance is the person's current position."""
 
     instance: Instance
     table: CostTable
     row: int
     names: tuple[str, ...]
     metric: NDArray[np.int64]  # integer distances of the current problem, shape (k, k)
-    unit: float  # length of a unit in metres
+    unit: float  # length of one unit in metres
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,14 @@ class _Filled:
 
 
 class TaskTable:
-    """Fills a full table if it is small enough for the solver, and keeps it until an object is moved."""
+    """A cache of a full table, which is kept until an object is moved."""
 
     def __init__(self, solver: "ExactSolver") -> None:
         self._solver = solver
         self._filled: _Filled | None = None
 
     def plan(self, problem: RoutingProblem) -> Plan | None:
-        """Return a proven plan, or None if the table would be too large or does not apply."""
+        """Return a plan that is proven optimal, or None if no full table can be used for the problem."""
         started = time.perf_counter()
         state = self._at(problem)
         if state is None:
@@ -58,11 +58,11 @@ class TaskTable:
         return make_plan(problem, state.metric, visits, length, started, certificate)
 
     def costs(self, problem: RoutingProblem) -> tuple[dict[Visit, int], float] | None:
-        """Return the length of the remaining tour for each possible next visit in units, and the unit in metres.
+        """Return the cost of each possible next visit in units, and the unit in metres.
 
-        The result is None if the table would be too large or does not apply.
+        A cost is the length of the remaining tour. The result is None if no full table can be used.
         """
-        from planner.exact.table_regret import costs_in  # imported late, because it loads the kernels
+        from planner.exact.table_regret import costs_in  # imported here because it loads the kernels
 
         state = self._at(problem)
         if state is None:
@@ -84,7 +84,7 @@ class TaskTable:
 
 
 def _state(filled: _Filled, problem: RoutingProblem) -> TableState | None:
-    """Return a problem's state in a table filled for another problem, or None if that table does not contain it."""
+    """Return the state of a problem in an existing table, or None if the table does not contain it."""
     before, n = filled.problem, len(problem.shipments)
     same_kind = (problem.capacity, problem.resolution) == (before.capacity, before.resolution)
     if not same_kind or not set(problem.names) <= set(before.names):

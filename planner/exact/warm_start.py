@@ -1,7 +1,7 @@
-"""Warm starts: results of earlier plans for similar problems.
+"""Warm starts, which reuse the results of earlier plans for similar problems.
 
-Multipliers give a valid lower bound for any remaining objects, so those from one state of a task apply to all later
-states. Only the table has to be filled again.
+Multipliers give a valid lower bound for any set of remaining objects, so they can be reused in all later
+states of a task. Only the table must be filled again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from planner.problem import RoutingProblem
 
 
 class Start(NamedTuple):
-    """A warm start in terms of an instance's object indices."""
+    """A warm start in which objects are identified by their indices in an instance."""
 
     group: NDArray[np.int64]  # group of each object, numbered from 0, shape (n,)
     multipliers: NDArray[np.int64]  # price of picking up each object in units, shape (n,)
@@ -26,14 +26,14 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True)
 class WarmStart:
-    """Results of earlier plans, by object name."""
+    """The results of earlier plans, in which objects are identified by name."""
 
     multipliers: Mapping[str, float]  # price of picking up each object in the relaxation, in metres
     groups: tuple[tuple[str, ...], ...] = ()  # groups of objects that the relaxation counts together
-    order: tuple[str, ...] = ()  # objects in the order in which a good tour picks them up
+    order: tuple[str, ...] = ()  # object names in the order in which a good tour picks them up
 
     def updated(self, problem: RoutingProblem, plan: Plan) -> "WarmStart":
-        """Return a warm start with the results of one more plan. Multipliers of other objects are kept."""
+        """Return a copy that includes the results of another plan. Multipliers of other objects are kept."""
         order = tuple(name for kind, name in plan.visits if kind is VisitKind.PICK)
         certificate = plan.certificate
         if certificate is None or certificate.proof is not Proof.RELAXATION:
@@ -44,7 +44,7 @@ class WarmStart:
         return WarmStart({**self.multipliers, **new}, groups, order)
 
     def numbered(self, names: Sequence[str], unit: float) -> Start | None:
-        """Convert the warm start to object indices, for an instance with these names and a unit in metres.
+        """Replace object names by indices, for an instance with the given names and a unit in metres.
 
         Return None if no multiplier of these objects is known. New objects get the mean price and join the first group.
         """

@@ -1,1 +1,1 @@
-"""Power, cost and preregistration of studies."""
+"""Plan studies: statistical power, cost and preregistration."""

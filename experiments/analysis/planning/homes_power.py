@@ -1,9 +1,9 @@
-"""Power of a study in several homes, as a function of the numbers of homes, participants and trials.
+"""Compute the statistical power of a study that uses several homes.
 
-The variances come from a mixed model of simulated participants. The design is balanced: every condition has the same
-number of participants, every participant the same number of trials, and all conditions use the same homes. A home's
-effect on all conditions cancels in their differences. The mean of a condition therefore varies with its participants,
-with the interaction of condition and home, and with the trials.
+The variances are estimated with a mixed model of simulated participants. The design is balanced: all
+conditions use the same homes and have equally many participants, who have equally many trials each. An effect
+of a home on all conditions cancels in their differences. The power therefore depends on the variances
+between participants and between trials, and on the interaction between condition and home.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,13 +27,13 @@ SLOPE = "house x assistance"
 
 @dataclass(frozen=True)
 class HomesPower:
-    """Power to detect a difference between conditions, by number of homes and participants per condition.
+    """The power to detect a difference between conditions, for several numbers of homes and participants.
 
     Attributes:
         trials: Number of trials per participant.
         means: Mean of the measure in each condition.
-        variances: Variances between participants, of the interaction of condition and home, and of the residual.
-        power: Matrix of power, with one row per number of homes and one column per number of participants.
+        variances: Variances of participants, of the interaction of condition and home, and of the residual.
+        power: Power for each number of homes (rows) and each number of participants per condition (columns).
     """
 
     origin: str
@@ -56,14 +56,14 @@ def homes_power(
     difference: float | None = None,
     alpha: float = 0.05,
 ) -> HomesPower:
-    """Compute the power for each combination of `homes` and `people` from a pool of trials in several homes.
+    """Compute the power for every combination of a number of homes and a number of participants.
 
-    The condition means are taken from the pool. If `difference` is given, it is the difference between the first and
-    the last condition, and the means of the others are halfway between them.
+    Means and variances are estimated from the trials in `table`. If `difference` is given, it replaces the
+    difference between the first and the last condition, and all other means are halfway between these two.
 
     Raises:
-        ConfigError: A combination does not form a valid design.
-        StatisticsError: The variances cannot be estimated from the pool.
+        ConfigError: A combination of numbers is not a valid design.
+        StatisticsError: The variances cannot be estimated from the trials.
     """
     if measure not in table.columns:
         raise ConfigError(f"there is no measure {measure!r}; there are {', '.join(table.columns)}")
@@ -107,21 +107,21 @@ def power_of_design(
     trials: int,
     alpha: float = 0.05,
 ) -> float:
-    """Compute the power of an F test of the conditions with Satterthwaite's degrees of freedom.
+    """Compute the power of an F test that compares the means of the conditions.
 
-    `people` is the number per condition. If a condition has fewer trials than there are homes, it uses one home per
-    trial.
+    The degrees of freedom follow Satterthwaite. `people` is the number of participants per condition. A
+    condition with fewer trials than there are homes uses one home per trial.
     """
     count, each = len(means), people * trials
     used = min(homes, each)
     left = variances["residual"]
-    # Expected mean squares of participants and of homes
+    # The expected mean squares of participants and of homes
     of_people = left + trials * variances["person"]
     of_homes = left + each / used * variances[SLOPE]
     freedom = count * (people - 1), (count - 1) * (used - 1)
-    # Residual degrees of freedom, which are fewest if no home is shared
+    # The lower limit of the residual degrees of freedom applies if every home is used only once.
     rest = max(count * each - sum(freedom) - used, freedom[0])
-    variance = (of_people + of_homes - left) / each  # variance of each condition's mean
+    variance = (of_people + of_homes - left) / each  # variance of the mean of a condition
     parts = np.array([of_people, of_homes, left]) ** 2 / np.array([*freedom, rest])
     df2 = variance**2 * each**2 / float(parts.sum())
     effect = float(np.square(np.array(means) - np.mean(means)).sum()) / variance

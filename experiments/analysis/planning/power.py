@@ -1,8 +1,8 @@
-"""Sample size and cost of a planned study, estimated from simulated participants.
+"""Estimate the sample size and the cost of a planned study from simulated participants.
 
-The sample size is computed from the noncentral F distribution, and its interval by bootstrapping the pool of simulated
-participants. Studies drawn at random from the pool show whether the power also holds for data that are not normal or
-have unequal variances.
+The sample size is computed from the noncentral F distribution. Its confidence interval is obtained by
+bootstrapping the simulated participants. Random samples of these participants are then tested to check that
+the power is also reached with data that are not normal or have unequal variances.
 """
 
 import math
@@ -18,9 +18,9 @@ from experiments.errors import ConfigError, StatisticsError
 from experiments.trials.exclusions import LeftOut
 
 RESAMPLES = 200  # number of bootstrap resamples for the interval of the sample size
-STUDIES = 400  # number of simulated studies to check the power
-COVERAGE = 0.9  # coverage of the sample size's interval
-MIN_POOL = 10  # minimum number of participants in each cell of the pool
+STUDIES = 400  # number of random samples with which the power is checked
+COVERAGE = 0.9  # confidence level of the interval for the sample size
+MIN_POOL = 10  # minimum number of simulated participants per cell of the design
 
 Cell = tuple[str, int]
 Pool = Mapping[Cell, Values]
@@ -28,16 +28,16 @@ Pool = Mapping[Cell, Values]
 
 @dataclass(frozen=True)
 class StudyCost:
-    """Payment, platform fees and time of participants.
+    """Assumptions about the pay, the platform fee, the dropout rate and the time per participant.
 
     Attributes:
         fee: Platform fee as a fraction of the pay.
         dropout: Fraction of participants who start but do not finish.
     """
 
-    pay: float = 7.5  # PAPER section 7
+    pay: float = 7.5  # value from the paper (PAPER section 7)
     fee: float = 0.0
-    minutes: float = 25.0  # PAPER section 7
+    minutes: float = 25.0  # value from the paper (PAPER section 7)
     dropout: float = 0.15
 
     def __post_init__(self) -> None:
@@ -49,11 +49,11 @@ class StudyCost:
                 )
 
     def total(self, people: int) -> float:
-        """Return the total cost if `people` participants finish."""
+        """Return the total cost of a study that `people` participants finish."""
         return people * self.pay * (1 + self.fee)
 
     def hours(self, people: int) -> float:
-        """Return the total hours of all participants, including dropouts, if `people` of them finish."""
+        """Return the hours spent by all participants, including dropouts, if `people` of them finish."""
         return self.to_recruit(people) * self.minutes / 60
 
     def to_recruit(self, people: int) -> int:
@@ -63,13 +63,13 @@ class StudyCost:
 
 @dataclass(frozen=True)
 class Wanted:
-    """The effect that a study should detect: by default, the effect in the pool.
+    """The effect that a planned study should detect. By default, its size is estimated from simulations.
 
     Attributes:
-        measure: Short name of the measured variable.
+        measure: Short name of the measure.
         effect: `assistance`, `objects` or `interaction`.
-        difference: Largest difference between the means of a factor's levels, in units of the measure, or None. The
-            other means are assumed to be halfway between, where the effect is hardest to detect.
+        difference: Largest difference between the means of a factor's levels, in units of the measure, or
+            None. All other means are assumed to be halfway between, which makes the effect hardest to detect.
         eta_squared: Partial eta squared of the effect, or None.
         power: Probability of detecting the effect.
         alpha: Significance level.
@@ -101,11 +101,11 @@ class Wanted:
 
 @dataclass(frozen=True)
 class PowerPlan:
-    """Sample size and cost of a planned study.
+    """The sample size and the cost of a planned study.
 
     Attributes:
-        interval: 90 % bootstrap interval of `per_cell`, or None if the sample size does not depend on the pool.
-        power: Fraction of simulated studies of this size that detect the effect.
+        interval: 90 % bootstrap interval of `per_cell`, or None if `eta_squared` was specified.
+        power: Fraction of random samples of this size in which the effect is detected.
         power_error: Standard error of `power`.
         people: Total number of participants who must finish.
         to_recruit: Number of participants to recruit, including expected dropouts.
@@ -130,13 +130,13 @@ class PowerPlan:
 def plan_power(
     cells: Sequence[Cell], table: StudyTable, wanted: Wanted, cost: StudyCost, *, seed: int = 0
 ) -> PowerPlan:
-    """Compute the number of participants that a study needs in each cell (condition, number of objects).
+    """Compute how many participants a study needs for each combination of condition and number of objects.
 
-    `table` is a pool of participants in the same cells.
+    `table` contains simulated participants with the same combinations.
 
     Raises:
-        ConfigError: The design cannot test the effect.
-        StatisticsError: The pool has too few participants or no variance, or the study would need too many.
+        ConfigError: The effect cannot be tested with this design.
+        StatisticsError: `table` has too few participants or no variance, or the study would need too many.
     """
     pool, rng = _pool(cells, table, wanted), np.random.default_rng(seed)
     eta_squared = _eta_squared(pool, wanted)
@@ -231,7 +231,7 @@ def _interval(pool: Pool, wanted: Wanted, rng: np.random.Generator) -> tuple[int
     for k in range(RESAMPLES):
         try:
             sizes.append(_eta_squared({cell: v[k] for cell, v in drawn.items()}, wanted, draws=2))
-        except StatisticsError:  # the effect vanished in this resample
+        except StatisticsError:  # this resample shows no effect
             sizes.append(0.0)
     small, large = np.quantile(sizes, [(1 - COVERAGE) / 2, (1 + COVERAGE) / 2], method="nearest").tolist()
     cells, freedom = len(pool), _freedom(pool, wanted.effect)
@@ -254,7 +254,7 @@ def _with_effect(pool: Pool, wanted: Wanted, eta_squared: float) -> Pool:
 
 
 def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return a pattern of cell means: -1 and 1 at a factor's extreme levels, otherwise 0. Interactions are products."""
+    """Return contrast weights by cell: -1 and 1 at the first and last level of a factor, and 0 elsewhere."""
 
     def step(cell: Cell, name: str) -> float:
         levels = _levels(pool, name)
@@ -265,7 +265,7 @@ def _pattern(pool: Pool, effect: str) -> dict[Cell, float]:
 
 
 def _own_pattern(pool: Pool, effect: str) -> dict[Cell, float]:
-    """Return the effect's part of each cell mean. Only its pattern is used, because chance inflates its size."""
+    """Return the contribution of an effect to each cell mean. The caller corrects its size for chance."""
     means = {cell: float(v.mean()) for cell, v in pool.items()}
     grand = float(np.mean(list(means.values())))
 

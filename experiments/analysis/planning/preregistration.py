@@ -1,6 +1,6 @@
-"""Preregistrations: ZIP files that freeze a study's design, measures, exclusions, analysis and code.
+"""Write and read preregistrations, which are ZIP files with the design and the analysis code of a study.
 
-Equal studies give identical files, so a file's SHA-256 identifies the study.
+The same study always gives the same file, so the SHA-256 of the file identifies the study.
 """
 
 import hashlib
@@ -39,14 +39,14 @@ ANALYSIS = (
     "experiments/trials/exclusions.py",
 )
 CELL = ("assistance", "objects")
-_DATE = (1980, 1, 1, 0, 0, 0)  # date of every ZIP entry, fixed so that equal studies give identical files
+_DATE = (1980, 1, 1, 0, 0, 0)  # fixed date of all ZIP entries, so that the same study gives the same file
 
 Files = dict[str, bytes]
 
 
 @dataclass(frozen=True)
 class Preregistration:
-    """A frozen study. `sha256` is the hash of the ZIP file, and `design` holds the settings of each trial."""
+    """The contents of a preregistration. `sha256` is the hash of its file, and `design` lists the trials."""
 
     files: Mapping[str, bytes]
     sha256: str
@@ -57,7 +57,7 @@ class Preregistration:
 
 
 def write_preregistration(study: Path, out: Path, measures: Path = FILE) -> str:
-    """Write a study file and a file of measures to a ZIP. Return the ZIP's SHA-256."""
+    """Preregister a study by writing its files to a ZIP file. Return the SHA-256 of that file."""
     design = read_design(study)
     check_names(design.trials)
     read_measures(measures)
@@ -109,7 +109,7 @@ def _json(value: Any) -> bytes:
 
 
 def read_preregistration(path: Path) -> Preregistration:
-    """Read a preregistration. Raises `ConfigError` if the file is not a valid preregistration or has been modified."""
+    """Read a preregistration. Raises `ConfigError` if the file is invalid or has been modified."""
     try:
         data = read_bytes(path)
         files = _unpacked(data)
@@ -153,7 +153,7 @@ def departures(
     folder: Path,
     measures: Measures,
 ) -> list[str]:
-    """Describe each difference between a study and its preregistration in one sentence."""
+    """Return a list of sentences that describe how a study differs from its preregistration."""
     now = _frozen(exclusions, b"")
     found = [*_of_exclusions(frozen.exclusions, exclusions)]
     if frozen.measures != measures:

@@ -1,1 +1,1 @@
-"""Reports on studies: the page, its figures, and checks of assumptions."""
+"""HTML reports on studies, with figures and checks of statistical assumptions."""

@@ -1,4 +1,4 @@
-"""Sections of a report that show how results depend on analytical choices and on statistical assumptions."""
+"""Report sections that show how results depend on analytical choices and statistical assumptions."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from experiments.analysis.statistics.models import residuals_of
 from experiments.analysis.study.analysis import ONE_WAY, TWO_WAY, Analysis, cells_of, tests_of
 
 FISHER, WELCH, HC3 = "Fisher; Type II", "Welch; Welch-James", "HC3"
-ANALYSES = {  # analyses in the order of the matrix's rows, by type of result
+ANALYSES = {  # names of analyses by type of result, in the order in which they are shown
     ONE_WAY: FISHER,
     TWO_WAY: FISHER,
     "two-way, Type III": "Type III",
@@ -39,15 +39,15 @@ COLUMN, ROW = 0.11, 0.17  # width and height of a matrix cell, in inches
 
 
 class Specification(NamedTuple):
-    """A measure analysed in one way, and the result."""
+    """One way of analysing a measure, with the result of the test."""
 
-    reading: str  # column of the study's table
+    reading: str  # table column from which the measure is read
     analysis: str
     test: FTest
 
 
 def specification_curve(analysis: Analysis, name: str, label: str) -> FigureBlock | None:
-    """Draw a specification curve of all effects on a measure. Return None if there are no effects.
+    """Draw a specification curve of all effects on a measure, or return None if no effect was tested.
 
     Source: Simonsohn, Simmons and Nelson 2020, doi:10.1038/s41562-020-0912-z.
     """
@@ -143,7 +143,7 @@ def _residuals(analysis: Analysis, labels: Mapping[str, str]) -> FigureBlock:
 
 
 def assumptions(analysis: Analysis, labels: Mapping[str, str]) -> Iterator[Block]:
-    """Yield tables and figures of residuals, then a table of results under weaker assumptions."""
+    """Yield tables and figures that describe the residuals, and the results under weaker assumptions."""
     found = {r.measure: r.value for r in analysis.results if r.kind == "diagnostics" and r.value}
     if not found:
         return

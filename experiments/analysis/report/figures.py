@@ -1,4 +1,4 @@
-"""Figures of a study as inline SVG. Equal data give identical figures."""
+"""Draw the figures of a study report as inline SVG. The same data always give the same SVG code."""
 
 import io
 import json
@@ -32,20 +32,20 @@ from experiments.record.run_directory import TRIALS, is_run
 from experiments.trials.floor_plan import PLANNED, WALKED, planned_path
 from mjsim.values.episode import Episode
 
-# Okabe-Ito palette, which remains distinguishable with common forms of colour blindness
+# The Okabe-Ito palette, whose colours can be distinguished with common forms of colour blindness
 COLOURS = ("#666666", "#E69F00", "#0072B2", "#009E73", "#CC79A7", "#56B4E9")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 ANSWER_COLOURS = ("#B35806", "#F1A340", "#D8DAEB", "#998EC3", "#542788")
-RASTER_DPI = 200  # resolution of rasterized dots
+RASTER_DPI = 200  # resolution at which dots are rasterized
 PANEL = (3.0, 2.6)  # size of a panel, in inches
 JITTER = 0.12  # maximum horizontal shift of a dot, as a fraction of a category's width
-MAX_DOTS = 2000  # number of dots above which they are rasterized to limit the file size
-WIDTH = 4.0  # width of a panel that shows paths, in inches
+MAX_DOTS = 2000  # number of dots above which all dots are rasterized to limit the file size
+WIDTH = 4.0  # width of a panel with a walked path, in inches
 DISTANCE = "distance"
 
 
 def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
-    """Plot each participant as a dot, and means with 95 % confidence intervals, in one row of panels per measure."""
+    """Plot each participant as a dot, and the mean of each condition with a 95 % confidence interval."""
     levels = table.levels()
     figure = Figure(figsize=(PANEL[0] * len(levels), PANEL[1] * len(labels)), layout="constrained")
     for panels, name in zip(grid(figure, len(labels), len(levels)), labels, strict=True):
@@ -62,7 +62,7 @@ def by_condition(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
 def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None:
     groups = table.groups(name, objects)
     for place, (condition, values) in enumerate(groups.items()):
-        # Use a deterministic jitter so that equal data give identical figures.
+        # Use a deterministic jitter so that the same data always give the same figure.
         shift = JITTER * np.sin(np.arange(len(values)) * 2.4)
         dots = axes.plot(place + shift, values, ".", color=_colour(table, condition), ms=3, alpha=0.5)
         dots[0].set_rasterized(len(values) > MAX_DOTS)
@@ -73,7 +73,7 @@ def _draw_people(axes: Axes, table: StudyTable, name: str, objects: int) -> None
 
 
 def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
-    """Plot condition means against the number of objects, with 95 % confidence intervals, in a panel per measure."""
+    """Plot the condition means of each measure, with 95 % intervals, against the number of objects."""
     figure = Figure(figsize=(PANEL[0] * len(labels), PANEL[1] + 0.3), layout="constrained")
     for axes, name in zip(grid(figure, 1, len(labels))[0], labels, strict=True):
         for k, condition in enumerate(table.conditions()):
@@ -91,7 +91,7 @@ def interactions(table: StudyTable, labels: Mapping[str, str]) -> FigureBlock:
 
 
 def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
-    """Draw a histogram of a measure for each cell, with one row per condition."""
+    """Draw histograms of a measure for each condition (rows) and number of objects (columns)."""
     levels, conditions = table.levels(), table.conditions()
     figure = Figure(figsize=(2.2 * len(levels), 1.3 * len(conditions) + 0.5), layout="constrained")
     panels = figure.subplots(len(conditions), len(levels), squeeze=False, sharex=True, sharey=True)
@@ -112,7 +112,7 @@ def variances(table: StudyTable, name: str, label: str) -> FigureBlock:
 
 
 def answers(analysis: Analysis) -> FigureBlock:
-    """Draw the distribution of answers to each survey item by condition, pooled over all numbers of objects."""
+    """Draw stacked bars of the answers to each survey item, with one bar per condition."""
     table = analysis.table
     items = [name for name in table.columns if name.startswith(LIKERT_PREFIX)]
     figure = Figure(figsize=(7.0, 0.9 * len(items) + 0.6), layout="constrained")
@@ -147,7 +147,7 @@ def svg(figure: Figure, title: str, caption: str) -> FigureBlock:
 
 
 def framed(figure: Figure, title: str, table: StudyTable, caption: str) -> FigureBlock:
-    """Convert a figure to inline SVG, labelled with the origin of the data."""
+    """Label a figure with the origin of its data, and convert it to inline SVG."""
     mark_origin(figure, table.origin)
     return svg(figure, f"{title}. {table.origin}.", caption)
 
@@ -192,10 +192,10 @@ def _draw_line(axes: Axes, table: StudyTable, name: str, condition: str, shift: 
 
 
 def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
-    """Draw the planned and walked paths of one participant per condition. `folder` holds the run directories.
+    """Draw the planned and walked paths of one participant per condition. `folder` contains the runs.
 
     Raises:
-        RecordError: `folder` does not contain run directories of these participants.
+        RecordError: `folder` does not contain the runs of these participants.
     """
     shown = [(row, found) for row in median_people(table) if (found := _run_of(row, folder)) is not None]
     if not shown:
@@ -214,7 +214,7 @@ def paths_figure(table: StudyTable, folder: Path) -> FigureBlock:
 
 
 def median_people(table: StudyTable) -> Iterator[Any]:
-    """Yield one row per condition: the participant with the median distance, at the smallest number of objects."""
+    """Yield the participant with the median walking distance for each condition and the fewest objects."""
     if DISTANCE not in table.columns:
         return
     walked, least = table.columns[DISTANCE], table.levels()[0]
@@ -225,7 +225,7 @@ def median_people(table: StudyTable) -> Iterator[Any]:
 
 
 def _run_of(row: Any, folder: Path) -> Path | None:
-    """Find a row's run directory. Look for the participant first, because equal trials have equal fingerprints."""
+    """Find the run of a table row, by participant if possible, because fingerprints need not be unique."""
     visit = folder / str(row.get("participant")) / TASK
     if is_run(visit):
         return visit

@@ -1,4 +1,4 @@
-"""The report on a study: one HTML file with all figures, tests and models."""
+"""Create the HTML report of a study, with all figures, tests and models in one file."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -44,7 +44,7 @@ PAIR_HEAD = (
 
 
 def report(analysis: Analysis, folder: Path, selection: Selection) -> str:
-    """Return the report as HTML. Paths are drawn if `folder` contains run directories."""
+    """Return the HTML report of an analysis. Walked paths are drawn if `folder` contains run directories."""
     parts = (
         ("Summary", _summary(analysis)),
         ("People", _people(analysis)),

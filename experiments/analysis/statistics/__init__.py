@@ -1,1 +1,1 @@
-"""Statistics of between-subjects studies, computed from plain arrays. Some require statsmodels (extra `study`)."""
+"""Statistical tests and models for between-subjects studies. Some need statsmodels (extra `study`)."""

@@ -1,4 +1,4 @@
-"""Between-subjects analyses of variance with one or two factors."""
+"""Analyses of variance for between-subjects designs with one or two factors."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
 OWN_VARIANCE = "variance, each group in units of its own"
-EFFECTS = ("assistance", "objects", "interaction")  # effects in a two-way analysis of variance
+EFFECTS = ("assistance", "objects", "interaction")  # the effects in a two-way analysis of variance
 
 
 def check_groups(groups: Mapping[str, Values], least: int = 1) -> None:
-    """Raise a `StatisticsError` unless two or more groups have at least `least` values each and some group varies."""
+    """Raise `StatisticsError` if there is only one group, a group is too small, or no group varies."""
     if len(groups) < 2:
         raise StatisticsError(f"there is only one group ({', '.join(groups) or 'none at all'})")
     small = [name for name, values in groups.items() if len(values) < least]
@@ -45,8 +45,8 @@ def one_way(groups: Mapping[str, Values]) -> FTest:
 def welch(groups: Mapping[str, Values]) -> FTest:
     """Compute Welch's analysis of variance, which does not assume equal variances.
 
-    Every group must vary. F * df1 estimates the sum of n (mean - weighted mean)^2 / variance over the groups, whatever
-    df2 is. The effect size and its interval are computed from this sum and the number of values.
+    The values in every group must vary. F * df1 estimates the sum of n (mean - weighted mean)^2 / variance
+    over the groups. The effect size and its interval are computed from this sum and the number of values.
 
     Source: Welch 1951, doi:10.1093/biomet/38.3-4.330.
     """
@@ -69,11 +69,12 @@ def welch(groups: Mapping[str, Values]) -> FTest:
 
 
 def brown_forsythe(groups: Mapping[str, Values]) -> FTest:
-    """Compute a modified Brown-Forsythe test of equal variances, based on the distances from the group medians.
+    """Test whether groups have equal variances, using a modified Brown-Forsythe test.
 
-    Of a group's sorted distances d1 <= d2 <= ... <= dn, d1 carries no information: it is 0 if n is odd, and equal to d2
-    if n is even. It is therefore left out, and d2 is replaced by (d1 + d2) / sqrt(2) if n is even. With d1, the false
-    positive rate would be only 3.5 % at the sample sizes of the paper.
+    The test compares the distances of values from the median of their group. Let d1 <= d2 <= ... <= dn be the
+    sorted distances. The first distance carries no information, because it is 0 if n is odd and equal to d2
+    if n is even. It is therefore left out, and d2 is replaced by (d1 + d2) / sqrt(2) if n is even. With d1,
+    the false positive rate would be only 3.5 % at the sample sizes of the paper.
 
     Sources: Brown and Forsythe 1974, doi:10.1080/01621459.1974.10482955; Hines and Hines 2000,
     doi:10.1111/j.0006-341X.2000.00451.x.
@@ -99,7 +100,7 @@ def _distances(values: Values) -> Values:
 
 
 def _fisher(groups: Mapping[str, Values]) -> FTest:
-    """Compute Fisher's analysis of variance directly, because statsmodels fails if a group has a single value."""
+    """Compute Fisher's analysis of variance without statsmodels, which fails for groups of a single value."""
     members, people = list(groups.values()), people_in(groups)
     grand = np.concatenate(members).mean()
     between = sum(len(v) * float(v.mean() - grand) ** 2 for v in members)
@@ -110,7 +111,7 @@ def _fisher(groups: Mapping[str, Values]) -> FTest:
 
 @dataclass(frozen=True)
 class Cells:
-    """Cell statistics of a design with one or two factors, c cells and n participants.
+    """Statistics of the cells in a design with one or two factors, c cells and n participants.
 
     Attributes:
         columns: Sum-coded columns of the linear model by effect, shape (c, columns): 1 at a level, -1 at the last
@@ -126,7 +127,7 @@ class Cells:
     squares: Values
 
     def residual(self, names: Iterable[str]) -> float:
-        """Return the residual sum of squares if a linear model with these effects is fitted to the cell means."""
+        """Return the residual sum of squares of a linear model of the cell means with the named effects."""
         weights = np.sqrt(self.people)[:, None]
         design = np.hstack([self.columns[name] for name in names]) * weights
         wanted = self.means * weights[:, 0]
@@ -134,7 +135,7 @@ class Cells:
 
 
 def cells_of(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells:
-    """Group values by two factors. All arrays have shape (n,). A second factor with only one level is ignored."""
+    """Group values by two factors. A second factor with only one level is ignored. Arrays have shape (n,)."""
     names, others = np.unique(first), np.unique(second)
     if len(names) < 2:
         raise StatisticsError(f"there is only one level ({', '.join(map(str, names))})")
@@ -160,9 +161,9 @@ def _sum_coded(levels: int) -> Values:
 
 
 def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2) -> dict[str, FTest]:
-    """Compute a two-way analysis of variance with unequal cell sizes. The keys are those in `EFFECTS`.
+    """Compute a two-way analysis of variance, and return the F test of each effect in `EFFECTS`.
 
-    Values and factors have shape (n,). `kind` is the type of the sums of squares, 2 or 3.
+    Values and factors have shape (n,). Cell sizes may differ. `kind` is the type of sums of squares, 2 or 3.
 
     Raises:
         StatisticsError: A cell is empty, every cell has a single value, or no cell varies.
@@ -187,7 +188,7 @@ def two_way(values: Values, first: NDArray[Any], second: NDArray[Any], kind: int
 def two_way_squares(
     values: Values, first: NDArray[Any], second: NDArray[Any], kind: int = 2
 ) -> dict[str, float]:
-    """Return the sum of squares of each effect in a two-way analysis of variance. For the arguments, see `two_way`."""
+    """Return the sum of squares of each effect. The arguments are the same as those of `two_way`."""
     return _squares(_crossed(values, first, second), kind)
 
 
@@ -199,9 +200,9 @@ def _crossed(values: Values, first: NDArray[Any], second: NDArray[Any]) -> Cells
 
 
 def _squares(cells: Cells, kind: int) -> dict[str, float]:
-    """Return the reduction of the residual sum of squares by each effect.
+    """Return the amount by which each effect reduces the residual sum of squares.
 
-    Type II adds the effect to a model without its interaction. Type III adds it to the model with all other effects.
+    For type II, main effects are tested in a model without interaction, and for type III in the full model.
     """
     sums = {}
     for effect in EFFECTS:
@@ -212,7 +213,7 @@ def _squares(cells: Cells, kind: int) -> dict[str, float]:
 
 
 def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """Compute Welch-James tests of both factors and their interaction, with Johansen's approximate degrees of freedom.
+    """Compute Welch-James tests of both factors and their interaction, using Johansen's approximation.
 
     All arrays have shape (n,). Source: Johansen 1980, doi:10.1093/biomet/67.1.85.
     """
@@ -220,9 +221,9 @@ def welch_james(values: Values, assistance: NDArray[Any], objects: NDArray[Any])
 
 
 def hc3(values: Values, assistance: NDArray[Any], objects: NDArray[Any]) -> dict[str, FTest]:
-    """Compute F tests of a linear model with the heteroscedasticity-consistent covariance HC3.
+    """Compute F tests of a linear model with the heteroscedasticity-consistent covariance estimator HC3.
 
-    The model has one mean per cell. HC3 estimates a mean's variance as the cell's variance divided by its size minus 1.
+    The model has one mean per cell, whose variance is estimated as the cell's variance divided by (size - 1).
     All arrays have shape (n,). Source: Long and Ervin 2000, doi:10.1080/00031305.2000.10474549.
     """
     return _tests(values, assistance, objects, 1, lambda statistic, q, _: (statistic / q, None))
@@ -240,7 +241,7 @@ def _tests(
     fewer: int,
     scaled: Callable[[float, int, Values], tuple[float, float | None]],
 ) -> dict[str, FTest]:
-    """Compute a Wald test of each effect. A mean's variance is the cell's variance over its size minus `fewer`."""
+    """Compute a Wald test of each effect. The variance of a cell mean is variance / (size - `fewer`)."""
     cells = cells_of(values, assistance, objects)
     if cells.people.min() < 2:
         raise StatisticsError("a cell has only one person; its variance is unknown")

@@ -1,4 +1,4 @@
-"""Effect sizes with confidence intervals, and the power of F tests."""
+"""Compute effect sizes with confidence intervals, and the power of F tests."""
 
 import bisect
 import math
@@ -15,12 +15,12 @@ from scipy.stats import f, ncf
 
 from experiments.errors import StatisticsError
 
-ETA_CONFIDENCE = 0.90  # with 90 %, the lower bound is above 0 exactly if p < .05 (Steiger 2004)
+ETA_CONFIDENCE = 0.90  # a 90 % interval excludes 0 if and only if p < .05 (Steiger 2004)
 CONFIDENCE = 0.95
 ALPHA = 0.05
 POWER = 0.8
 MAX_PEOPLE = 100_000  # maximum number of participants per cell
-MAX_WIDTH = 12  # maximum search range for the noncentrality of t, in standard errors
+MAX_WIDTH = 12  # largest search range for the noncentrality of t, in standard errors
 MAX_STEPS = 60
 
 Interval = tuple[float, float]
@@ -34,7 +34,7 @@ class FTest:
         df2: Degrees of freedom of the error, which are fractional in Welch's test.
         people: Sample size.
         within: Degrees of freedom within groups if they differ from df2, otherwise None.
-        of: Quantity whose explained fraction is the effect size.
+        of: Quantity that is partly explained by the effect, such as `variance`.
     """
 
     statistic: float
@@ -50,14 +50,14 @@ class FTest:
 
     @property
     def eta_squared(self) -> float:
-        """Partial eta squared: F df1 / (F df1 + degrees of freedom within groups)."""
+        """Partial eta squared, computed as F df1 / (F df1 + degrees of freedom within groups)."""
         return partial_eta_squared(self.statistic, self.df1, self.df2 if self.within is None else self.within)
 
     @cached_property
     def interval(self) -> Interval | None:
-        """90 % confidence interval of partial eta squared.
+        """The 90 % confidence interval of partial eta squared.
 
-        It is converted from the interval of the noncentrality L by L / (L + sample size). Source: Steiger 2004,
+        Each limit is L / (L + sample size), where L is a limit of the noncentrality. Source: Steiger 2004,
         doi:10.1037/1082-989X.9.2.164, equations 9 and 17.
         """
         found = f_interval(self.statistic, self.df1, self.df2, ETA_CONFIDENCE)
@@ -66,10 +66,10 @@ class FTest:
         return found[0] / (found[0] + self.people), found[1] / (found[1] + self.people)
 
     def p_of_equivalence(self, bound: float) -> float:
-        """Return the p-value of an equivalence test. A value below .05 shows that partial eta squared is below `bound`.
+        """Return the p-value of the hypothesis that partial eta squared is not smaller than `bound`.
 
-        It is the probability of an F at most this large if partial eta squared equals the bound. Source: Campbell and
-        Lakens 2021, doi:10.1111/bmsp.12201.
+        This is the probability of an F no larger than the observed one if partial eta squared equals `bound`.
+        Source: Campbell and Lakens 2021, doi:10.1111/bmsp.12201.
         """
         return float(ncfdtr(self.df1, self.df2, self.people * bound / (1.0 - bound), self.statistic))
 
@@ -83,10 +83,10 @@ def partial_eta_squared(statistic: float, df1: float, df2: float) -> float:
 
 
 def hedges_g(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float | None, Interval | None]:
-    """Return Hedges' g, second group minus first, and its 95 % interval. Both are None if undefined.
+    """Return the effect size Hedges' g and its 95 % confidence interval. Each is None if it is undefined.
 
-    The groups have shapes (n,) and (m,). The interval inverts the noncentral t distribution. Source: Hedges 1981,
-    doi:10.3102/10769986006002107.
+    The effect is positive if the second group has the larger mean. The groups have shapes (n,) and (m,). The
+    interval inverts the noncentral t distribution. Source: Hedges 1981, doi:10.3102/10769986006002107.
     """
     n, m = len(first), len(second)
     freedom = n + m - 2
@@ -115,7 +115,7 @@ def t_interval(statistic: float, freedom: int, confidence: float) -> Interval | 
         def excess(center: float) -> float:
             return float(nctdtr(freedom, center, statistic)) - share
 
-        # Widen the range step by step, because scipy returns NaN far from the statistic.
+        # Widen the search range in steps, because scipy returns NaN for values far from the statistic.
         for width in step * np.arange(1.0, MAX_WIDTH):
             if excess(statistic - width) > 0 > excess(statistic + width):
                 return _root(excess, statistic - width, statistic + width)
@@ -155,12 +155,12 @@ def _both(bound: Callable[[float], float | None], confidence: float) -> Interval
 def _root(excess: Callable[[float], float], low: float, high: float) -> float | None:
     try:
         return float(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
-    except ValueError:  # scipy returned NaN within the range
+    except ValueError:  # scipy returned NaN
         return None
 
 
 def power_of(eta_squared: float, df1: int, df2: float, people: int, alpha: float = ALPHA) -> float:
-    """Return the power of an F test for this partial eta squared.
+    """Return the power of an F test if the true partial eta squared is `eta_squared`.
 
     The noncentrality is people * eta_squared / (1 - eta_squared). Source: Cohen 1988, Statistical Power Analysis for
     the Behavioral Sciences, chapter 8.
@@ -170,14 +170,14 @@ def power_of(eta_squared: float, df1: int, df2: float, people: int, alpha: float
 
 
 def detectable_eta_squared(df1: int, df2: float, people: int, power: float = POWER) -> float:
-    """Return the smallest partial eta squared that an F test detects with this power."""
+    """Return the smallest partial eta squared that an F test detects with the given power."""
     return float(brentq(lambda eta: power_of(eta, df1, df2, people) - power, 1e-9, 0.999))
 
 
 def people_per_cell(
     eta_squared: float, df1: int, cells: int, power: float = POWER, alpha: float = ALPHA
 ) -> int:
-    """Return the smallest number of participants per cell that gives an F test this power. All cells are equal."""
+    """Return the smallest number of participants per cell with which an F test has the given power."""
 
     def enough(people: int) -> bool:
         return power_of(eta_squared, df1, cells * (people - 1), cells * people, alpha) >= power

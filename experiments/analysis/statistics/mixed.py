@@ -1,4 +1,4 @@
-"""Linear models with crossed random factors, such as participant and house, and a bootstrap over houses."""
+"""Fit linear models with crossed random factors, and compare conditions by a bootstrap over houses."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -13,14 +13,14 @@ from experiments.analysis.statistics.anova import Values, cells_of, varies
 from experiments.analysis.statistics.variance_components import VarianceComponents
 from experiments.errors import StatisticsError
 
-MIN_LEVELS = 5  # minimum number of levels to estimate a variance between them
+MIN_LEVELS = 5  # minimum number of levels of a random factor
 RESAMPLES = 2000
-BATCH = 100  # number of resamples processed at a time, which limits memory
+BATCH = 100  # number of resamples that are processed at a time, to limit memory use
 
 
 @dataclass(frozen=True)
 class WaldTest:
-    """A Wald F test of an effect, with Satterthwaite's degrees of freedom for the error."""
+    """A Wald F test of an effect, whose error degrees of freedom follow Satterthwaite."""
 
     statistic: float
     df1: int
@@ -46,7 +46,7 @@ class RandomFactor:
 
 @dataclass(frozen=True)
 class MixedModel:
-    """A linear model with crossed random factors. `tests` has one test per effect; those of a covariate come last."""
+    """A fitted linear model with crossed random factors. `tests` lists the effects of a covariate last."""
 
     tests: Mapping[str, WaldTest]
     random: Mapping[str, RandomFactor]
@@ -60,13 +60,14 @@ def mixed_model(
     random: Mapping[str, NDArray[Any]],
     covariate: tuple[str, Values] | None = None,
 ) -> MixedModel:
-    """Fit fixed effects of assistance, number of objects and their interaction, and a random intercept for each factor.
+    """Fit a linear mixed model with crossed random factors.
 
-    All arrays have one entry per trial, shape (n,). A covariate is given with its name. It has a linear effect on the
-    values, and interacts linearly with the condition.
+    The fixed effects are the assistance, the number of objects and their interaction. Each factor in `random`
+    has a random intercept. All arrays have one entry per trial, shape (n,). A covariate is given with its
+    name. It has a linear effect on the values and interacts with the condition.
 
     Raises:
-        StatisticsError: A random factor has too few levels, a cell is empty, or two variances cannot be told apart.
+        StatisticsError: A random factor has too few levels, a cell is empty, or two variances are confounded.
     """
     members = {name: np.unique(levels, return_inverse=True)[1] for name, levels in random.items()}
     for name, member in members.items():
@@ -112,7 +113,7 @@ def _with_covariate(name: str, values: Values, conditions: Values) -> dict[str, 
 
 @dataclass(frozen=True)
 class HouseDifference:
-    """Difference of two means, second minus first, with a 95 % interval from resampling whole houses."""
+    """The difference between two condition means, with a 95 % interval from a bootstrap over houses."""
 
     first: str
     second: str
@@ -128,7 +129,7 @@ def differences_by_house(
     conditions: Sequence[str],
     seed: int = 0,
 ) -> list[HouseDifference]:
-    """Compare all pairs of `conditions` by a percentile bootstrap over houses. All arrays have shape (n,)."""
+    """Compare all pairs of conditions with a percentile bootstrap over houses. Arrays have shape (n,)."""
     names, house = np.unique(houses, return_inverse=True)
     if len(names) < MIN_LEVELS:
         raise StatisticsError(f"resampling needs at least {MIN_LEVELS} houses; there are {len(names)}")

@@ -1,7 +1,8 @@
-"""Types of participants by their acceptance of suggestions, modelled as a mixture of beta-binomial distributions.
+"""Find types of participants that differ in how often they accept suggestions.
 
-Each participant has an acceptance rate, drawn from the Beta distribution of their type, and accepts each suggested
-visit with that probability. The Bayesian information criterion (BIC) selects the number of types.
+Acceptance is modelled as a mixture of beta-binomial distributions. Each participant has an acceptance rate,
+which is drawn from the Beta distribution of their type, and accepts each suggested visit with that
+probability. The number of types is selected by the Bayesian information criterion (BIC).
 """
 
 import math
@@ -17,15 +18,15 @@ from experiments.errors import StatisticsError
 
 MAX_KINDS = 3
 MIN_PEOPLE = 10
-PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, participants of one type hardly differ
-STARTS = 10  # number of random starting points, in addition to those from the data and from the fit with one type fewer
+PRECISIONS = (0.0, 7.0)  # limits of log(a + b); at the upper limit, participants of a type are nearly equal
+STARTS = 10  # number of random starting points, in addition to those computed from the data
 
 Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """A fitted mixture of k types, in descending order of mean acceptance rate.
+    """A fitted mixture of k types of participants, sorted by descending mean acceptance rate.
 
     Attributes:
         precisions: Sum a + b of each Beta distribution's parameters, shape (k,). Participants of a type with a higher
@@ -41,9 +42,9 @@ class Mixture:
 
 
 def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
-    """Fit mixtures of one to three types by maximum likelihood, and return them in ascending order of BIC.
+    """Fit mixtures of one, two and three types by maximum likelihood. Return them with the best BIC first.
 
-    `accepted` counts the accepted visits of each participant, and `visits` all visits. Both have shape (n,).
+    `accepted` and `visits`, shape (n,), count the accepted visits and all visits of each participant.
 
     Raises:
         StatisticsError: There are too few participants, or the counts are invalid.
@@ -52,7 +53,7 @@ def fit_mixtures(accepted: Counts, visits: Counts) -> list[Mixture]:
         raise StatisticsError(f"a mixture needs at least {MIN_PEOPLE} people; there are {len(accepted)}")
     if (visits < 1).any() or (accepted < 0).any() or (accepted > visits).any():
         raise StatisticsError("a number of accepted visits is below 0 or above the number of visits")
-    # Participants with equal counts have the same likelihood, which is computed once.
+    # Compute the likelihood only once for all participants with the same counts.
     cases, people = np.unique(np.stack([accepted, visits], axis=1), axis=0, return_counts=True)
     found: list[Mixture] = []
     for kinds in range(1, MAX_KINDS + 1):
@@ -120,7 +121,7 @@ def _loss(
     weights, means, precisions = _parts(parameters, kinds)
     accepted, others = cases[:, :1], cases[:, 1:] - cases[:, :1]
     a, b = means * precisions, (1 - means) * precisions
-    # Leave out the binomial coefficient, which does not depend on the mixture.
+    # The binomial coefficient is omitted because it does not depend on the mixture.
     each = betaln(accepted + a, others + b) - betaln(a, b) + weights
     everyone = np.logaddexp.reduce(each, axis=1)
     belonging = np.exp(each - everyone[:, None]) * people[:, None]

@@ -1,7 +1,7 @@
-"""Proportional odds models of ordinal answers, and diagnostics of residuals.
+"""Fit proportional odds models to ordinal answers, and compute diagnostics of residuals.
 
-The likelihood has a single maximum, found by Newton's method. statsmodels reaches it only to 1e-4 and is a hundred
-times slower.
+The likelihood has a single maximum, which is found by Newton's method. statsmodels is a hundred times slower
+and is accurate only to 1e-4.
 """
 
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ from experiments.analysis.statistics.effects import FTest
 from experiments.errors import StatisticsError
 
 MAX_STEPS = 60
-FARTHEST = 25.0  # maximum size of cuts and shifts, in logits; the fit has diverged beyond it
+FARTHEST = 25.0  # largest parameter of a fit that has not diverged, in logits
 
 
 @dataclass(frozen=True)
 class Chi2Test:
-    """A chi-squared test of a term in a model."""
+    """A chi-squared test of one term of a model."""
 
     statistic: float
     df: int
@@ -31,7 +31,7 @@ class Chi2Test:
 
 @dataclass(frozen=True)
 class OrdinalModel:
-    """Odds of higher answers by condition, relative to the first condition, with a likelihood ratio test."""
+    """A fitted proportional odds model. `odds_ratios` compares each condition with the first condition."""
 
     test: Chi2Test
     odds_ratios: Mapping[str, float]
@@ -52,7 +52,7 @@ def ordinal_model(groups: Mapping[str, Values]) -> OrdinalModel:
     counts = np.array([(values[:, None] == given).sum(axis=0) for values in groups.values()], float)
     likelihood, shifts = _climb(counts)
     total = counts.sum(axis=0)
-    alone = float((total * np.log(total / total.sum())).sum())  # log likelihood of the null model
+    alone = float((total * np.log(total / total.sum())).sum())  # the log likelihood of the null model
     gain, df = max(2 * (likelihood - alone), 0.0), len(groups) - 1
     return OrdinalModel(
         Chi2Test(gain, df, float(chi2.sf(gain, df))),
@@ -65,7 +65,7 @@ def _climb(counts: Values) -> tuple[float, Values]:
     groups, cuts = counts.shape[0], counts.shape[1] - 1
     share = counts.sum(axis=0).cumsum()[:-1] / counts.sum()
     point = np.concatenate([logit(share), np.zeros(groups - 1)])
-    # Design matrix of the logits of "at most this answer": the cut minus the group's shift
+    # The logit of P(answer <= cut) is modelled as the cut minus the shift of the group.
     member = np.repeat(np.eye(groups)[:, 1:], cuts, axis=0)
     design = np.hstack([np.tile(np.eye(cuts), (groups, 1)), -member])
     value, gradient, curvature = _likelihood(counts, design, point)
@@ -109,14 +109,14 @@ MAX_SHAPIRO = 5000  # largest sample for which scipy's p-value of the Shapiro-Wi
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Diagnostics of a measure's residuals, its deviations from the cell means.
+    """Diagnostics of the residuals of a measure, which are its deviations from the cell means.
 
     Attributes:
         shapiro_wilk: Statistic W of the Shapiro-Wilk test, which is 1 for perfectly normal residuals.
         shapiro_wilk_p: p-value of the Shapiro-Wilk test, or None for samples larger than `MAX_SHAPIRO`.
         kurtosis: Excess kurtosis, which is 0 for normal residuals.
         equal_variances: Brown-Forsythe test over all cells.
-        largest_deviation: Name of the cell with the largest standard deviation, and that deviation.
+        largest_deviation: Name and standard deviation of the cell with the largest standard deviation.
     """
 
     shapiro_wilk: float
@@ -129,7 +129,7 @@ class Diagnostics:
 
 
 def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
-    """Compute diagnostics of values by cell. Each cell needs at least two values.
+    """Compute diagnostics of the residuals in all cells. Each cell needs at least two values.
 
     Sources: Shapiro and Wilk 1965, doi:10.1093/biomet/52.3-4.591; p-value by Royston 1995, AS R94.
     """
@@ -150,5 +150,5 @@ def diagnose(cells: Mapping[str, Values]) -> Diagnostics:
 
 
 def residuals_of(cells: Mapping[str, Values]) -> Values:
-    """Return the residuals of all cells in one array: each value minus the mean of its cell."""
+    """Return the residuals of all cells in one array. A residual is a value minus the mean of its cell."""
     return np.concatenate([values - values.mean() for values in cells.values()])

@@ -1,4 +1,4 @@
-"""Pairwise comparisons of groups: differences, effect sizes and equivalence tests."""
+"""Compare pairs of groups with significance tests, effect sizes and equivalence tests."""
 
 import itertools
 import math
@@ -18,13 +18,13 @@ from experiments.errors import StatisticsError
 
 DIFFERENT, EQUIVALENT, UNDECIDED = "different", "equivalent", "undecided"
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
-TAIL = 1e-18  # probability cut off at each end when integrating over the sample standard deviation
-WIDEST = 1e4  # upper limit when searching quantiles of the studentized range
+TAIL = 1e-18  # tail probability that is ignored when integrating over the standard deviation
+WIDEST = 1e4  # upper limit of the search for quantiles of the studentized range
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A comparison of two groups. p-values are two-sided, or None if they cannot be computed.
+    """A comparison of two groups. The p-values are two-sided, or None if they cannot be computed.
 
     Attributes:
         difference: Mean of the second group minus mean of the first.
@@ -50,7 +50,7 @@ class Pair:
 
 
 def compare_pairs(groups: Mapping[str, Values], bound: float) -> list[Pair]:
-    """Compare all pairs of groups. `bound` is the largest equivalent difference, in pooled standard deviations."""
+    """Compare all pairs of groups. Differences up to `bound` pooled standard deviations are equivalent."""
     check_groups(groups)
     pairs = list(itertools.combinations(groups, 2))
     welch = {
@@ -92,7 +92,7 @@ def _compare(
 
 
 def tukey_differs(groups: Mapping[str, Values], first: str, second: str) -> bool:
-    """Return True if Tukey's test at .05 separates two of the groups. This is faster than computing its p-value."""
+    """Return True if Tukey's test is significant at .05. This is faster than computing the p-value."""
     check_groups(groups)
     if missing := [name for name in (first, second) if name not in groups]:
         raise StatisticsError(f"no people in {missing[0]}")
@@ -107,15 +107,15 @@ def _difference(groups: Mapping[str, Values], first: str, second: str) -> tuple[
 
 
 def tukey_p(statistic: float, groups: int, freedom: float) -> float:
-    """Return the p-value of Tukey's test for a difference between two of several groups, in standard errors.
+    """Return the p-value of Tukey's test for a difference between two groups, given in standard errors.
 
-    Source: Tukey 1953 and Kramer 1956, doi:10.2307/3001469, for unequal group sizes.
+    Group sizes may differ. Sources: Tukey 1953 and Kramer 1956, doi:10.2307/3001469.
     """
     return range_sf(statistic * math.sqrt(2), groups, freedom)
 
 
 def tukey_quantile(groups: int, freedom: float) -> float:
-    """Return the critical difference of Tukey's test at .05, in standard errors."""
+    """Return the smallest difference, in standard errors, that is significant in Tukey's test at .05."""
     return range_quantile(CONFIDENCE, groups, freedom) / math.sqrt(2)
 
 
@@ -125,7 +125,7 @@ def pooled_deviation(groups: Mapping[str, Values]) -> float:
 
 
 def holm(p: Values) -> Values:
-    """Correct p-values for multiple comparisons by Holm's method.
+    """Correct p-values for multiple comparisons with Holm's method.
 
     Source: Holm 1979, Scandinavian Journal of Statistics 6.
     """
@@ -159,9 +159,9 @@ def range_quantile(share: float, groups: int, freedom: float) -> float:
 
 
 def _deviations(freedom: float) -> tuple[Values, Values]:
-    """Return nodes and weights to integrate over the ratio of the sample standard deviation to the true one.
+    """Return nodes and weights for integrals over the ratio of sample and true standard deviation.
 
-    The nodes are spaced on the square root of this ratio, where the density is smooth at 0 for all degrees of freedom.
+    The nodes are chosen on the scale of the square root of this ratio, because its density is smooth at 0.
     """
     low, high = (
         2 * end / freedom for end in (gammaincinv(freedom / 2, TAIL), gammainccinv(freedom / 2, TAIL))

@@ -1,7 +1,7 @@
-"""Variance components of crossed random factors, estimated by restricted maximum likelihood.
+"""Estimate variance components of crossed random factors by restricted maximum likelihood.
 
-statsmodels reaches a precision of only 1e-4, gives no error degrees of freedom, and takes minutes for crossed factors.
-Here, the deviance for given variance ratios takes one Cholesky decomposition, and Newton's method minimizes it.
+statsmodels is accurate only to 1e-4, computes no error degrees of freedom, and takes minutes for crossed
+factors. Here, the deviance is evaluated with one Cholesky decomposition and minimized by Newton's method.
 """
 
 from functools import cache
@@ -19,18 +19,18 @@ from experiments.errors import StatisticsError
 STARTS = np.array([0.0, 0.01, 0.1, 1.0, 10.0, 100.0])  # starting values of the variance ratios
 MAX_RATIO = 1e6
 NEWTON_STEPS = 30
-DENSE = 400  # number of levels above which crossproducts are stored as sparse matrices
+DENSE = 400  # maximum number of levels for which the crossproducts are stored as dense matrices
 PRECISION = 1e-4  # absolute precision of confidence limits
 
 
 class VarianceComponents:
-    """A linear model with random factors, evaluated at given ratios of their variances to the residual variance.
+    """A linear model with random factors, whose variances are given as ratios to the residual variance.
 
-    V is the covariance divided by the residual variance, and P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1. Everything is
-    computed from the crossproducts of the indicators Z, the design X and the values y, so the cost depends on the
-    levels of the factors, not on the number of trials. The factor with the most levels, and the factors that it is
-    nested in, are eliminated one by one, because their crossproducts are diagonal. Large crossproducts are sparse
-    matrices.
+    V is the covariance divided by the residual variance, and P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1. All
+    results are computed from the crossproducts of the indicators Z, the design X and the values y. The cost
+    therefore depends on the number of factor levels and not on the number of trials. The factor with the most
+    levels and the factors in which it is nested have diagonal crossproducts, so these factors are eliminated
+    one by one. Large crossproducts are stored as sparse matrices.
     """
 
     def __init__(self, design: Values, values: Values, members: list[NDArray[np.int64]]) -> None:
@@ -43,7 +43,7 @@ class VarianceComponents:
         ends = np.cumsum(self.sizes[order]).tolist()
         self.slices = {k: slice(end - int(self.sizes[k]), end) for k, end in zip(order, ends, strict=True)}
         self.levels = ends[-1]
-        self.start = ends[len(self.nested) - 1]  # index of the first level that is not nested
+        self.start = ends[len(self.nested) - 1]  # index of the first level that is not eliminated
         ones, rows = np.ones(len(values)), np.arange(len(values))
         parts = [csr_array((ones, (rows, members[k]))) for k in order]
         columns = hstack([*parts, csr_array(np.column_stack([design, values]))], "csr")
@@ -55,7 +55,7 @@ class VarianceComponents:
         self._check_variances()
 
     def _check(self, columns: Any, member: NDArray[np.int64]) -> None:
-        """Raise a `StatisticsError` if the residual variance or a factor's variance cannot be estimated."""
+        """Raise `StatisticsError` if the variance of the residual or of a factor cannot be estimated."""
         trials, count = columns.shape[0], self.levels - self.start + self.effect_count
         within, _ = _swept(self.products, self.slices[self.nested[0]], np.inf)
         products = _dense(within[-count - 1 :, -count - 1 :])
@@ -77,12 +77,12 @@ class VarianceComponents:
     def _check_variances(self) -> None:
         traces = self._traces()[0]
         sizes = traces.diagonal()
-        aliased = sizes.min() <= 1e-13 * self.freedom**2  # a factor is aliased with the fixed effects
+        aliased = sizes.min() <= 1e-13 * self.freedom**2  # a factor is confounded with the fixed effects
         if aliased or np.linalg.cond(traces / np.sqrt(np.outer(sizes, sizes))) > 1e8:
             raise StatisticsError("the design cannot distinguish the variances of the random factors")
 
     def at(self, ratios: Values) -> None:
-        """Solve generalized least squares for these variance ratios, shape (k,)."""
+        """Fit the model by generalized least squares at the given variance ratios, shape (k,)."""
         self.ratios = ratios
         self.active = np.flatnonzero(ratios > 0.0)
         products = self.products
@@ -110,7 +110,7 @@ class VarianceComponents:
         return np.append(levels, ones), np.append(np.ones(len(levels)), 0.0 * ones)
 
     def deviance(self, ratios: Values) -> float:
-        """Return minus twice the restricted log likelihood at these variance ratios, shape (k,), up to a constant."""
+        """Return -2 times the restricted log likelihood at the given variance ratios, up to a constant."""
         products, fixed = self.products, 0.0
         for k in self.nested:
             products, more = _swept(products, slice(0, self.sizes[k]), ratios[k])
@@ -139,7 +139,7 @@ class VarianceComponents:
 
     @staticmethod
     def _lowest(function: Any, start: Values, precision: float = 1e-6) -> tuple[Values, float]:
-        """Minimize a function of variance ratios to a relative precision. Return the minimizer and the minimum."""
+        """Minimize a function of the variance ratios. Return the minimizer and the minimum."""
         if not len(start):
             return start, float(function(start))
         found = minimize(
@@ -155,13 +155,13 @@ class VarianceComponents:
         return float(self.ratios[k] / (1.0 + self.ratios.sum()))
 
     def interval(self, k: int) -> tuple[float, float]:
-        """Return the 95 % profile likelihood interval of factor k's fraction of the variance."""
+        """Return the 95 % profile likelihood interval of the share of the variance that factor k explains."""
         lowest, limit = self.deviance(self.ratios), float(np.sqrt(chdtri(1, 0.05)))
         others, best, last = np.delete(self.ratios, k), self.share(k), MAX_RATIO / (1.0 + MAX_RATIO)
 
         @cache
         def above(share: float) -> float:
-            nonlocal others  # start from the variance ratios found in the previous call
+            nonlocal others  # start from the ratios that the previous call has found
             if share == best:
                 return -limit
             odds = share / (1.0 - share)
@@ -176,7 +176,7 @@ class VarianceComponents:
         return low, float(brentq(above, best, last, xtol=PRECISION)) if above(last) > 0.0 else 1.0
 
     def test(self, indices: NDArray[np.int64]) -> tuple[float, int, float]:
-        """Test the fixed effects with these indices. Return F with its numerator and denominator degrees of freedom.
+        """Compute an F test of the fixed effects at `indices`. Return F and its two degrees of freedom.
 
         The degrees of freedom follow Fai and Cornelius 1996, doi:10.1080/00949659608811740.
         """
@@ -184,7 +184,7 @@ class VarianceComponents:
         sizes, turn = np.linalg.eigh(block)
         squares = (turn.T @ self.effects[indices]) ** 2 / sizes
         slopes = [(turn.T @ d[np.ix_(indices, indices)] @ turn).diagonal() for d in self._slopes()]
-        gradient = np.array(slopes)  # derivatives of eigenvalues with respect to variances, shape (k, q)
+        gradient = np.array(slopes)  # derivatives of the eigenvalues by the variances, shape (k, q)
         freedom = 2.0 * sizes**2 / np.einsum("iq,ij,jq->q", gradient, self._variances(), gradient)
         q, statistic = len(indices), float(squares.mean())
         return statistic, q, _joint_freedom(freedom)
@@ -199,7 +199,7 @@ class VarianceComponents:
         return [*slopes, self.covariance - factors]
 
     def _traces(self) -> tuple[Values, Values]:
-        """Return the traces of P V_k P V_l, shape (k + 1, k + 1), and of P V_k, shape (k,), residual last."""
+        """Return the traces of P V_k P V_l, shape (k + 1, k + 1), and of P V_k, with the residual last."""
         diagonal = self.between.diagonal() - (self.bent * self.through).sum(axis=1)
         places = [self.slices[k] for k in range(len(self.sizes))]
         single = np.array([diagonal[place].sum() for place in places])
@@ -207,7 +207,7 @@ class VarianceComponents:
         traces = np.zeros((len(places), len(places)))
         for k, m in np.ndindex(traces.shape):
             block = self.between[places[k], places[m]]
-            # Sum the squares of a sparse matrix minus a low-rank product without computing the difference.
+            # Add the squares of (sparse matrix - low-rank product) without computing this difference.
             crossing = float((self.bent[places[k]] * (block @ self.through[places[m]])).sum())
             traces[k, m] = (block**2).sum() - 2.0 * crossing + float((halves[k] * halves[m].T).sum())
         return self._with_residual(traces, single, float(self.freedom)), single
@@ -218,7 +218,7 @@ class VarianceComponents:
         return np.block([[of_factors, mixed[:, None]], [mixed[None], np.array([[last]])]])
 
     def _quadratic_forms(self) -> tuple[Values, Values]:
-        """Return y' P V_k P V_l P y, shape (k + 1, k + 1), and y' P V_k P y, shape (k,), residual last."""
+        """Return y' P V_k P V_l P y, shape (k + 1, k + 1), and y' P V_k P y, with the residual last."""
         parts = np.zeros((self.levels, len(self.sizes)))
         for k, place in self.slices.items():
             parts[place, k] = self.left[place]
@@ -241,7 +241,7 @@ class VarianceComponents:
 
 
 def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[int]:
-    """Return the indices of the factor with the most levels and of the chain of factors in which it is nested."""
+    """Return the indices of the factor with the most levels and of the factors in which it is nested."""
     first, *rest = np.argsort(-sizes, kind="stable").tolist()
     chain = [first]
     for k in rest:
@@ -252,7 +252,7 @@ def _nested(members: list[NDArray[np.int64]], sizes: NDArray[np.int64]) -> list[
 
 
 def _swept(products: Any, place: slice, ratio: float, *, keep: bool = False) -> tuple[Any, float]:
-    """Eliminate the factor at `place` and drop its rows unless `keep`. Return crossproducts and log determinant."""
+    """Eliminate a factor from the crossproducts. Return the crossproducts and the log determinant."""
     block = products[place]
     counts = block[:, place].diagonal()
     shrink = np.zeros(len(counts)) if ratio == 0.0 else 1.0 / (1.0 / ratio + counts)

@@ -1,1 +1,1 @@
-"""Analysis of a study's table: measures, models and tests."""
+"""Analyse the table of a study with statistical tests and models."""

@@ -1,4 +1,4 @@
-"""The analysis of a study: descriptive statistics, tests and models, or the reasons why they could not be computed."""
+"""Analyse a study with descriptive statistics, tests and models."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
@@ -38,7 +38,7 @@ from experiments.errors import StatisticsError
 ONE_WAY, TWO_WAY = "one-way", "two-way, Type II"
 MIXED, ROOMS, BY_HOUSE = "mixed model", "rooms", "by house"
 OUT_OF_MEMORY = "not enough memory; analyse fewer trials, or trials with fewer people, houses or conditions"
-STRICT = "nd_strict_2n"  # measure with a known denominator, from which the number of deviations follows
+STRICT = "nd_strict_2n"  # measure from which the number of deviations is computed
 
 
 Test = FTest | WaldTest | Chi2Test
@@ -46,7 +46,7 @@ Test = FTest | WaldTest | Chi2Test
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """A test or model of a measure, or the reason why it is missing. If `objects` is None, all trials are included."""
+    """The result of a test or model, or the reason why there is none. `objects` is None for all trials."""
 
     measure: str
     kind: str
@@ -57,7 +57,7 @@ class AnalysisResult:
 
 @dataclass(frozen=True)
 class Description:
-    """Descriptive statistics of a measure in a cell. `interval` and `deviation` are None for a single value."""
+    """Descriptive statistics of a measure in one cell. A single value has no interval and no deviation."""
 
     measure: str
     assistance: str
@@ -71,7 +71,7 @@ class Description:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The results of an analysis: descriptive statistics, tests and models."""
+    """All results of an analysis: descriptive statistics, tests and models."""
 
     table: StudyTable
     measures: Measures
@@ -143,7 +143,7 @@ def test_results(table: StudyTable, measures: Measures) -> list[AnalysisResult]:
 
 
 def tests_of(result: AnalysisResult) -> Iterator[tuple[str, Test]]:
-    """Yield each test of a result with the name of its effect."""
+    """Yield the tests in a result, each with the name of the tested effect."""
     if isinstance(result.value, FTest):
         yield EFFECTS[0], result.value
     elif isinstance(result.value, OrdinalModel):
@@ -198,7 +198,7 @@ def two_way_tests(table: StudyTable, name: str) -> list[AnalysisResult]:
 
 
 def cells_of(table: StudyTable, name: str) -> dict[str, Values]:
-    """Return the known values of a measure, grouped by cell."""
+    """Return the known values of a measure, grouped by condition and number of objects."""
     return {f"{c}, {n}": v for n in table.levels() for c, v in table.groups(name, n).items()}
 
 
@@ -214,13 +214,13 @@ def _mixed(table: StudyTable, name: str, covariate: str | None = None) -> Any:
 
 
 def random_factors(table: StudyTable) -> dict[str, NDArray[Any]]:
-    """Return the random factors of a mixed model: houses, and those of repeated trials if participants have several."""
+    """Return the random factors that can be estimated from the data, such as participants and houses."""
     rows, houses = len(table.rows), len(set(table.houses.tolist()))
     found: dict[str, NDArray[Any]] = {}
     if MIN_LEVELS <= len(set(table.people.tolist())) < rows:
         found["person"] = table.people
         trials = table.numbers("trial_number")
-        # A factor with only two levels does not allow a variance to be estimated.
+        # A variance cannot be estimated from only two levels.
         if len(set(trials.tolist())) > 2 and not np.isnan(trials).any():
             found["trial_number"] = trials
     if houses >= MIN_LEVELS or not found:
@@ -248,7 +248,7 @@ def _acceptance(table: StudyTable) -> list[AnalysisResult]:
         here = (table.assistance == condition) & ~np.isnan(table.columns[STRICT]) & (made > 0)
         visits = made[here]
         deviations = np.rint(table.columns[STRICT][here] * 2 * table.objects[here]).astype(int)
-        # If the column `visits` is missing, dropped objects count as deviations.
+        # Dropped objects count as deviations if the table has no column `visits`.
         accepted = np.clip(visits - deviations, 0, visits)
         kind = f"acceptance, {condition}"
         results.append(_attempt(STRICT, kind, None, partial(fit_mixtures, accepted, visits)))

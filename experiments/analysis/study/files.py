@@ -1,4 +1,4 @@
-"""Output files of an analysis: statistics, tables of participants and of tests, and the report."""
+"""Write the output files of an analysis: statistics, tables and the report."""
 
 import csv
 import io
@@ -27,13 +27,13 @@ TEST_COLUMNS = (
 
 
 def check_files(folder: Path, *, replace: bool) -> None:
-    """Raise a `RecordError` if `folder` contains files of an analysis, unless `replace` is true."""
+    """Raise `RecordError` if the folder already contains an analysis, unless `replace` is true."""
     for name in FILES:
         check_file(folder / name, replace=replace)
 
 
 def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mapping[str, Any]) -> None:
-    """Write each file of an analysis atomically. `report` is HTML, and `further` is added to the statistics."""
+    """Write the files of an analysis atomically. `report` is HTML. `further` is added to the statistics."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / STATISTICS, {**analysis.as_json(), **further})
     table = people_table(analysis.table)
@@ -46,7 +46,7 @@ def write_analysis(folder: Path, analysis: Analysis, report: str, further: Mappi
 
 
 def people_table(table: StudyTable) -> pa.Table:
-    """Return a table with one row per participant: seeds, cell, and all measures under their short names."""
+    """Return a table with one row per participant, which contains the seeds, the cell and all measures."""
     columns: dict[str, Any] = {
         "origin": [table.origin] * len(table.rows),
         **{name: [row.get(name) for row in table.rows] for name in ("user", "participant", "house", *SEEDS)},
@@ -57,7 +57,7 @@ def people_table(table: StudyTable) -> pa.Table:
         **table.columns,
     }
     found = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
-    # Leave out columns without values, whose type is unknown.
+    # Omit columns without values, because their type is unknown.
     return found.select([c for c in found.column_names if not pa.types.is_null(found.schema.field(c).type)])
 
 

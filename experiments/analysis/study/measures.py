@@ -1,4 +1,4 @@
-"""Measures of an analysis and their columns, read from experiments/trials/designs/metrics.toml or another file."""
+"""Read the measures of an analysis and their table columns from a TOML file."""
 
 import difflib
 import re
@@ -18,7 +18,7 @@ from experiments.trials.trial_config import SETTINGS
 from mjsim.support.files import read_bytes
 
 FILE = FOLDER / "metrics.toml"
-MAX_COLUMNS_SHOWN = 20  # maximum number of columns listed in a message
+MAX_COLUMNS_SHOWN = 20  # maximum number of columns that are listed in a message
 _OF_A_TRIAL = re.compile(
     r"(person|behaviour|max|mean|p99)_\w+|simulated(_s)?|fingerprint|participant|releases_settled|ejections|"
     "tunnellings|grips_lost"
@@ -28,13 +28,13 @@ ANSWERS = (1, 5)  # smallest and largest answer to a Likert item
 
 
 class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A measure of the paper, and the column from which it is computed.
+    """A measure to analyse, and the table column that contains it.
 
     Attributes:
         why: Reason for the choice of this column.
         range: Smallest and largest valid value.
         without: Fallback column if `column` has no values.
-        others: Columns with alternative definitions of the measure, which are also reported.
+        others: Columns with alternative definitions of the measure, which are reported as well.
     """
 
     label: str
@@ -54,26 +54,26 @@ class Measure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Equivalence(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Largest effects considered equivalent: a difference in pooled standard deviations, and partial eta squared."""
+    """The largest effects that count as equivalent, in standard deviations and as partial eta squared."""
 
     pair: float
     eta_squared: float
 
 
 class Measures(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Measures of an analysis by short name, and labels of survey items. Answers are in columns `likert_NAME`."""
+    """The measures of an analysis and the labels of survey items, both by short name."""
 
     objective: dict[str, Measure] = msgspec.field(name="measures")
     likert: dict[str, str]
     equivalence: Equivalence
 
     def answers(self) -> dict[str, str]:
-        """Return the labels of survey items by column."""
+        """Return the label of each survey item by the name of its table column."""
         return {LIKERT_PREFIX + name: label for name, label in self.likert.items()}
 
 
 def read_measures(path: Path = FILE) -> Measures:
-    """Read a file of measures, by default the paper's. Raises `ConfigError` if the file is not valid."""
+    """Read a measures file, by default the one of the paper. Raises `ConfigError` if it is invalid."""
     try:
         return decoded_measures(read_bytes(path))
     except OSError as error:
@@ -83,7 +83,7 @@ def read_measures(path: Path = FILE) -> Measures:
 
 
 def decoded_measures(content: bytes) -> Measures:
-    """Decode the content of a file of measures. Raises msgspec's errors."""
+    """Decode the content of a measures file. Raises an error of msgspec if the content is invalid."""
     return msgspec.toml.decode(content, type=Measures)
 
 
@@ -92,7 +92,7 @@ def present_columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
-    """Return a list with one note that names all unrecognized columns, or an empty list."""
+    """Return a list with one note about unrecognized columns, or an empty list if there are none."""
     read = {c for m in measures.objective.values() for c in m.columns}
     recorded = (field.name for kind in (Metrics, Displays) for field in fields(kind))
     known = {*read, *SETTINGS, *CIRCUMSTANCES, *recorded}
@@ -105,12 +105,12 @@ def unread_note(columns: Sequence[str], measures: Measures) -> list[str]:
 
 
 def resolve(measure: Measure, known: Collection[str]) -> str | None:
-    """Return the first column of a measure that has values, or None."""
+    """Return the first column of a measure that contains values, or None if there is none."""
     return next((c for c in (measure.column, measure.without) if c is not None and c in known), None)
 
 
 def check_answer_columns(columns: Sequence[str], measures: Measures, path: Path) -> None:
-    """Raise a `RecordError` if a column of answers does not belong to a survey item."""
+    """Raise `RecordError` if a column contains answers to an unknown survey item."""
     known = measures.answers()
     for name in columns:
         if name.lower().startswith(LIKERT_PREFIX.rstrip("_")) and name not in known:
@@ -127,7 +127,7 @@ def check_ranges(
     measures: Measures,
     path: Path,
 ) -> None:
-    """Raise a `RecordError` if a value is outside the range of its measure."""
+    """Raise `RecordError` if a value is outside the valid range of its measure."""
     for measure in measures.objective.values():
         low, high = measure.range
         for name in measure.columns:

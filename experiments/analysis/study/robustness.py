@@ -1,4 +1,4 @@
-"""Exclusion rules of a study, their effects on the results, and departures from the preregistration."""
+"""Compare the results of a study with and without each of its exclusion rules."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -21,12 +21,12 @@ CHANGE_HEAD = (
     *("measure", "test", "effect", "objects", "F or χ²", "without", "p", "without"),
     *("partial η²", "without", "decision"),
 )
-Key = tuple[str, str, str, int | None]  # measure, test, effect, and number of objects, or None for all
+Key = tuple[str, str, str, int | None]  # measure, test, effect, and number of objects (None for all)
 
 
 @dataclass(frozen=True)
 class Change:
-    """A test with and without an exclusion rule. Either is None if it cannot be computed."""
+    """The results of a test with and without an exclusion rule, or None if they cannot be computed."""
 
     measure: str
     test: str
@@ -42,8 +42,8 @@ class LeaveOneOut:
     """The effect of one exclusion rule on the results.
 
     Attributes:
-        alone: Number of participants excluded by this rule but by no other.
-        changes: Every test with and without the rule, or empty if `alone` is 0.
+        alone: Number of participants who are excluded by this rule and by no other.
+        changes: Results of every test with and without the rule. Empty if `alone` is 0.
         refused: Reason why the results without the rule cannot be computed, or None.
     """
 
@@ -58,7 +58,7 @@ class LeaveOneOut:
 def leave_one_out(
     people: Sequence[Mapping[str, Any]], measures: Measures, path: Path, exclusions: Exclusions
 ) -> list[LeaveOneOut]:
-    """Compare the test results with and without each exclusion rule. Participants excluded by id count as one rule."""
+    """Compare the test results with and without each exclusion rule. Exclusions by ID count as one rule."""
     found = []
     whole = study_table(people, measures, path, exclusions)
     tests = _tests(whole, measures)
@@ -72,7 +72,7 @@ def leave_one_out(
             changes = tuple(
                 _change(key, tests.get(key), others.get(key)) for key in {**tests, **others} if alone
             )
-        except RecordError as error:  # the rule excludes a row whose values are not valid
+        except RecordError as error:  # the rule excludes a row with invalid values
             refused = str(error)
         found.append(LeaveOneOut(rule, reason, len(theirs), alone, changes, refused))
     return found
@@ -104,7 +104,7 @@ def _change(key: Key, one: Test | None, other: Test | None) -> Change:
 
 @dataclass(frozen=True)
 class Selection:
-    """Exclusions of a study, and departures from its preregistration, which is identified by its SHA-256."""
+    """The exclusions of a study, and its departures from the preregistration with the given SHA-256."""
 
     rules: Sequence[LeaveOneOut]
     preregistration: str | None = None

@@ -1,4 +1,4 @@
-"""Table of a study's participants, read from trials.parquet or from visits of `mjsim play`."""
+"""Read the table of a study's participants from `trials.parquet` or from the output of `mjsim play`."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,17 +29,17 @@ from experiments.trials.exclusions import Exclusions, LeftOut, left_out, person_
 from experiments.trials.table import NAME, read_rows
 from experiments.trials.trial_config import SEEDS
 
-ANALYSIS = "analysis"  # default name of the output folder
+ANALYSIS = "analysis"  # default name of the output folder of an analysis
 REPORT, STATISTICS, PEOPLE, TESTS = "report.html", "stats.json", "people", "tests.csv"
 FILES = (REPORT, STATISTICS, f"{PEOPLE}.parquet", f"{PEOPLE}.csv", TESTS)  # output files of an analysis
 REQUIRED = ("assistance", "objects", "user")
-CONDITIONS = ("none", "highlight", "optimal")  # conditions of the paper, in its order
-MAX_PEOPLE_SHOWN = 20  # maximum number of participants listed in a message
+CONDITIONS = ("none", "highlight", "optimal")  # conditions of the paper, in the same order
+MAX_PEOPLE_SHOWN = 20  # maximum number of participants that are listed in a message
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Participants left out of a measure's tests because their values are missing or infinite."""
+    """Participants who are excluded from the tests of a measure because of missing or infinite values."""
 
     measure: str
     value: str
@@ -48,13 +48,13 @@ class Gap:
 
 @dataclass(frozen=True)
 class StudyTable:
-    """Participants of a study, in the order of its table. Every array has one entry per row, shape (n,).
+    """The participants of a study, in the order of the table rows. All arrays have shape (n,).
 
     Attributes:
         houses: Name of the house in each trial.
-        people: Identity of the participant, which is the same in all their trials.
+        people: Identifier of the participant, which is the same in all of their trials.
         columns: Values of measures and answers by short name, with NaN for unknown values.
-        sources: Name of each column in the file, by short name.
+        sources: Name of each column in the table file, by short name.
         origin: `Simulated`, `Partly simulated` or `Recorded from people`.
         notes: Remarks about the table, one sentence each.
         left_out: Participants excluded from the table.
@@ -80,7 +80,7 @@ class StudyTable:
         return sorted(set(self.objects.tolist()))
 
     def take(self, people: NDArray[np.int64]) -> "StudyTable":
-        """Return the rows with these indices, shape (m,). Indices may repeat."""
+        """Return a table of the rows with the given indices, shape (m,). Indices may be repeated."""
         return replace(
             self,
             rows=[self.rows[k] for k in people],
@@ -92,14 +92,14 @@ class StudyTable:
         )
 
     def groups(self, name: str, objects: int | None = None) -> dict[str, NDArray[np.float64]]:
-        """Return the known values of a measure by condition, for one number of objects or all, without empty groups."""
+        """Return the known values of a measure by condition, for one number of objects or for all."""
         values, known = self.columns[name], ~np.isnan(self.columns[name])
         here = known if objects is None else known & (self.objects == objects)
         found = {c: values[here & (self.assistance == c)] for c in self.conditions()}
         return {c: v for c, v in found.items() if len(v)}
 
     def visits(self) -> NDArray[np.int64]:
-        """Return the numbers of visits. Without a column `visits`, assume two per object if all were delivered."""
+        """Return the number of visits per trial. Unknown numbers are computed from the numbers of objects."""
         found = []
         for row, usual in zip(self.rows, (2 * self.objects).tolist(), strict=True):
             made, finished = row.get("visits"), row.get("ended", ALL_DELIVERED) == ALL_DELIVERED
@@ -107,16 +107,16 @@ class StudyTable:
         return np.array(found)
 
     def numbers(self, name: str) -> NDArray[np.float64]:
-        """Return any numeric column, with NaN for unknown values."""
+        """Return a numeric column as an array, with NaN for unknown values."""
         values = (row.get(name) for row in self.rows)
         return np.array([np.nan if value is None else value for value in values], float)
 
     def densities(self) -> NDArray[np.float64]:
-        """Return the numbers of objects per square metre of floor, with NaN for unknown areas."""
+        """Return the number of objects per square metre of floor, or NaN if the area is unknown."""
         return np.asarray(self.objects / self.numbers("area_m2"))
 
     def absent(self) -> list[str]:
-        """Return a list with one line that names the excluded participants, or an empty list."""
+        """Return a list with one note that names all excluded participants, or an empty list."""
         names = [person.person for person in self.left_out]
         more = f" and {len(names) - MAX_PEOPLE_SHOWN} more" if len(names) > MAX_PEOPLE_SHOWN else ""
         if not names:
@@ -124,23 +124,23 @@ class StudyTable:
         return [f"left out, as not everything was delivered: {', '.join(names[:MAX_PEOPLE_SHOWN])}{more}"]
 
     def sizes(self) -> dict[tuple[str, int], int]:
-        """Return the number of participants in each combination of condition and number of objects, even if it is 0."""
+        """Return the number of participants for each combination of condition and number of objects."""
         count = Counter(zip(self.assistance.tolist(), self.objects.tolist(), strict=True))
         return {(c, n): count[(c, n)] for c in self.conditions() for n in self.levels()}
 
 
 def read_study(folder: Path, measures: Measures) -> StudyTable:
-    """Read the participants who finished a study, a batch or visits of `mjsim play`."""
+    """Read a study, a batch or the output of `mjsim play`. Return a table of the finished participants."""
     return study_table(read_people(folder), measures, people_path(folder))
 
 
 def people_path(folder: Path) -> Path:
-    """Return the path of the table of a study or batch, or `folder` itself if it contains visits of `mjsim play`."""
+    """Return the path of the table in a study or batch folder, or `folder` itself if it contains visits."""
     return folder if visit_folders(folder) else folder / f"{NAME}.parquet"
 
 
 def read_people(folder: Path) -> Sequence[Mapping[str, Any]]:
-    """Read all rows of a study, a batch or visits of `mjsim play`. Raises `RecordError` if a column is missing."""
+    """Read all rows from a study, a batch or `mjsim play`. Raises `RecordError` if a column is missing."""
     if visits := visit_folders(folder):
         return [{"participant": str(visit.relative_to(folder)), **_visitor(visit)} for visit in visits]
     path = people_path(folder)
@@ -169,7 +169,7 @@ def study_table(
     path: Path,
     exclusions: Exclusions = Exclusions(),  # noqa: B008 - frozen
 ) -> StudyTable:
-    """Build the table of all participants who are not excluded. `path` appears only in messages."""
+    """Build the study table of all participants who are not excluded. `path` is used only in messages."""
     _check_design(people, path)
     check_answer_columns(present_columns(people), measures, path)
     absent = left_out(exclusions, people, path)
@@ -274,7 +274,7 @@ def _notes(rows: Sequence[Mapping[str, Any]], measures: Measures) -> list[str]:
 
 
 def _person(row: Mapping[str, Any], number: int) -> str:
-    """Return the identity of a row's participant. Rows without one count as separate participants."""
+    """Return an identifier of the participant in a row, which is unique to the row if none is recorded."""
     names = row.get("participant"), row.get("person_seed")
     return f"{row['user']}/{next((name for name in names if name is not None), f'row {number}')}"
 

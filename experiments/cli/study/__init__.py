@@ -6,7 +6,7 @@ from typing import Any
 from experiments.cli.doctor import add_checkout_command
 from experiments.cli.options import HelpFormatter
 
-# Modules with `add_parser(commands)`, in the order of the help. The wheel does not include those of `studies`.
+# Modules of the subcommands, in the order in which `--help` lists them. The wheel does not contain `studies`.
 MODULES = (
     "experiments.cli.study.prepare",
     "experiments.cli.study.check",
@@ -31,7 +31,7 @@ participants is marked as such: it is not evidence about people."""
 def add_parser(commands: Any) -> None:
     parser: argparse.ArgumentParser = commands.add_parser(
         "study",
-        help=None,  # without this argument, the completion script would omit the command
+        help=None,  # completion scripts omit commands that have no `help` argument
         description=DESCRIPTION,
         formatter_class=HelpFormatter,
     )

@@ -1,4 +1,4 @@
-"""`mjsim study check`: check that a study is ready."""
+"""`mjsim study check`: check that a study is ready to start."""
 
 import argparse
 import sys
@@ -85,7 +85,7 @@ def _recruiter(study: "Study") -> "Recruiter":
 
     try:
         return recruiter(study.settings.recruitment)
-    except ConfigError:  # the check reports the error as a problem of the study file
+    except ConfigError:  # the check reports this error as a problem with the study file
         return OpenLink()
 
 

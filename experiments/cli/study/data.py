@@ -1,4 +1,4 @@
-"""Subcommands of `mjsim study` for study data: collect, export, backup, restore, erase and forget."""
+"""Subcommands of `mjsim study` that manage study data: collect, export, backup, restore, erase and forget."""
 
 import argparse
 import asyncio
@@ -159,7 +159,7 @@ async def _back_up(store: "Store", arguments: argparse.Namespace) -> None:
     from experiments.study.data.copies import note_copy
     from experiments.visit.store.copies import check_new
 
-    check_new(arguments.out)  # before `note_copy`, which would record an existing file as a copy
+    check_new(arguments.out)  # must come before `note_copy`, which would record an existing file as a copy
     note_copy(arguments.folder, "backup", arguments.out)
     await store.backup(arguments.out)
 

@@ -44,9 +44,9 @@ def with_store(
     work: "Callable[[Store], Awaitable[T]]",
     url: str | None = None,
 ) -> T:
-    """Run `work` with the database of a study and return its result.
+    """Open the database of a study, call `work` with it, and return the result.
 
-    The database is always closed, even after a signal.
+    The database is closed even if a signal interrupts the work.
     """
     from experiments.visit.store import Store
 

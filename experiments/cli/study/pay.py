@@ -1,4 +1,4 @@
-"""`mjsim study pay`: decide and make payments."""
+"""`mjsim study pay`: determine the payments that are owed to participants, and make them."""
 
 import argparse
 from datetime import timedelta

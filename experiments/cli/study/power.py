@@ -1,4 +1,4 @@
-"""`mjsim study power`: compute the sample size of a study from simulated participants."""
+"""`mjsim study power`: estimate the sample size that a study needs by simulating participants."""
 
 import argparse
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""`mjsim study init` and `mjsim study preregister`: write a study file, and freeze a study."""
+"""`mjsim study init` and `mjsim study preregister`: create a study file, and preregister a study."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`mjsim study rehearse`: rehearse a whole study with simulated participants."""
+"""`mjsim study rehearse`: test a complete study with simulated participants."""
 
 import argparse
 from collections import Counter
@@ -118,7 +118,7 @@ async def _run(
 
 
 def _analyse(study: "Study", out: Path) -> None:
-    """Analyse the rehearsal like a study. Too few participants for an analysis do not count as an error."""
+    """Analyse the rehearsal like a real study. If there are too few participants, only print a message."""
     from experiments.cli.study import analyze
     from experiments.errors import RecordError
     from experiments.study.rehearsal.report import TABLE

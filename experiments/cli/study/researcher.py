@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     study = people_study(arguments)
     arguments.folder.mkdir(
         parents=True, exist_ok=True
-    )  # the first account may be created before the study is first served
+    )  # the folder does not exist if an account is created before the server first starts
     url = arguments.database or sqlite_url(arguments.folder / DATABASE)
     with_store(study, arguments, lambda store: _do(store, arguments), url)
     return 0
@@ -78,7 +78,7 @@ async def _do(store: "Store", arguments: argparse.Namespace) -> None:
 
 
 def _password(arguments: argparse.Namespace) -> str:
-    """Ask for a password. It is not an option, because other users could read it from the command line."""
+    """Ask for a password. A command-line option would be visible to other users of the machine."""
     if arguments.generate:
         password = secrets.token_urlsafe(18)
         print(password)

@@ -1,4 +1,4 @@
-"""`mjsim study serve` and `mjsim study hosts`: serve a study from one or several hosts."""
+"""`mjsim study serve` and `mjsim study hosts`: serve a study on one or more hosts."""
 
 import argparse
 import asyncio
@@ -65,7 +65,7 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument(
         "--rehearsal", type=float, metavar="FACTOR", help=argparse.SUPPRESS
-    )  # hidden option for `mjsim study rehearse`
+    )  # hidden option that only `mjsim study rehearse` uses
     server = parser.add_argument_group("server")
     add_server_options(server)
     server.add_argument(
@@ -116,10 +116,10 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.study.rehearsal.plan import rehearsed
 
         study = rehearsed(study, arguments.rehearsal)
-    phases_of(plan_of(study))  # fails before serving if a custom phase or a completion code is missing
+    phases_of(plan_of(study))  # raises an error early if a custom phase or a completion code is missing
     check_public_url(arguments.public_url)
     check_public_url(arguments.researcher_url)
-    prepare_process()  # before the folder is created, so that the folder is private
+    prepare_process()  # must come first so that the folder is created with private permissions
     arguments.out.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         listener = stack.enter_context(listen(arguments.host, arguments.port))
@@ -132,7 +132,7 @@ def run(arguments: argparse.Namespace) -> int:
         from experiments.web.server.pool import WorkerPool
 
         pool = WorkerPool(study.cells[0].trial(0).house)
-        pool.warm_up()  # workers start while the film is made
+        pool.warm_up()  # the fork server starts while the video is recorded
         film = _film(study, arguments)
         asyncio.run(_serve(study, pool, film, (listener, researchers), arguments))
     return 0

@@ -1,7 +1,7 @@
-"""Model of a participant who has seen the house once.
+"""A model of a participant who has seen the house once.
 
-It covers perception, memory, choice, compliance and reading times. The parameters of each part are fields of a class,
-with their distributions, units and sources (docs/participants.md). Some are fitted to data (docs/paper.md).
+The model covers perception, memory, choice, compliance and reading times. The parameters of each part are
+class fields with distributions and sources (docs/participants.md). Some are fitted to data (docs/paper.md).
 """
 
 import dataclasses
@@ -30,9 +30,9 @@ PERSON: Final[Mapping[str, Any]] = {
 
 
 class _Build:
-    """Factory of guests.
+    """A factory of guests.
 
-    `behaviour` contains the parameters of the model, and `person` the distributions of the body's parameters.
+    `behaviour` contains the parameters of the model, and `person` contains distributions for the body.
     """
 
     behaviour = PARAMETERS
@@ -41,13 +41,13 @@ class _Build:
     def __call__(
         self, house: House, rng: np.random.Generator, behaviour: Mapping[str, float] | None = None
     ) -> Participant:
-        """Create a guest with the given parameter values. By default, draw them."""
+        """Create a guest with the given parameter values, or with random values by default."""
         values = behaviour or draw(PARAMETERS, Distributions(), rng, "guest")
         return Guest(house, rng, as_behaviour(values))
 
 
 def as_behaviour(values: Mapping[str, float]) -> Behaviour:
-    """Create the parts of the model from values by name, such as `compliance.follows`."""
+    """Convert parameter values by name, such as `compliance.follows`, to the parts of the model."""
     return Behaviour(
         **{
             part: kind(**{f.name: values[f"{part}.{f.name}"] for f in dataclasses.fields(kind)})

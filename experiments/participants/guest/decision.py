@@ -1,4 +1,4 @@
-"""Choice of the guest's next visit or search, and the time for the decision."""
+"""Choose the guest's next visit or search, and determine how long the decision takes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from planner.plan import Visit, VisitKind
 
 @dataclass(frozen=True)
 class Decision:
-    """Parameters of choosing the next visit or search.
+    """Parameters for choosing the next visit or search.
 
-    People plan several moves ahead, and more of them the better they know a task (van Opheusden et al., Nature 618,
-    2023). The regions of a building affect their routes (Wiener and Mallot, Spatial Cognition and Computation 3, 2003).
-    The planning depth, the distance error and the room cost are assumptions.
+    People plan several moves ahead, and the number of moves increases with practice (van Opheusden et al.,
+    Nature 618, 2023). People's routes depend on how a building is divided into regions (Wiener and Mallot,
+    Spatial Cognition and Computation 3, 2003). Planning depth, distance error and room cost are assumptions.
     """
 
-    # scale in metres: an option that costs c metres more is chosen with odds exp(-c / temperature)
+    # temperature in metres: an option that costs c metres more has odds of exp(-c / temperature)
     temperature: float = varies({"lognormal": [0.5, 0.35]}, 0.0, 1000.0, "m")
     # planning depth: number of visits simulated ahead, rounded to an integer
     look_ahead: float = varies({"uniform": [1.5, 4.5]}, 1.0, 12.0, "visits")
@@ -37,20 +37,20 @@ class Decision:
 
 @dataclass(frozen=True)
 class Task:
-    """The rest of the task as the guest knows it. Locations are numbered. Location 0 is the guest's position."""
+    """The rest of the task, as far as the guest knows it. Location 0 is the guest's position."""
 
     legs: NDArray[np.float64]  # costs of walks between locations, in metres, shape (n, n)
     picks: Sequence[int]  # location of each object that can be picked up
-    bins: Sequence[int]  # location of the bin of each of these objects
+    bins: Sequence[int]  # location of the bin for each object that can be picked up
     carried: Sequence[int]  # location of the bin of each carried object
     capacity: int  # maximum number of objects that can be carried
 
 
 def first_step_costs(task: Task, look_ahead: int) -> list[float]:
-    """Return the cost in metres of each possible first visit, in the order `picks`, `carried`.
+    """Return the cost of each possible first visit in metres, first for `picks`, then for `carried`.
 
-    The cost is that of `look_ahead` visits, which continue with the nearest possible visit. If the hands are full,
-    picks cost infinity.
+    The cost covers `look_ahead` visits. After the first visit, the guest imagines always choosing the nearest
+    possible visit. If the hands are full, picks have an infinite cost.
     """
     picks, carried, full = (
         list(range(len(task.picks))),
@@ -99,7 +99,7 @@ def judged_distances(
 def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator) -> int:
     """Choose an option with odds exp(-cost / temperature), both in metres.
 
-    At temperature 0, choose the cheapest. An option of infinite cost is never chosen.
+    At temperature 0, choose the cheapest. An option with an infinite cost is never chosen.
     """
     noise = rng.gumbel(size=len(costs))
     return int(np.argmin(np.asarray(costs) - temperature * noise))
@@ -107,7 +107,7 @@ def choose(costs: Sequence[float], temperature: float, rng: np.random.Generator)
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """Knowledge on which a choice depends."""
+    """The knowledge on which the guest bases a choice."""
 
     objects: Mapping[str, Point]  # remembered positions of objects in metres, shape (2,)
     pull: float  # weight (0 to 1) of the straight-line distance in estimated distances to these objects
@@ -115,7 +115,7 @@ class Known:
 
 
 class Chooser:
-    """Chooses visits and searches."""
+    """A model of how the guest chooses the next visit or search."""
 
     def __init__(
         self, decision: Decision, house: House, frontier: Frontier, rng: np.random.Generator
@@ -188,26 +188,26 @@ class Chooser:
 
 @dataclass(frozen=True)
 class Timing:
-    """Parameters of the time for reading and deciding."""
+    """Parameters that determine how long reading and deciding take."""
 
-    # factor of all times below: less than 1 for fast participants, more than 1 for slow ones
+    # factor that scales all other times: less than 1 for fast participants, more than 1 for slow ones
     pace: float = varies({"lognormal": [1.0, 0.35]}, 0.05, 20.0)
     # time to prepare the next step mentally, in seconds (Card, Moran and Newell, CACM 23, 1980)
     deciding: float = varies(1.35, 0.0, 60.0, "s")
     # reading speed in words per minute (Brysbaert, Journal of Memory and Language 109, 2019)
     reading_speed: float = varies(238.0, 10.0, 10_000.0, "words a minute")
-    words: float = varies(4.0, 0.0, 100.0)  # number of words in a row of the task list
+    words: float = varies(4.0, 0.0, 100.0)  # number of words in each row of the task list
     # time in seconds to understand a suggested step and its path before walking (starting value)
     guided_step: float = varies(6.0, 0.0, 60.0, "s")
     # time in seconds to relate the flagpoles to the house before a choice (starting value)
     interpreting: float = varies({"uniform": [1.5, 3.0]}, 0.0, 60.0, "s")
 
     def list_time(self, rows: int) -> float:
-        """Return the time to read a list, in seconds."""
+        """Return the time in seconds to read a list with the given number of rows."""
         return self.pace * rows * self.words / self.reading_speed * 60.0
 
     def choice_time(self, *, poles: bool) -> float:
-        """Return the time to choose the next visit, in seconds. With `poles`, it includes interpreting flagpoles."""
+        """Return the time in seconds to choose the next visit and, with `poles`, to interpret flagpoles."""
         return self.pace * (self.deciding + (self.interpreting if poles else 0.0))
 
     def suggestion_time(self) -> float:

@@ -1,4 +1,4 @@
-"""Deviations of the guest from suggested steps and from the shortest path."""
+"""Model how the guest deviates from suggested steps and from the shortest path."""
 
 from dataclasses import dataclass
 
@@ -13,25 +13,26 @@ MIN_DETOUR = 0.5  # minimum length of a detour, in metres
 
 @dataclass(frozen=True)
 class Compliance:
-    """Parameters of compliance with suggested steps.
+    """Parameters that determine how the guest complies with suggested steps.
 
-    The published variance of deviations is largest under `optimal` at every difficulty (PAPER section 8). This suggests
-    groups of participants who always, sometimes or rarely follow suggestions. The weights of the groups are starting
-    values. A participant who always follows neither gives up a step nor picks up other objects, but may quit following.
+    In the published data, the variance of deviations is largest in the condition `optimal` at every
+    difficulty (PAPER section 8). This suggests that there are groups of participants who always, sometimes or
+    rarely follow suggestions. The weights of the groups are starting values. A participant who always follows
+    suggestions does not give up a step or pick up other objects, but may quit following.
     """
 
     # probability of following a suggested step
     follows: float = chance({"mixture": [[0.62, 1.0], [0.20, {"beta": [2, 2]}], [0.18, {"beta": [1, 9]}]]})
     abandons: float = chance({"beta": [1.0, 19.0]})  # probability of giving up a suggested step on the way
-    # probability of picking up an object next to the path that is noticed while a hand is free
+    # probability of picking up an object that is noticed near the path while a hand is free
     picks_up: float = chance({"uniform": [0.15, 0.30]})
-    beside: float = varies(2.0, 0.0, 20.0, "m")  # maximum distance of such an object, in metres
-    # probability at each suggestion of ignoring it and all later ones
+    beside: float = varies(2.0, 0.0, 20.0, "m")  # maximum distance of objects picked up on the way, in metres
+    # probability, at each suggestion, of ignoring this and all later suggestions
     quits: float = chance({"beta": [1.0, 99.0]})
 
 
 class Adherence:
-    """Decisions of a participant about suggestions."""
+    """A model of whether a participant follows suggestions."""
 
     def __init__(self, compliance: Compliance, rng: np.random.Generator) -> None:
         self.compliance, self._rng, self._has_quit = compliance, rng, False
@@ -43,13 +44,13 @@ class Adherence:
         return chance < self.compliance.follows and not self._has_quit
 
     def gives_up_after(self, duration: float) -> float | None:
-        """Return the time in seconds after which the step is given up during a walk, or None if it is not."""
+        """Return the time in seconds after which a suggested step is given up, or None if it is completed."""
         chance, share = self._rng.random(2).tolist()
         gives_up = chance < self.compliance.abandons and not self._always_follows
         return share * duration if gives_up else None
 
     def picks_up(self, distance: float) -> bool:
-        """Decide whether to pick up an object that was noticed at this distance, in metres."""
+        """Decide whether to pick up an object that was noticed at the given distance in metres."""
         tempted = float(self._rng.random()) < self.compliance.picks_up
         return tempted and distance <= self.compliance.beside and not self._always_follows
 
@@ -60,18 +61,18 @@ class Adherence:
 
 @dataclass(frozen=True)
 class Walking:
-    """Parameters of departures from the shortest path. The shapes of the distributions are starting values."""
+    """Parameters of deviations from the shortest path. Shapes of distributions are starting values."""
 
-    # probability of first going elsewhere by mistake, at each walk without a shown path
+    # probability that a walk without a shown path starts with a detour by mistake
     lapse_rate: float = chance({"beta": [0.5, 3.0]})
-    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # maximum length of this detour, in metres
-    # probability of first going to the point of the current room that is nearest to a flagpole in another room, and
-    # weight of the straight-line distance in estimated distances to flagpoles
+    lapse_distance: float = varies(5.0, 0.0, 50.0, "m")  # maximum length of a detour by mistake, in metres
+    # Probability of first going to the point of the room that is nearest to a flagpole in another room. It is
+    # also the weight of the straight-line distance when the distance to a flagpole is estimated.
     pull: float = chance({"beta": [2.0, 3.0]})
 
 
 class Detours:
-    """Chooses intermediate stops of a walk."""
+    """A model of the intermediate stops that the guest makes on a walk."""
 
     def __init__(self, walking: Walking, house: House, rng: np.random.Generator) -> None:
         self._walking, self._house, self._rng = walking, house, rng

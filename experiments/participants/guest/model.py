@@ -1,4 +1,4 @@
-"""Simulated participant that combines all parts of the model."""
+"""The simulated participant `guest`, which combines all parts of the model."""
 
 import math
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ SEEN_BIN = 2.0  # distance in metres within which the guest learns the location 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Parameter values of one guest."""
+    """The parameter values of one guest."""
 
     perception: Perception
     memory: Memory
@@ -38,15 +38,15 @@ class Behaviour:
 class Intention:
     """The visit or search that a guest is about to make."""
 
-    aim: Visit | SearchPlace  # visit, or viewpoint to search from
-    suggested: bool = False  # True if the HUD suggested it
+    aim: Visit | SearchPlace  # visit to make, or viewpoint from which to search
+    suggested: bool = False  # True if the HUD suggested the visit
     # True if the guest has left the shown path or was blocked on it
     strays: bool = False
     gives_up_at: float = math.inf  # simulated time in seconds at which the suggested step is given up
 
 
 class Guest:
-    """Tidies like a participant who has seen the house once, with the guidance of any condition."""
+    """A simulated participant who has seen the house once. The guest works in every assistance condition."""
 
     needs: frozenset[str] = frozenset()
 
@@ -65,7 +65,7 @@ class Guest:
         self._turned_for_poles = self._has_begun = False
         self._carried: set[str] = set()
         self._brought: set[str] = set()  # objects that are assumed to be in their bins
-        self._passed: set[str] = set()  # objects that were already considered for picking up in passing
+        self._passed: set[str] = set()  # objects that the guest has already considered picking up in passing
         self._room: str | None = None
         self._read: Visit | None = None
         self._given_up: Visit | None = None
@@ -232,7 +232,7 @@ class Guest:
         return self._house.approaches[percept.targets[aim.object]]
 
     def _turn_around(self, percept: Percept) -> Action | None:
-        """Continue a turn. After a full turn, all bins of the room are known."""
+        """Continue a turn. After a full turn, the guest knows all bins of the room."""
         turning = self._turn.act(percept) if self._turn is not None else None
         if turning is None and self._turn is not None:
             self._turn = None

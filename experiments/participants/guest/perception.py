@@ -1,4 +1,4 @@
-"""Perception and memory of objects and bins."""
+"""Model how the guest perceives and remembers objects and bins."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -12,7 +12,7 @@ from experiments.participants.distribution import chance, varies
 
 @dataclass(frozen=True)
 class Perception:
-    """Parameters of noticing objects.
+    """Parameters that determine which objects the guest notices.
 
     Conspicuity predicts search time (Toet et al., Optical Engineering 37, 1998). The probability of noticing is assumed
     to be a logistic function of distance. The field of view and the sight range are parameters of the body
@@ -24,15 +24,15 @@ class Perception:
     # scale of the logistic function, in metres
     distance_spread: float = varies(1.0, 0.01, 20.0, "m")
     looks_around: float = chance(0.8)  # probability of turning around at a viewpoint
-    # distance in metres within which visible floor counts as searched; objects that are overlooked there can only be
-    # found in the next round
+    # Distance in metres within which visible floor counts as searched. Objects that are overlooked there can
+    # only be found in the next round.
     covers: float = varies({"uniform": [2.0, 6.0]}, 0.0, 100.0, "m")
 
     def probability(self, distance: float, share: float) -> float:
-        """Return the probability that an object at a distance in metres is noticed.
+        """Return the probability that an object at the given distance in metres is noticed.
 
-        `share` is the visible share of the object, 0 to 1. A quarter of an object has the same visual angle as a whole
-        object at twice the distance.
+        `share` is the visible fraction of the object, 0 to 1. A quarter of an object looks as large as a
+        whole object at twice the distance.
         """
         if share <= 0:
             return 0.0
@@ -41,7 +41,7 @@ class Perception:
 
 
 class Noticing:
-    """Notices objects. An overlooked object stays overlooked until it is closer or `look_afresh` is called."""
+    """A model of noticing objects. Overlooked objects may be noticed later at a shorter distance."""
 
     def __init__(self, perception: Perception, rng: np.random.Generator) -> None:
         self._perception, self._rng = perception, rng
@@ -69,7 +69,7 @@ class Noticing:
 
 @dataclass(frozen=True)
 class Memory:
-    """Parameters of memory.
+    """Parameters that determine what the guest remembers.
 
     After one tour through a building, most landmarks are remembered. The location of an object is forgotten after an
     exponentially distributed time. Both parameters are starting values.
@@ -82,7 +82,7 @@ class Memory:
 
 
 class Recollection:
-    """Locations that a participant remembers.
+    """The locations that a participant remembers.
 
     Attributes:
         objects: Positions of objects in metres, shape (2,).
@@ -96,7 +96,7 @@ class Recollection:
         self.bins = {key for key in sorted(receptacles) if rng.random() < memory.knows_bins}
 
     def learn(self, found: Mapping[str, Point], time: float) -> list[str]:
-        """Store positions of objects seen at `time`, in seconds. Return the names of objects that are new."""
+        """Store the positions of objects seen at `time`, in seconds. Return the names of new objects."""
         new = [name for name in found if name not in self.objects]
         self.objects.update(found)
         for name in found:
@@ -104,7 +104,7 @@ class Recollection:
         return new
 
     def forget(self, time: float, but: str | None = None) -> None:
-        """Forget objects that were last seen too long ago, except the object `but`."""
+        """Forget the objects whose retention time has passed, except the object `but`."""
         for name in [n for n, until in self._until.items() if until < time and n != but]:
             self.drop(name)
 

@@ -1,1 +1,1 @@
-"""Collection, export and deletion of study data."""
+"""Collect, export and delete the data of a study."""

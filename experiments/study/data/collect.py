@@ -1,4 +1,4 @@
-"""Collect a tidy table of a study from its database and runs, with one row per participant."""
+"""Collect the data of a study in a table with one row per participant."""
 
 import csv
 import hashlib
@@ -25,21 +25,21 @@ from experiments.visit.texts.items import Item
 from mjsim.support.files import write_text_atomically
 
 TEXTS = "texts.csv"
-FREE = ("line", "text")  # types of items that have free-text answers
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # characters with which a spreadsheet formula can start
+FREE = ("line", "text")  # types of survey items with free-text answers
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # characters that can start a spreadsheet formula
 Row = TypeVar("Row", Answer, PhaseRow)
 _NAME = re.compile(r"p?(\d{1,9})", re.ASCII)
 
 
 @dataclass(frozen=True)
 class Collected:
-    """Collected data of a study.
+    """The collected data of a study.
 
     Attributes:
-        rows: One row per participant who ended the task, with measures and answers.
-        texts: Free-text answers. Each row has the participant, the item and the text.
-        unfinished: Number of participants who did not end the task, by status.
-        unusable: For each participant whose run cannot be read, the reason.
+        rows: One row per participant who played the task to its end, with measures and answers.
+        texts: Free-text answers. Each row contains the participant, the item and the text.
+        unfinished: Number of participants who did not play the task to its end, by status.
+        unusable: Error message for each participant whose run cannot be read.
     """
 
     rows: Sequence[Mapping[str, Any]]
@@ -51,7 +51,7 @@ class Collected:
 async def collect(study: Study, store: Store, folder: Path) -> Collected:
     """Collect the data of all participants whose runs are in `folder`.
 
-    Participants who asked for the deletion of their data are omitted, and so are all platform ids.
+    Platform ids are omitted. Participants who asked for the deletion of their data are omitted as well.
     """
     people = [person for person in await store.people() if not person.delete_wanted]
     check_people(study, people)
@@ -83,11 +83,7 @@ def _by_person(rows: Sequence[Row]) -> Mapping[int, Sequence[Row]]:
 
 
 def check_people(study: Study, people: Sequence[PersonRow]) -> None:
-    """Check that a study has only real participants, and a rehearsal only simulated ones.
-
-    Raises:
-        RecordError: A participant is of the wrong type.
-    """
+    """Raise `RecordError` if a study has simulated participants or a rehearsal has real participants."""
     simulated = sum(person.platform == REHEARSAL for person in people)
     if simulated and not study.rehearsal:
         raise RecordError(
@@ -99,7 +95,7 @@ def check_people(study: Study, people: Sequence[PersonRow]) -> None:
 
 
 def collect_visits(folder: Path) -> Collected:
-    """Collect the finished tasks of all visits in an output folder of `mjsim play`, without participants' links."""
+    """Collect the finished tasks in an output folder of `mjsim play`. Personal links are not included."""
     rows: list[Mapping[str, Any]] = []
     unusable: dict[str, str] = {}
     under_way = 0
@@ -128,17 +124,17 @@ def write_collected(collected: Collected, out: Path) -> Sequence[Path]:
 
 
 def person_name(person: PersonRow) -> str:
-    """Return the participant's name in tables, such as `p00012`."""
+    """Return the name of a participant in tables, such as `p00012`."""
     return f"p{person.id:05d}"
 
 
 def visit_name(folder: str) -> str:
-    """Return the name in tables of a visit to `mjsim play`, such as `v1b9c03af`."""
+    """Return the name that identifies a visit in tables, such as `v1b9c03af`."""
     return f"v{hashlib.sha256(folder.encode()).hexdigest()[:8]}"
 
 
 def person_number(name: str) -> int:
-    """Parse the participant's number from a name such as `p00012`. Raises ConfigError for any other text."""
+    """Parse the number in a participant's name, such as `p00012`. Raises ConfigError for any other text."""
     found = _NAME.fullmatch(name)
     if found is None:
         raise ConfigError(f"{name!r} is no person; tables name people like p00012")

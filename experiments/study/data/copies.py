@@ -1,4 +1,4 @@
-"""A list of all copies of a study's data, from which participants must be erased too."""
+"""Keep a list of all copies of a study's data, so that participants can be erased from them."""
 
 from collections.abc import Collection
 from datetime import UTC, datetime
@@ -16,7 +16,7 @@ Kind = Literal["backup", "database", "export", "table", "analysis", "film", "pag
 
 
 class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A file or folder made from study data. `source` is the part of the study's folder from which it was made."""
+    """A file or folder that was made from study data. `source` is a path within the study folder."""
 
     kind: Kind
     path: str
@@ -25,7 +25,7 @@ class Copy(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
-    """Add a copy to a folder's list. Call this before writing the copy."""
+    """Add a copy to the list in a folder. Call this function before the copy is written."""
     made = datetime.now(UTC).isoformat(timespec="seconds")
     line = msgspec.json.encode(Copy(kind, str(path.absolute()), made, source)) + b"\n"
     with (folder / INDEX).open("ab") as file:
@@ -33,7 +33,7 @@ def note_copy(folder: Path, kind: Kind, path: Path, source: str = "") -> None:
 
 
 def note_derived(source: Path, kind: Kind, path: Path) -> None:
-    """Record a file made from a run or table in the list of the nearest parent folder that has one."""
+    """Add a file made from a run or table to the list of copies in the nearest parent that has a list."""
     source = source.absolute()
     for folder in (source, *source.parents):
         if (folder / INDEX).is_file():
@@ -41,7 +41,7 @@ def note_derived(source: Path, kind: Kind, path: Path) -> None:
 
 
 def copies(folder: Path) -> list[Copy]:
-    """Return the recorded copies. If a path was recorded several times, the last record counts."""
+    """Return all copies in the list of a folder. If a path is listed several times, the last entry counts."""
     path = folder / INDEX
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = [msgspec.json.decode(line, type=Copy) for line in lines if line.endswith(b"}")]

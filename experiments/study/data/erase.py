@@ -1,4 +1,4 @@
-"""Erase a participant from a study. Copies and files are changed first, then the database."""
+"""Erase a participant from a study, first from files and copies and then from the database."""
 
 import asyncio
 import csv
@@ -18,17 +18,17 @@ from experiments.visit.folders import VISITS, VisitFolders
 from experiments.visit.store import PersonRow, Store, change_database
 from mjsim.support.files import WORK, remove_leftovers, write_text_atomically
 
-LEFTOVER_S = 3600.0  # age at which temporary files are considered abandoned, in seconds
+LEFTOVER_S = 3600.0  # age after which temporary files are considered abandoned, in seconds
 
 
 async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
-    """Erase a participant from the study and from its recorded backups, tables and exports.
+    """Erase a participant from a study and from all its known backups, tables and exports.
 
     Args:
         name: The participant's name in tables, such as `p00012`.
 
     Returns:
-        One message per copy that was changed or is missing.
+        A message for each copy that was changed or is missing.
 
     Raises:
         ConfigError: `name` is not a participant's name.
@@ -56,7 +56,7 @@ async def erase(store: Store, folder: Path, name: str, who: str) -> list[str]:
 
 async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who: str) -> list[str]:
     async def gone(other: Store) -> bool:
-        # Compare arrival times too, since numbers are assigned again after an old backup is restored.
+        # Numbers are reused after an old backup is restored, so the arrival times must match as well.
         same = {one.id for one in await other.people() if one.created == person.created} & {person.id}
         for number in same:
             await other.erase(number, who, unpaid=True)
@@ -70,7 +70,7 @@ async def _erase_from_copies(store: Store, folder: Path, person: PersonRow, who:
 async def change_databases(
     store: Store, folder: Path, work: Callable[[Store], Awaitable[bool]], name: str
 ) -> list[str]:
-    """Apply `work` to all recorded backups and restored databases. Return one message per changed or missing copy."""
+    """Apply a function to all backups and restored databases. Return a message for each changed copy."""
     study, told = await store.study(), []
     for copy in copies(folder):
         path = Path(copy.path)
@@ -83,9 +83,9 @@ async def change_databases(
 
 
 def remove_from_files(folder: Path, names: Sequence[str]) -> list[str]:
-    """Remove a participant from the files made from a folder. Return one message per file."""
+    """Remove a participant from all files that were made from a folder. Return a message for each file."""
     told, deleted, listed = list[str](), set[str](), copies(folder)
-    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not add analyses to the list
+    if (usual := folder / ANALYSIS).is_dir():  # earlier versions did not list analyses as copies
         listed.append(Copy("analysis", str(usual), ""))
     for place in {folder, *(Path(copy.path).parent for copy in listed)}:
         for left in place.glob(f"{WORK}*"):

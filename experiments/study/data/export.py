@@ -46,10 +46,10 @@ OWN = {
 
 @dataclass(frozen=True)
 class Variable:
-    """A table column, as described in the codebook.
+    """A table column and its description in the codebook.
 
     Attributes:
-        levels: The meaning of each value of a categorical column.
+        levels: Meaning of each value of a categorical column.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Exported:
-    """Summary of an export."""
+    """The summary of an export."""
 
     people: int
     runs: int
@@ -79,7 +79,7 @@ class Exported:
 
 
 async def export(study: Study, store: Store, folder: Path, out: Path, *, replace: bool = False) -> Exported:
-    """Export a study to the folder `out`, atomically.
+    """Export a study to a folder atomically.
 
     Participants are identified by numbers. The export contains no platform ids, IP addresses, links or hashes of
     links. It omits participants who did not consent or who asked for the deletion of their data.
@@ -119,7 +119,7 @@ async def export(study: Study, store: Store, folder: Path, out: Path, *, replace
 
 
 def check_export(out: Path, *, replace: bool) -> None:
-    """Raise RecordError if an export cannot be written to `out`."""
+    """Raise `RecordError` if an export cannot be written to a folder."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     if not (out / DESCRIPTION).is_file():
@@ -178,7 +178,7 @@ def _write(out: Path, study: Study, tables: Mapping[str, Table]) -> None:
 
 
 def csv_text(table: Table) -> str:
-    """Format a table as CSV, and escape texts that a spreadsheet would evaluate as formulas."""
+    """Format a table as CSV, and escape text that a spreadsheet would evaluate as a formula."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
     writer.writeheader()

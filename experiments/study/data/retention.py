@@ -1,4 +1,4 @@
-"""Delete identifying data some days after a participant's last activity, as set by `keep_days` in the study file."""
+"""Delete identifying data when a participant has been inactive for the retention period of the study."""
 
 import asyncio
 import datetime
@@ -15,17 +15,17 @@ from experiments.study.data.erase import change_databases, erase, remove_from_fi
 from experiments.visit.store import PersonRow, Store, utc_now
 
 LOG = logging.getLogger("mjsim.study")
-WHO = "keep_days"  # name under which deletions appear in the audit log
+WHO = "keep_days"  # user name of automatic deletions in the audit log
 DAY = 86400.0  # one day, in seconds
 
 
 @dataclass(frozen=True)
 class Retained:
-    """Names of the participants whose retention period is over.
+    """The names of all participants whose retention period has ended.
 
     Attributes:
         forgotten: Participants whose identifying data was deleted.
-        erased: Participants whose data was deleted completely, at their request.
+        erased: Participants whose data was completely deleted at their request.
         unpaid: Participants whose data is kept until they have been paid.
     """
 
@@ -37,13 +37,13 @@ class Retained:
 async def forget_old(
     store: Store, visits: Path, keep_days: int, *, dry: bool = False, now: datetime.datetime | None = None
 ) -> Retained:
-    """Delete platform ids, keys and links of participants `keep_days` after their last activity.
+    """Delete the platform ids, keys and links of participants who have been inactive for `keep_days` days.
 
-    Participants who asked for deletion are erased. The measures and answers of others are kept under their number.
-    Participants with a pending payment are skipped. Recorded backups are changed too.
+    Participants who asked for deletion are erased. The measures and answers of all others are kept.
+    Participants with a pending payment are skipped. The data is also deleted from known backups.
 
     Args:
-        dry: Report the affected participants without deleting anything.
+        dry: True to report the affected participants without deleting anything.
     """
     before = (now or utc_now()) - datetime.timedelta(days=keep_days)
     owed = {p.person_id for p in await store.ledger.owed(in_doubt_after=datetime.timedelta())}
@@ -51,7 +51,7 @@ async def forget_old(
     paid = [person for person in people if person.id not in owed]
     deleted, kept = ([p for p in paid if p.delete_wanted is wanted] for wanted in (True, False))
     played, names = {row.person_id for row in await store.trials()}, await _names(store, kept)
-    # Skip participants whose runs are on another host, since that host deletes their data.
+    # If the runs of a participant are on another host, that host deletes the data.
     places = {p.id: (visits / p.token_hash, visits / names[p.id]) for p in kept}
     kept = [p for p in kept if p.id not in played or any(place.is_dir() for place in places[p.id])]
     if not dry:
@@ -73,13 +73,13 @@ async def forget_daily(store: Store, visits: Path, keep_days: int) -> NoReturn:
             found = await forget_old(store, visits, keep_days)
             if found.forgotten or found.erased:
                 LOG.info("%d people forgotten, %d erased", len(found.forgotten), len(found.erased))
-        except (StoreError, OSError) as error:  # will be tried again tomorrow
+        except (StoreError, OSError) as error:  # the deletion is tried again a day later
             LOG.warning("%s", error)
         await asyncio.sleep(DAY)
 
 
 async def _names(store: Store, people: Sequence[PersonRow]) -> dict[int, str]:
-    """Choose new folder names, since a hash of the link still identifies its participant."""
+    """Choose new names for the run folders, because a hash of a link still identifies the participant."""
     study = await store.study()
     made = {p.id: f"{study.name} {study.created} {p.id}" for p in people}
     return {number: hashlib.sha256(text.encode()).hexdigest() for number, text in made.items()}
@@ -96,10 +96,10 @@ async def _forget(store: Store, visits: Path, people: Sequence[PersonRow], names
         return bool(identified)
 
     await change_databases(store, visits.parent, gone, "them")
-    for person in people:  # derived files contain the old folder name, a hash of the link
+    for person in people:  # derived files may contain the old folder name
         traces = (person.token_hash, visit_name(person.token_hash))
         await asyncio.to_thread(remove_from_files, visits.parent, traces)
-    for person in people:  # an interrupted deletion may have renamed some folders already
+    for person in people:  # an interrupted deletion may already have renamed some folders
         if (folder := visits / person.token_hash).is_dir():
             await asyncio.to_thread(folder.rename, visits / names[person.id])
     await store.forget(numbers, [names[number] for number in numbers], WHO)

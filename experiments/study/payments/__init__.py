@@ -1,1 +1,1 @@
-"""Payments to participants: rules, payouts and the interface of recruitment platforms."""
+"""Determine which payments are due to participants, and send them to the recruitment platform."""

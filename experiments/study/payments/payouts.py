@@ -1,4 +1,4 @@
-"""Send owed payments to the recruitment platform, each at most once."""
+"""Send all owed payments to the recruitment platform without paying twice."""
 
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Sent:
-    """Result of an attempt to send a payment.
+    """The result of an attempt to send a payment.
 
     Attributes:
         key: Key of the payment in the ledger.
         state: `paid`, `refused` (another attempt is possible) or `in doubt` (the platform may have paid).
-        text: The platform's reference, or the reason why the payment was not made.
-        stops: True if the platform can currently make no payments at all.
+        text: Reference of the payment on the platform, or the reason why it was not made.
+        stops: True if the platform currently cannot make any payments.
     """
 
     key: str
@@ -30,23 +30,23 @@ class Sent:
 
 
 class Sender:
-    """Sends owed payments to the platform.
+    """A client that sends owed payments to the recruitment platform.
 
     Each attempt is recorded in the ledger before the request is sent. If the outcome of an attempt is unknown, the
-    payment is sent again only when the platform's lists must show the first attempt and do not.
+    payment is sent again only if it is still missing from the platform's lists after a waiting time.
     """
 
     def __init__(self, study: str, store: Store, payer: Payer) -> None:
         self._study, self._ledger, self._identity, self._payer = study, store.ledger, store.identity, payer
 
     async def send(self) -> AsyncIterator[Sent]:
-        """Send all owed payments, and yield the result of each."""
+        """Send all owed payments, and yield the result of each payment."""
         for last in await self._ledger.owed(in_doubt_after=timedelta()):
             done = await self._settle(last) if last.in_doubt else None
             if done is None:
                 attempt = await self._ledger.begin_sending(last.key)
                 if attempt is None:
-                    continue  # another process is already sending this payment
+                    continue  # another process is sending this payment
                 done = await self._send(last.key, await self._order(last, attempt))
             yield done
             if done.stops:

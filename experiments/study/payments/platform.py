@@ -1,4 +1,4 @@
-"""Payment interface of recruitment platforms, and an HTTP client for their APIs."""
+"""An interface for payments through recruitment platforms, and an HTTP client for platform APIs."""
 
 import asyncio
 import os
@@ -12,8 +12,8 @@ import httpx
 from experiments.errors import ConfigError, ExperimentError
 from experiments.visit.store.values import PaymentKind
 
-TIMEOUT = 30.0  # timeout for a response, in seconds; other processes may retry after ten minutes
-# maximum number of attempts if requests are rate-limited, and the longest delay between two, in seconds
+TIMEOUT = 30.0  # response timeout in seconds; other processes may retry after ten minutes
+# Maximum number of attempts for a rate-limited request, and maximum delay between two attempts, in seconds
 TRIES, LONGEST_WAIT = 4, 60.0
 LISTED_AFTER = timedelta(minutes=10)
 MAX_TEXT = 300  # maximum length of a platform's error message, in characters
@@ -21,15 +21,15 @@ TOO_MANY = 429
 
 
 class DeclinedError(ExperimentError):
-    """The platform refused the request or could not be reached."""
+    """Raised if the platform refuses a request or cannot be reached."""
 
 
 class StoppedError(DeclinedError):
-    """The platform can make no payments, because it is unreachable or rejects the API secret."""
+    """Raised if no payments are possible because the platform is unreachable or rejects the API secret."""
 
 
 class UnsureError(ExperimentError):
-    """It is unknown whether the platform carried out the request."""
+    """Raised if it is unknown whether the platform has carried out a request."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Order:
         attempt: Number of the attempt to make the payment.
         cents: Amount in hundredths of the currency, or 0 for a rejection.
         why: Reason for the payment, which is shown to the participant.
-        identity: Ids with which the participant arrived, by query parameter.
+        identity: Ids in the participant's link, by query parameter.
         others: Amounts of the bonuses that the participant has already received, in hundredths of the currency.
     """
 
@@ -55,11 +55,11 @@ class Order:
 
     @property
     def amount(self) -> str:
-        """Amount as a decimal number, such as `7.50`."""
+        """The amount as a decimal number, such as `7.50`."""
         return f"{self.cents // 100}.{self.cents % 100:02}"
 
     def id(self, name: str) -> str:
-        """Return the participant's id that the platform sent in a query parameter.
+        """Return the id that the platform added to the participant's link as a query parameter.
 
         Raises:
             DeclinedError: The participant did not come from the platform, or the ids have been erased.
@@ -70,7 +70,7 @@ class Order:
 
 
 class Payer(Protocol):
-    """Payment client of a recruitment platform. Its methods raise DeclinedError and UnsureError.
+    """A client that makes payments through a platform. Its methods raise DeclinedError or UnsureError.
 
     Attributes:
         listed_after: Time until the platform's lists reliably show the outcome of a request.
@@ -81,18 +81,18 @@ class Payer(Protocol):
     shortest_reason: int
 
     async def find(self, order: Order) -> str | None:
-        """Find the payment in the platform's lists and return its reference. Return None if it has not been made."""
+        """Return the reference of the payment in the platform's lists, or None if it has not been made."""
         ...
 
     async def send(self, order: Order) -> str:
-        """Make the payment and return its reference. Raises UnsureError if the platform may have paid."""
+        """Make a payment, and return its reference. Raises UnsureError if the outcome is unknown."""
         ...
 
     async def close(self) -> None: ...
 
 
 class Api:
-    """HTTP client of a platform's API.
+    """An HTTP client for the API of a recruitment platform.
 
     Args:
         timeout: Timeout for a complete response, in seconds.
@@ -106,8 +106,8 @@ class Api:
         """Send a request and return the JSON of the response, or None if it is empty.
 
         Raises:
-            DeclinedError: The platform was unreachable or refused the request.
-            UnsureError: There is no valid response, so the platform may have carried out the request.
+            DeclinedError: The platform could not be reached or refused the request.
+            UnsureError: There was no valid response, so the platform may have carried out the request.
         """
         for attempt in range(1, TRIES + 1):
             answer = await self._answer(method, path, request)
@@ -123,7 +123,7 @@ class Api:
             raise DeclinedError(f"the platform says {said}")
         try:
             return answer.json() if answer.content else None
-        except ValueError as error:  # for example, a proxy may answer with an HTML page
+        except ValueError as error:  # the response may be an HTML page from a proxy
             raise UnsureError(f"the platform's answer is not understood: {said}") from error
 
     async def close(self) -> None:
@@ -140,7 +140,7 @@ class Api:
 
 
 def secret(name: str) -> str:
-    """Read a secret from an environment variable. Raises ConfigError if it is missing or cannot be sent in a header."""
+    """Read a secret from an environment variable. Raises ConfigError if it is missing or invalid."""
     if not (value := os.environ.get(name, "").strip()):
         raise ConfigError(f"{name} is not set in the environment; it holds the platform's secret for paying")
     if not (value.isascii() and value.isprintable()):

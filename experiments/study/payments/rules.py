@@ -1,4 +1,4 @@
-"""Apply a study's payment rules and record the payments that are due."""
+"""Apply the payment rules of a study, and record the payments that are due."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ class Due:
 def due(
     study: Study, people: Sequence[PersonRow], trials: Sequence[TrialRow], rejected: Collection[int] = ()
 ) -> list[Due]:
-    """Return the payments that are due under the study file's rules, in the participants' order of arrival.
+    """Return all payments that are due by the rules of the study, in the order in which participants arrived.
 
-    No payments are due to active or rejected participants.
+    Active and rejected participants receive no payments.
     """
     pay, phases = study.settings.pay, study.settings.phases
     delivered = {row.person_id for row in trials if row.phase == TASK and row.ended == ALL_DELIVERED}
@@ -65,7 +65,7 @@ def due(
 
 
 def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[Due]:
-    """Return the payments that are not in the ledger yet. Recorded payments remain valid even if the rules change."""
+    """Return the payments that are not in the ledger yet. Later rule changes do not affect old payments."""
     known = {event.key for event in history}
     once = {event.person_id for event in history if event.kind in ONCE}
     return [
@@ -74,7 +74,7 @@ def undecided(payments: Sequence[Due], history: Sequence[PaymentEvent]) -> list[
 
 
 async def decide(store: Store, payments: Sequence[Due]) -> int:
-    """Add the given payments to the ledger unless they are recorded already. Return the number added."""
+    """Add all new payments to the ledger, and return their number."""
     new = 0
     for payment in undecided(payments, await store.ledger.history()):
         person, kind, cents = payment.person_id, payment.kind, payment.cents
@@ -83,7 +83,7 @@ async def decide(store: Store, payments: Sequence[Due]) -> int:
 
 
 async def reject(store: Store, person: PersonRow, currency: str, why: str) -> None:
-    """Record that a participant's work is rejected. The platform is notified when payments are sent.
+    """Record that a participant's work was rejected. The platform is notified when payments are sent.
 
     Raises:
         StoreError: The participant did not finish the study, or a payment is already recorded.

@@ -1,4 +1,4 @@
-"""Recruitment platforms. Each module handles arriving participants and payments on one platform."""
+"""Recruit and pay participants through recruitment platforms, with one module per platform."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from experiments.study.recruitment.external_question import ExternalQuestion, Ex
 from experiments.study.recruitment.prolific import Prolific, ProlificPayer
 from experiments.visit.recruiter import OpenLink, Recruiter
 
-# Keys of the table `[study.recruitment]` that each platform requires.
+# Keys in the table `[study.recruitment]` that each platform requires
 NEEDED: Mapping[str, Sequence[str]] = {
     "prolific": ("completed", "screened_out", "no_consent"),
     "connect": ("completed",),
@@ -20,7 +20,7 @@ PAY_DOLLARS = ("connect", "external-question")
 
 
 def recruiter(settings: Recruitment) -> Recruiter:
-    """Create the recruiter for a study's recruitment platform.
+    """Create a recruiter, which handles participants who arrive from the recruitment platform.
 
     Raises:
         ConfigError: The study file lacks a setting that the platform requires.
@@ -40,7 +40,7 @@ def recruiter(settings: Recruitment) -> Recruiter:
 
 
 def payer(settings: StudySettings) -> Payer:
-    """Create the payment client for a study's recruitment platform.
+    """Create a client that makes payments through the study's recruitment platform.
 
     Raises:
         ConfigError: The platform cannot pay, does not support the currency, or has no secret in the environment.

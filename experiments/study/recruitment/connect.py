@@ -1,7 +1,7 @@
-"""Recruitment and payments through CloudResearch Connect (API v1).
+"""Recruit and pay participants through CloudResearch Connect (API v1).
 
-The platform's public help describes only links and completion pages. The API calls are those of public clients: approve
-or reject an assignment, pay a bonus, and list the assignments of a project. Amounts are in US dollars.
+The platform's documentation covers only links and completion pages. The API calls are those that public
+clients use to approve, reject and list assignments and to pay bonuses. Amounts are in US dollars.
 """
 
 import re
@@ -19,7 +19,7 @@ _ID = re.compile(r"[0-9A-Za-z-]{4,64}")
 
 
 class Connect:
-    """Recruiter for a project on CloudResearch Connect."""
+    """A recruiter for projects on CloudResearch Connect."""
 
     platform = "connect"
     parameters: tuple[str, ...] = (PERSON, ASSIGNMENT, PROJECT)
@@ -45,7 +45,7 @@ class Connect:
 
 
 class ConnectPayer:
-    """Payment client for CloudResearch Connect. Approving an assignment makes the platform pay the project's reward."""
+    """A payment client for CloudResearch Connect, which pays the reward when an assignment is approved."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -56,7 +56,7 @@ class ConnectPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Look for the payment in the assignment's status or the sum of its bonuses."""
+        """Look for a payment in the status of the assignment or in the sum of its bonuses."""
         listed = await self._api.ask("GET", f"/assignments/{order.id(PROJECT)}")
         mine: Mapping[str, Any] = next(
             (one for one in listed["assignments"] or () if one[ASSIGNMENT] == order.id(ASSIGNMENT)), {}
@@ -68,7 +68,7 @@ class ConnectPayer:
         return "listed with the assignment" if paid >= sum(order.others) + order.cents else None
 
     async def send(self, order: Order) -> str:
-        """Approve or reject the assignment, or pay a bonus. The platform refuses to use the same token twice."""
+        """Approve or reject an assignment, or pay a bonus. The platform accepts each token only once."""
         action = {"reward": "approve", "rejection": "reject"}.get(order.kind, "bonus")
         row = {"id": order.id(ASSIGNMENT), "message": order.why}
         body: Mapping[str, Any] = {"participants": [row]}

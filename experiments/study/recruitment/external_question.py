@@ -1,8 +1,8 @@
-"""Recruitment and payments through the ExternalQuestion interface of Mechanical Turk.
+"""Recruit and pay participants through the ExternalQuestion interface of Mechanical Turk.
 
-The platform embeds the study in a frame and receives a form at the end. Mechanical Turk closed on 2026-09-30. For other
-platforms with this interface, set `sites` and `api_url` in the study file. Requests are those of Mechanical Turk's API
-(2017-01-17) as JSON, but a secret in the header `Authorization` replaces the signature.
+The platform embeds the study in a frame and receives a form at the end. Mechanical Turk closed on 2026-09-30.
+For other platforms with this interface, set `sites` and `api_url` in the study file. Requests follow the API
+of Mechanical Turk (2017-01-17) as JSON, with a secret in the `Authorization` header instead of a signature.
 """
 
 import json
@@ -24,7 +24,7 @@ _ID = re.compile(r"[0-9A-Za-z]{4,64}")
 
 
 class ExternalQuestion:
-    """Recruiter for a task (HIT) on a platform that embeds the study in its pages."""
+    """A recruiter for tasks (HITs) on platforms that embed the study in their pages."""
 
     platform = "external-question"
     parameters: tuple[str, ...] = (ASSIGNMENT, TASK, PERSON, SITE)
@@ -34,7 +34,7 @@ class ExternalQuestion:
         self.embedded_by, self._task = settings.sites, settings.study_id
 
     def arrive(self, query: Mapping[str, str]) -> Candidate | Preview | InvalidLink:
-        """Validate the link of an arriving person. It must contain one of the `sites` of the study file."""
+        """Validate the link of an arriving participant. It must name one of the `sites` in the study file."""
         if query.get(ASSIGNMENT) == PREVIEW:
             return Preview()
         ids = {name: query.get(name, "") for name in self.parameters}
@@ -55,7 +55,7 @@ class ExternalQuestion:
 
 
 class ExternalQuestionPayer:
-    """Payment client for ExternalQuestion tasks. Approving an assignment makes the platform pay the task's reward."""
+    """A payment client for platforms that pay the reward of a task when the assignment is approved."""
 
     listed_after = LISTED_AFTER
     shortest_reason = 1
@@ -71,7 +71,7 @@ class ExternalQuestionPayer:
         self._api = Api(url, headers) if timeout is None else Api(url, headers, timeout)
 
     async def find(self, order: Order) -> str | None:
-        """Look for the payment in the assignment's status, or for its key in the reasons of bonuses."""
+        """Look for a payment in the status of the assignment, or for its key in the reasons for bonuses."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         done = {"reward": "Approved", "rejection": "Rejected"}.get(order.kind)
         if done is not None:
@@ -82,7 +82,7 @@ class ExternalQuestionPayer:
         return "bonus" if named else None
 
     async def send(self, order: Order) -> str:
-        """Approve or reject the assignment, or pay a bonus. The platform refuses a second bonus with the same token."""
+        """Approve or reject an assignment, or pay a bonus. The platform pays only one bonus per token."""
         mine = {"AssignmentId": order.id(ASSIGNMENT)}
         if order.kind in ("reward", "rejection"):
             operation = "ApproveAssignment" if order.kind == "reward" else "RejectAssignment"

@@ -1,4 +1,4 @@
-"""Recruitment and payments through Prolific (API v1)."""
+"""Recruit and pay participants through Prolific (API v1)."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ _ID = re.compile(r"[0-9A-Za-z]{8,64}")
 
 
 class Prolific:
-    """Recruiter for a study on Prolific."""
+    """A recruiter for studies on Prolific."""
 
     platform = "prolific"
     parameters: tuple[str, ...] = (PERSON, STUDY, SUBMISSION)
@@ -49,11 +49,11 @@ class Prolific:
 
 
 class ProlificPayer:
-    """Payment client for Prolific. Approving a submission makes the platform pay the study's reward.
+    """A payment client for Prolific, which pays the reward of a study when a submission is approved.
 
-    The study's settings on the platform determine the pay of screened-out participants. Partial payments are bonuses,
-    which can be paid even for a returned submission. The platform does not refuse duplicate bonuses, so a retry first
-    consults the submission's list of bonuses, which lags by some minutes.
+    The payment for screened-out participants is set on the platform. Partial payments are made as bonuses,
+    which are possible even for returned submissions. The platform does not refuse duplicate bonuses. A retry
+    therefore checks the submission's list of bonuses first, which is updated with a delay of some minutes.
     """
 
     listed_after = timedelta(hours=1)
@@ -66,7 +66,7 @@ class ProlificPayer:
         self._screened_out = settings.screened_out
 
     async def find(self, order: Order) -> str | None:
-        """Look for the payment in the submission's status or the amounts of its bonuses."""
+        """Look for a payment in the status of the submission or in the amounts of its bonuses."""
         submission = await self._api.ask("GET", f"/submissions/{order.id(SUBMISSION)}/")
         done = {"reward": "APPROVED", "screen_out": "SCREENED OUT", "rejection": "REJECTED"}.get(order.kind)
         if done is not None:
@@ -76,7 +76,7 @@ class ProlificPayer:
         return "listed with the submission" if paid else None
 
     async def send(self, order: Order) -> str:
-        """Approve, reject or screen out the submission, or pay a bonus."""
+        """Approve, reject or screen out a submission, or pay a bonus."""
         changes: Mapping[str, Mapping[str, str]] = {
             "reward": {"action": "APPROVE"},
             "screen_out": {"action": "COMPLETE", "completion_code": self._screened_out},

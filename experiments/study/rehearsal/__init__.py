@@ -1,1 +1,1 @@
-"""Rehearsals, in which simulated participants visit a study's real server."""
+"""Rehearse a study by sending simulated participants to its server."""

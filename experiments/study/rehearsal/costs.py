@@ -1,4 +1,4 @@
-"""Estimates of a study's cost and duration, and of the effects that it can detect."""
+"""Estimate the cost and the duration of a study, and the effect sizes that it can detect."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ from experiments.trials.trial import run_trial
 from experiments.trials.trial_config import TrialConfig
 from experiments.visit.phases.base import Phase
 
-# time to choose an answer and click it, in seconds (Card, Moran and Newell, CACM 23, 1980)
+# Time to choose and click an answer, in seconds (Card, Moran and Newell, CACM 23, 1980)
 CHOOSING = 2.65
 WRITING = 20.0  # assumed time to write a free-text answer, in seconds
 PEOPLE = 2  # number of participants simulated in each cell
-GUEST = "guest"  # simulated participant to use if the study file names none
+GUEST = "guest"  # simulated participant that is used if the study file names none
 
 
 @dataclass(frozen=True)
 class TrialDurations:
-    """Mean durations of simulated trials, in seconds."""
+    """The mean durations of simulated trials, in seconds."""
 
     training: float
-    tasks: Mapping[str, float]  # by label of the cell
+    tasks: Mapping[str, float]  # duration of the task in each cell, by label
 
 
 def simulate(study: Study, folder: Path, on_trial: Callable[[str], None]) -> TrialDurations:
-    """Simulate some trials of each cell, write their runs to `folder`, and return their mean durations."""
+    """Simulate some trials of each cell, write their records to a folder, and return the mean durations."""
     trials = [_simulated(cell, study.path) for cell in study.cells]
     house = House.load(trials[0][0].house)
 
@@ -71,7 +71,7 @@ def durations(
 ) -> dict[str, float]:
     """Return the expected duration of each phase, in seconds.
 
-    A duration includes reading, answering, watching the film and playing. It is never less than the phase's minimum.
+    A duration includes reading, answering, watching the video and playing, and is not below the minimum.
     """
     found = {}
     for phase in phases:
@@ -89,12 +89,12 @@ def durations(
 
 @dataclass(frozen=True)
 class Cost:
-    """Estimated cost of a study, in units of its currency.
+    """The estimated cost of a study, in units of its currency.
 
     Attributes:
-        rewards: Rewards if all participants finish.
-        bonuses: Bonuses if all participants earn them.
-        fee: Platform fee on rewards and bonuses. None if the study file does not specify it.
+        rewards: Total of the rewards if all participants finish.
+        bonuses: Total of the bonuses if all participants earn them.
+        fee: Platform fee on rewards and bonuses, or None if the study file does not specify it.
         hourly: Hourly wage if a visit takes as long as announced.
     """
 
@@ -105,7 +105,7 @@ class Cost:
 
     @property
     def total(self) -> float:
-        """Maximum cost, excluding payments to screened-out participants."""
+        """The maximum cost, without payments to screened-out participants."""
         return self.rewards + self.bonuses + (self.fee or 0.0)
 
 
@@ -117,7 +117,7 @@ def cost(study: Study) -> Cost:
 
 
 def detectable(study: Study) -> dict[str, float]:
-    """Return the partial eta squared of each effect that is detected with 80 % power at a significance level of 5 %."""
+    """Return the smallest partial eta squared of each effect that is detected with 80 % power at p < .05."""
     conditions = {cell.trials[0].assistance for cell in study.cells}
     levels = {cell.trials[0].objects for cell in study.cells}
     if len(conditions) * len(levels) != len(study.cells) or study.people <= len(study.cells):

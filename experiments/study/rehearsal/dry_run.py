@@ -1,4 +1,4 @@
-"""Dry runs. A dry run is a short rehearsal with one simulated participant for each way in which a visit can end."""
+"""Run a short rehearsal with one simulated participant for each way in which a visit can end."""
 
 import asyncio
 import socket
@@ -31,18 +31,18 @@ from experiments.visit.store import Store
 from experiments.visit.tokens import token_hash
 from experiments.web.server.pool import WorkerPool
 
-MINIMUM_S = 1.0  # upper limit for the minimum times of phases, in seconds
+MINIMUM_S = 1.0  # longest minimum duration of a phase in a dry run, in seconds
 TASK_S = 1.0
-PLACES = 10  # number of times that the trials of a cell are repeated, so that no participant is turned away
+PLACES = 10  # factor by which the trials of a cell are repeated so that no participant is turned away
 FACTOR = 1e6  # factor by which reading times are divided
-TIMEOUT_S = 400.0  # HTTP timeout, in seconds; the first request may wait for compilation
+TIMEOUT_S = 400.0  # HTTP timeout in seconds, long enough for the compilation during the first request
 
-Photograph = Callable[[str, str], Awaitable[None]]  # is called with the name and URL of a page
+Photograph = Callable[[str, str], Awaitable[None]]  # a function that is given the name and URL of a page
 
 
 @dataclass
 class Walked:
-    """Faults found in a dry run, and the number of words on each page."""
+    """The faults that were found in a dry run, and the number of words on each page."""
 
     faults: list[str] = field(default_factory=list)
     words: dict[str, int] = field(default_factory=dict)
@@ -51,10 +51,10 @@ class Walked:
 async def dry_run(
     study: Study, platform: Recruiter, folder: Path, pool: WorkerPool, photograph: Photograph
 ) -> Walked:
-    """Send simulated participants through a study. One finishes it, and each of the others leaves in a different way.
+    """Send simulated participants through a study. One of them finishes it, and the others leave early.
 
-    Every phase must refuse wrong and early forms, and accept a correct form only once. Minimum times and the task are
-    limited to one second.
+    Every phase must refuse incorrect and early forms, and must accept a correct form only once. Minimum
+    durations and the task are limited to one second.
     """
     study = rehearsed(_shortened(study), 1.0)
     store = await Store.open(f"sqlite:///{folder / 'study.db'}", study.settings.name, study.sha256)
@@ -174,7 +174,7 @@ class _Text(HTMLParser):
 
 
 class _Server(uvicorn.Server):
-    """A server that leaves signal handling to the command."""
+    """A Uvicorn server that does not handle signals, because the command does."""
 
     def capture_signals(self) -> AbstractContextManager[None]:  # type: ignore[override]
         return nullcontext()

@@ -1,4 +1,4 @@
-"""WebSocket client with which a simulated participant plays trials."""
+"""A WebSocket client with which simulated participants play trials."""
 
 import asyncio
 import contextlib
@@ -13,18 +13,18 @@ from websockets.typing import Origin
 
 from experiments.study.rehearsal.player import STEPS, SimulatedPlayer
 
-ANSWER_TIMEOUT = 2.0  # timeout for a new state before the next input is sent, in seconds
-DELAYED = 15  # number of inputs at the start that a slow connection delays
-OPENING_TIMEOUT = 600.0  # timeout for a session to get ready, in seconds
+ANSWER_TIMEOUT = 2.0  # maximum time to wait for a new state before the next input is sent, in seconds
+DELAYED = 15  # number of initial inputs that are delayed on a slow connection
+OPENING_TIMEOUT = 600.0  # maximum time until a session is ready, in seconds
 VIEW = {"type": "view", "width": 1280, "height": 720, "codec": "none"}
 
 
 class LostError(Exception):
-    """The server has closed the connection or does not answer."""
+    """Raised if the server has closed the connection or does not respond."""
 
 
 class Link:
-    """A connection to a trial, opened by :func:`connected`. `decisions` is the number of inputs sent."""
+    """A connection to a trial, opened by :func:`connected`. `decisions` counts the inputs that were sent."""
 
     def __init__(self, socket: ClientConnection, player: SimulatedPlayer) -> None:
         self._socket, self._player = socket, player
@@ -42,7 +42,7 @@ class Link:
         self._socket.transport.abort()
 
     async def play(self, decisions: int, delay: float) -> bool:
-        """Play until the trial is saved or `decisions` inputs have been sent. Return True if the trial was saved.
+        """Play until the trial is saved or a number of inputs has been sent. Return True if it was saved.
 
         The first inputs are delayed by `delay` seconds. Raises LostError if the connection is lost.
         """
@@ -126,7 +126,7 @@ class Link:
 async def connected(
     base: str, path: str, trial: str, tab: str, player: SimulatedPlayer
 ) -> AsyncIterator[Link]:
-    """Connect to a trial as a browser page would. The connection is closed at the end of the context."""
+    """Connect to a trial in the same way as a web page, and disconnect at the end of the block."""
     url, origin = f"ws{base.removeprefix('http')}{path}", cast("Origin", base)
     async with connect(url, origin=origin, max_size=None) as socket:
         link = Link(socket, player)

@@ -1,4 +1,4 @@
-"""Simulated participants, who visit a study's pages by HTTP and play its trials by WebSocket."""
+"""Simulated participants, who visit the pages of a study over HTTP and play trials over a WebSocket."""
 
 import asyncio
 import re
@@ -22,21 +22,21 @@ from experiments.visit.texts.items import Item
 SHOWN = re.compile(r'name="phase" value="([^"]+)"|data-trial="(\w+)"')
 READING = 15.0  # mean time to read a page, in seconds of study time
 AWAY = 600.0  # longest absence of a returning participant, in seconds of study time
-DELAY = 0.2  # delay of the first inputs on a bad connection, in seconds
-CUTS = 3  # number of times that a bad connection is cut during a trial
+DELAY = 0.2  # delay of the first inputs on a slow connection, in seconds
+CUTS = 3  # number of times that a bad connection is interrupted during a trial
 TRIES = 20  # maximum number of attempts to connect to a trial or to submit a form
-QUEUED = 'http-equiv="refresh"'  # text by which the queue page is recognized
-QUEUE_PAUSE = 3.0  # time between two requests of the queue page, in seconds
+QUEUED = 'http-equiv="refresh"'  # text that identifies the queue page
+QUEUE_PAUSE = 3.0  # time between two requests for the queue page, in seconds
 PAUSE = 0.5  # delay before reconnecting to a trial, in seconds
 
 
 @dataclass
 class Rehearsed:
-    """Progress and outcome of a simulated participant's visit.
+    """The progress and the outcome of a simulated participant's visit.
 
     Attributes:
-        link: Path of the participant's personal link. Empty before the visit starts.
-        outcome: `finished`, `stuck`, or how the participant left. Empty during the visit.
+        link: Path of the participant's personal link, or empty before the visit starts.
+        outcome: `finished`, `stuck`, or the way in which the participant left. Empty during the visit.
         answers: Accepted forms, by phase.
     """
 
@@ -57,22 +57,22 @@ async def _ignore(name: str, page: httpx.Response) -> None:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Server, study and time scale of a rehearsal, shared by all simulated participants."""
+    """The study, server and time scale of a rehearsal, which all simulated participants share."""
 
     base: str
     client: httpx.AsyncClient
     phases: Mapping[str, Phase]
     house: House
-    parameters: Mapping[str, str]  # query parameters of links, with ids left empty
-    minimum: Mapping[str, float]  # minimum durations enforced by the server, in seconds, by phase
+    parameters: Mapping[str, str]  # query parameters of the platform's links, with empty ids
+    minimum: Mapping[str, float]  # minimum duration of each phase, in seconds, enforced by the server
     attempts: int  # number of attempts allowed at the comprehension check
     factor: float  # factor by which waiting times are divided
-    hasty: bool = False  # if True, forms are also submitted too early, which the server must refuse
-    watch: Watch = _ignore  # is called with the name of each page and the response
+    hasty: bool = False  # True to submit forms too early as well, which the server must refuse
+    watch: Watch = _ignore  # called with the name of each page and the server's response
 
 
 class SimulatedPerson:
-    """A simulated participant who visits the study as planned."""
+    """A simulated participant who visits a study according to a plan."""
 
     def __init__(self, planned: Planned, around: Surroundings, rehearsed: Rehearsed) -> None:
         self._planned, self._around, self.rehearsed = planned, around, rehearsed
@@ -82,7 +82,7 @@ class SimulatedPerson:
         self._headers = {"Origin": around.base, "X-Forwarded-For": f"10.0.{number // 250}.{number % 250 + 1}"}
 
     async def begin(self) -> None:
-        """Start a visit and store its link. If the participant starts it twice, both links must be the same."""
+        """Start a visit and store its link. If the participant starts twice, both links must be the same."""
         number = self._planned.number
         ids = {k: value or f"rehearsal{number:06d}" for k, value in self._around.parameters.items()}
         await self._around.watch("welcome", await self._get("/", ids))
@@ -95,7 +95,7 @@ class SimulatedPerson:
             self.rehearsed.link = link
 
     async def go(self) -> None:
-        """Continue the visit from the current page to its end, and store the outcome."""
+        """Continue the visit until it ends, and store the outcome."""
         self.rehearsed.outcome = await self._go()
 
     async def _go(self) -> str:
@@ -143,7 +143,7 @@ class SimulatedPerson:
             self._fault(f"the page says {page.status_code}")
             return "stuck"
         how = self._planned.leaves
-        # A participant who plans to leave during a trial finishes the visit if the trial ends first.
+        # If a trial ends before the participant can leave as planned, the participant finishes the visit.
         return how if how in ("refuses", "fails", "gives up") else "finished"
 
     async def _fill(self, phase: Phase, leaves: str | None, tries: int) -> None:
@@ -242,7 +242,7 @@ class SimulatedPerson:
     async def _answered(self, method: str, path: str, **more: Any) -> httpx.Response:
         try:
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
-        except httpx.TransportError as error:  # try again, as a participant would by reloading the page
+        except httpx.TransportError as error:  # try again, like a participant who reloads the page
             self._fault(f"{method} of a page was not answered: {type(error).__name__}")
             answer = await self._around.client.request(method, path, headers=self._headers, **more)
         if answer.is_server_error:
@@ -257,7 +257,7 @@ MARK = "Rehearsal: drawn at random"
 
 
 def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
-    """Return a form that the phase accepts. It has no answers if a custom phase has no items."""
+    """Return a form with random answers that the phase accepts. It has no answers if there are no items."""
     example: dict[str, Any] = getattr(phase, "example", dict)()
     items = phase.items if isinstance(phase, FormPhase) else ()
     points = len(phase.texts.scale) if isinstance(phase, FormPhase) else 0
@@ -266,9 +266,9 @@ def form_of(phase: Phase, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def wrong_form(phase: Phase, form: dict[str, Any]) -> dict[str, Any] | None:
-    """Return a form that the phase must refuse, or None if it accepts every form.
+    """Return a form that the phase must refuse, or None if the phase accepts every form.
 
-    If a question has a right answer, the form has a wrong one. Otherwise, all answers are missing.
+    If a question has a right answer, the form contains a wrong answer. Otherwise, all answers are missing.
     """
     example: dict[str, Any] = getattr(phase, "example", dict)()
     for item in phase.items if isinstance(phase, FormPhase) else ():

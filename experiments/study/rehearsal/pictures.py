@@ -1,4 +1,4 @@
-"""Take screenshots of pages with an installed Chromium, through its DevTools protocol."""
+"""Take screenshots of web pages with Chromium, using the DevTools protocol."""
 
 import asyncio
 import base64
@@ -20,19 +20,19 @@ from mjsim.support.files import write_text_atomically
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}  # window sizes, in pixels
 MAX_HEIGHT = 6000  # maximum height of a screenshot, in pixels
-SETTLE = 1.5  # delay before a screenshot in which a page's scripts can run, in seconds
+SETTLE = 1.5  # delay that lets the scripts of a page run before a screenshot, in seconds
 LOADING = 120.0  # timeout for loading a trial, in seconds
 LOADED = "!document.querySelector('#play') || !!document.querySelector('#panel-actions button')"
 START = 120.0  # timeout for the start of the browser, in seconds
 
 
 def browser() -> str | None:
-    """Return the path of an installed Chromium, or None if there is none."""
+    """Return the path of the Chromium executable, or None if Chromium is not installed."""
     return next(filter(None, map(shutil.which, BROWSERS)), None)
 
 
 class Camera:
-    """Takes screenshots of pages and saves them in a folder."""
+    """A browser that takes screenshots of pages and saves them in a folder."""
 
     def __init__(self, socket: ClientConnection, folder: Path) -> None:
         self._socket, self._folder = socket, folder
@@ -46,7 +46,7 @@ class Camera:
         self._session = attached["sessionId"]
 
     async def photograph(self, name: str, url: str) -> None:
-        """Take a screenshot of the whole page at each window size."""
+        """Take a screenshot of a whole page at each window size."""
         self.taken.append(f"{len(self.taken) + 1:02d}-{name.replace(':', '-')}")
         for size, (width, height) in SIZES.items():
             screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == "phone"}
@@ -58,7 +58,7 @@ class Camera:
             clip["height"] = min(max(height, content["height"]), MAX_HEIGHT)
             shot = await self._ask("Page.captureScreenshot", captureBeyondViewport=True, clip=clip)
             (self._folder / f"{self.taken[-1]}-{size}.png").write_bytes(base64.b64decode(shot["data"]))
-        await self._ask("Page.navigate", url="about:blank")  # leaving the page ends a trial's session
+        await self._ask("Page.navigate", url="about:blank")  # leaving the page ends the session of a trial
 
     async def _settle(self) -> None:
         loop = asyncio.get_running_loop()

@@ -1,4 +1,4 @@
-"""Plan when simulated participants arrive, leave, return, reload a page or lose the connection."""
+"""Plan when simulated participants arrive, leave, return, reload a page or lose their connection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,18 +13,18 @@ from experiments.visit.plan import COMPREHENSION, CONSENT, PLAYED
 from experiments.visit.recruiter import Recruiter
 
 Leaving = Literal["vanishes", "withdraws", "withdraws and deletes", "refuses", "fails", "gives up"]
-STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # query parameters of links
-RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # fractions of all participants
+STUDY_IDS, SUBMIT_TO = ("STUDY_ID", "projectId", "hitId"), "turkSubmitTo"  # query parameters in links
+RETURNS, RELOADS, BAD, TWICE, WRONG = 0.1, 0.2, 0.15, 0.15, 0.1  # fractions of participants
 HOW = (0.6, 0.2, 0.2)  # probabilities of the first three ways of leaving
 
 
 @dataclass(frozen=True)
 class Planned:
-    """Planned behaviour of a simulated participant.
+    """The planned behaviour of a simulated participant.
 
     Attributes:
         arrives: Time of arrival, in seconds of study time.
-        leaves: How the participant leaves the study early, or None.
+        leaves: Way in which the participant leaves the study early, or None.
         returns_in: Phase in which the participant closes the page and later reopens the link, or None.
         reloads_in: Phase in which the participant reloads the page, or None.
         bad: True if the connection is slow and interrupted.
@@ -47,7 +47,7 @@ class Planned:
 def plan_people(
     phases: Sequence[str], people: int, seed: int, *, per_minute: float, dropouts: float
 ) -> list[Planned]:
-    """Plan the participants of a rehearsal, in order of arrival. The same seed gives the same plan.
+    """Plan the behaviour of the participants in a rehearsal. Return them in order of arrival.
 
     Args:
         people: Number of participants. Their arrivals form a Poisson process.
@@ -87,19 +87,19 @@ def _leaving(phases: Sequence[str], rng: np.random.Generator) -> tuple[Leaving, 
 
 
 def moment(phase: str, rng: np.random.Generator) -> int:
-    """Draw the number of inputs before a planned interruption of a trial."""
+    """Draw the number of inputs after which a trial is interrupted."""
     return int(rng.integers(2, 15 if phase == PLAYED[0] else 60))
 
 
 def link_parameters(study: Study, platform: Recruiter) -> dict[str, str]:
-    """Return the query parameters of the platform's links, with empty values for the ids of participants."""
+    """Return the query parameters of a platform's links, with empty values for participant ids."""
     settings = study.settings.recruitment
     own = {**dict.fromkeys(STUDY_IDS, settings.study_id), SUBMIT_TO: next(iter(settings.sites), "")}
     return {name: own.get(name, "") for name in platform.parameters}
 
 
 def rehearsed(study: Study, factor: float) -> Study:
-    """Copy a study for simulated participants, with minimum times and timeouts divided by `factor`."""
+    """Copy a study for simulated participants, and divide all minimum durations and timeouts by a factor."""
     settings = study.settings
     away = ("abandoned_after", "timed_out_after")
     shorter = {name: getattr(settings.limits, name) / factor for name in away}

@@ -1,4 +1,4 @@
-"""Simulated player that chooses the inputs of a trial from the messages that browsers receive (docs/protocol.md)."""
+"""A simulated player that plays a trial using only the messages that a browser receives."""
 
 import math
 from collections.abc import Mapping
@@ -10,27 +10,27 @@ from experiments.house import House
 from planner.errors import UnreachableError
 
 STEP = 0.04  # duration of a control step, in seconds
-STEPS = 16  # control steps per input
-NEAR = 0.15  # distance from a corner of the path at which it counts as reached, in metres
-ALIGNED = 0.7  # largest heading error at which the player walks, in radians
-SEEN = 0.8  # distance from a viewpoint at which it counts as visited, in metres
-STUCK = 0.05  # the player is stuck if it moves less than this within `STUCK_AFTER` inputs, in metres
+STEPS = 16  # number of control steps per input
+NEAR = 0.15  # distance at which a corner of the path counts as reached, in metres
+ALIGNED = 0.7  # largest heading error with which the player starts to walk, in radians
+SEEN = 0.8  # distance at which a viewpoint counts as visited, in metres
+STUCK = 0.05  # distance in metres below which the player is stuck after `STUCK_AFTER` inputs
 STUCK_AFTER = 6
 BACKWARDS = 3  # number of inputs for which a stuck player walks backwards
-PRESS_GAP = 15  # shortest time between two presses, in control steps
+PRESS_GAP = 15  # shortest time between two key presses, in control steps
 
 
 class SimulatedPlayer:
-    """A player that puts objects away and walks along shortest paths.
+    """A simulated player that puts objects away and walks along shortest paths.
 
-    It walks to the goal on the display, if there is one. Otherwise, it walks to the nearest known object or bin, or
-    searches for objects.
+    The player walks to the goal on the display, if there is one. Otherwise, it walks to the nearest known
+    object or bin. If it knows of none, it searches for objects.
     """
 
     def __init__(self, house: House, rng: np.random.Generator) -> None:
         self._house, self._rng = house, rng
         self._models: dict[str, str] = {}
-        self._places: dict[str, tuple[float, float]] = {}  # last known positions of objects to put away
+        self._places: dict[str, tuple[float, float]] = {}  # last known position of each misplaced object
         self._held: tuple[str | None, str | None] = (None, None)
         self._goal: tuple[float, float] | None = None
         self._reach: Any = None
@@ -57,7 +57,7 @@ class SimulatedPlayer:
                 self._take_snapshot(message)
 
     def act(self) -> dict[str, Any]:
-        """Return the next input, without the fields `number` and `step`."""
+        """Return the next input without its fields `number` and `step`."""
         state = self.state
         if state is None or state["busy"]:
             return {}

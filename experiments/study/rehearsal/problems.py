@@ -1,4 +1,4 @@
-"""Checks of a study file before participants are recruited."""
+"""Check a study file for problems before participants are recruited."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Problem:
     """A problem found in a study file.
 
     Attributes:
-        key: Key of the setting, such as `study.contact`.
+        key: Key of the setting that causes the problem, such as `study.contact`.
     """
 
     key: str
@@ -26,7 +26,7 @@ class Problem:
 
 
 def problems_of_file(study: Study) -> list[Problem]:
-    """Return the problems that can be found without simulating the study."""
+    """Return all problems that can be found without a simulation of the study."""
     return [Problem(f"study.{key}", text) for key, text in _found(study)]
 
 
@@ -58,7 +58,7 @@ def _found(study: Study) -> Iterator[tuple[str, str]]:
 
 
 def problems_of_length(study: Study, shortest: float, longest: float) -> list[Problem]:
-    """Compare the announced duration with the expected durations of the shortest and longest cell, in seconds."""
+    """Return a problem if the announced duration of a study differs too much from the expected duration."""
     told, low, high = study.settings.minutes, shortest / 60, longest / 60
     if 0.8 * low <= told <= 2.5 * high and told >= 0.8 * high:
         return []

@@ -1,4 +1,4 @@
-"""Report of a rehearsal, which compares the database with the records of the simulated participants."""
+"""Report on a rehearsal, and compare the database with the outcomes of the simulated visits."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from experiments.visit.tokens import token_hash
 from mjsim.support.files import write_text_atomically
 
 REPORT, TABLE, EXPORT = "rehearsal.json", "table", "export"
-STATUS: dict[str, Leaving] = {  # status expected in the database after each outcome of a visit
+STATUS: dict[str, Leaving] = {  # expected status in the database for each outcome of a visit
     "finished": "finished",
     "withdraws": "withdrawn",
     "withdraws and deletes": "withdrawn",
@@ -34,11 +34,11 @@ STATUS: dict[str, Leaving] = {  # status expected in the database after each out
 
 @dataclass(frozen=True)
 class RehearsalReport:
-    """Result of a rehearsal.
+    """The result of a rehearsal.
 
     Attributes:
         cells: Number of participants who finished, by cell.
-        owed: Total of all payments that would be due, in hundredths of the currency.
+        owed: Total amount of all payments that would be due, in hundredths of the currency.
     """
 
     settings: RehearsalSettings
@@ -52,7 +52,7 @@ class RehearsalReport:
 async def report(
     study: Study, settings: RehearsalSettings, store: Store, people: Sequence[Rehearsed], out: Path
 ) -> RehearsalReport:
-    """Record payments, export the data, compare the database with the participants' records, and write a report."""
+    """Record payments, export the data, check the database, and write the report of the rehearsal."""
     study, served = replace(study, rehearsal=True), out / SERVED
     known = {person.token_hash: person for person in await store.people()}
     faults = [f"person {one.number}: {fault}" for one in people for fault in one.faults]
@@ -91,11 +91,11 @@ PASSED, WITHOUT = "rehearsal passed", "pays without a rehearsal"
 
 
 async def require_rehearsal(store: Store, study: Study, folder: Path | None, *, without: bool) -> None:
-    """Require a successful rehearsal of this study file, and record it in the audit log.
+    """Raise an error unless a study file has been rehearsed, and record the rehearsal in the audit log.
 
     Args:
-        folder: Folder of a rehearsal, or None if the audit log already contains a successful one.
-        without: True to allow the study without a rehearsal. The audit log records this instead.
+        folder: Folder of a rehearsal, or None if the audit log already contains a successful rehearsal.
+        without: True to allow a study without a rehearsal, which is then recorded in the audit log.
 
     Raises:
         ConfigError: There is no successful rehearsal of this version of the study file.

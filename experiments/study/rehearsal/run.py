@@ -1,4 +1,4 @@
-"""Run a rehearsal, which starts the study's server and sends simulated participants to it."""
+"""Run a rehearsal by starting the study's server and sending simulated participants to it."""
 
 import asyncio
 import contextlib
@@ -22,13 +22,13 @@ from experiments.visit.phases import phases_of
 from mjsim.support.files import write_text_atomically
 
 SERVED, PLAN, PEOPLE, SERVER_LOG = "served", "plan.json", "people.jsonl", "server.log"
-WORKERS = "20"  # maximum number of concurrent trials; they need not run in real time
-END_TIMEOUT = 60.0  # timeout for the server to stop, in seconds
+WORKERS = "20"  # maximum number of concurrent trials, which need not run in real time
+END_TIMEOUT = 60.0  # maximum time until the server has stopped, in seconds
 HTTP_TIMEOUT = 120.0  # timeout for HTTP requests, in seconds
 
 
 class RehearsalSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Settings of a rehearsal, stored in its folder so that it can be resumed."""
+    """Settings of a rehearsal, which are stored in its folder so that the rehearsal can be resumed."""
 
     study: str  # SHA-256 of the study file
     people: Annotated[int, msgspec.Meta(ge=1, le=100_000)]
@@ -45,11 +45,11 @@ async def rehearse(
     film: Path | None,
     on_person: Callable[[Rehearsed], None],
 ) -> list[Rehearsed]:
-    """Simulate the visits that have not ended yet. Return the results of all participants, in order.
+    """Simulate all visits that have not ended yet, and return the results of all participants in order.
 
     Args:
-        film: Video of the house, or None to have the server create it.
-        on_person: Is called for each visit that has ended, including those of an earlier run.
+        film: Video of the house, or None to let the server create the video.
+        on_person: Function that is called for each visit that has ended, including visits of an earlier run.
 
     Raises:
         ConfigError: The folder contains a different rehearsal.
@@ -72,7 +72,7 @@ async def rehearse(
 
 
 def read_people(path: Path) -> dict[int, Rehearsed]:
-    """Read the latest record of each simulated participant, by number."""
+    """Read the latest record of each simulated participant, and return the records by number."""
     lines = path.read_bytes().splitlines() if path.is_file() else []
     found = {}
     for line in lines:
@@ -107,7 +107,7 @@ async def _server(
     with (out / SERVER_LOG).open("ab") as log:
         process = await asyncio.create_subprocess_exec(
             *command, stdout=asyncio.subprocess.PIPE, stderr=log, start_new_session=True
-        )  # in a separate session, the server does not receive Ctrl-C
+        )  # a separate session, so that the server does not receive Ctrl-C
         try:
             url = (await process.stdout.readline()).decode().strip() if process.stdout else ""
             if not url:
@@ -138,7 +138,7 @@ async def _send(
     phases = {phase.name: phase for phase in phases_of(plan_of(study))}
     house = House.load(study.cells[0].trial(0).house)
     minimum = {name: seconds / settings.factor for name, seconds in study.settings.minimum.items()}
-    # Keep no idle connections, because the client checks all of them before each request.
+    # Do not keep idle connections, because the client checks every connection before each request.
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=0)
     async with httpx.AsyncClient(base_url=base, timeout=HTTP_TIMEOUT, limits=limits) as client:
         around = Surroundings(

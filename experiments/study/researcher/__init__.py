@@ -1,1 +1,1 @@
-"""The researcher's page."""
+"""Web pages on which researchers monitor and control a study."""

@@ -1,4 +1,4 @@
-"""Access control for the researcher's page: login cookies, roles and rate limits."""
+"""Control access to the researcher's page with login cookies, roles and rate limits."""
 
 import asyncio
 import datetime
@@ -14,18 +14,18 @@ from experiments.web.server.guards import Rate
 
 COOKIE = "mjsim-login"
 LASTS = datetime.timedelta(hours=12)
-ATTEMPTS = 10, 300.0  # maximum number of login attempts per address and per name, and its period in seconds
+ATTEMPTS = 10, 300.0  # maximum number of login attempts per address and per name, and the period in seconds
 CHECKS = 2  # maximum number of concurrent password checks, each of which needs 64 MiB
-ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # by increasing permissions
+ORDER: tuple[Role, ...] = ("viewer", "assistant", "owner")  # roles in order of increasing permissions
 
 
 def may(who: Researcher, role: Role) -> bool:
-    """Return True if the researcher has the permissions of `role`."""
+    """Return True if a researcher has at least the permissions of a role."""
     return ORDER.index(who.role) >= ORDER.index(role)
 
 
 class Access:
-    """Logs researchers in and out."""
+    """Session management for researchers, who log in with a name and a password."""
 
     def __init__(self, researchers: Researchers, *, secure: bool) -> None:
         self._researchers, self._secure = researchers, secure
@@ -34,16 +34,16 @@ class Access:
         self._checks = asyncio.Semaphore(CHECKS)
 
     async def who(self, connection: HTTPConnection) -> Researcher | None:
-        """Return the logged-in researcher, or None."""
+        """Return the logged-in researcher, or None if no researcher is logged in."""
         token = self._token(connection)
         return None if token is None else await self._researchers.who(token_hash(token))
 
     def may_try(self, address: str, name: str) -> bool:
-        """Count a login attempt, and return True if the limits per address and per name allow it."""
+        """Count a login attempt. Return True if the limits per address and per name allow it."""
         return self._from.allows(address) and self._names.allows(name)
 
     async def log_in(self, connection: HTTPConnection, name: str, password: str) -> str | None:
-        """Log in and return the login's token, or None if the credentials are wrong. An earlier login is revoked."""
+        """Log in a researcher. Return the token of the login, or None if the credentials are wrong."""
         async with self._checks:
             researcher = await self._researchers.check(name, password)
         if researcher is None:
@@ -54,12 +54,12 @@ class Access:
         return token
 
     async def log_out(self, connection: HTTPConnection) -> None:
-        """Revoke the login of the cookie, if there is one."""
+        """Revoke the login that belongs to the cookie, if there is one."""
         if (token := self._token(connection)) is not None:
             await self._researchers.log_out(token_hash(token))
 
     def remember(self, response: Response, token: str) -> None:
-        """Set the login cookie. With `SameSite=strict`, browsers do not send it in requests from other sites."""
+        """Set the login cookie with `SameSite=strict`, so that other sites cannot use it in requests."""
         seconds = int(LASTS.total_seconds())
         response.set_cookie(
             self._cookie, token, seconds, httponly=True, secure=self._secure, samesite="strict"

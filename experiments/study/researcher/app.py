@@ -1,4 +1,4 @@
-"""The researcher's page: overview, participants, watching sessions, study state, quotas and the audit log."""
+"""The web application with which researchers monitor and control a study."""
 
 import asyncio
 import logging
@@ -32,9 +32,9 @@ from mjsim.formats.gltf.store import scenes_folder
 
 LOG = logging.getLogger("mjsim.study")
 HEALTH_TIMEOUT = 3.0  # timeout for the database in a health check, in seconds
-CHECK_PERIOD = 5.0  # period at which the login of a watching researcher is checked, in seconds
+CHECK_PERIOD = 5.0  # interval between login checks while a researcher watches, in seconds
 PAGE_SIZE = 100  # number of participants on each page of the list
-MAX_WANTED = 1_000_000  # largest number of participants that can be wanted in a cell
+MAX_WANTED = 1_000_000  # maximum number of participants that can be requested for a cell
 METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 UNKNOWN = "Not found", "This page does not exist."
 _PAGE = re.compile(r"\d{1,9}", re.ASCII)
@@ -43,7 +43,7 @@ Handler = Callable[[Request, Researcher], Awaitable[Response]]
 
 @dataclass(frozen=True)
 class ResearcherContext:
-    """Data sources of the researcher's page."""
+    """The data sources of the researcher's page."""
 
     study: Study
     store: Store
@@ -52,10 +52,10 @@ class ResearcherContext:
 
 
 class ResearcherServer:
-    """Serves the researcher's page, the health check and the metrics.
+    """A server for the researcher's page, the health check and the metrics.
 
     Args:
-        public: Public URL of the page if it is behind a proxy, or None.
+        public: Public URL of the page, or None if the page is not behind a proxy.
         proxies: Proxies whose X-Forwarded-For header is trusted.
     """
 
@@ -68,7 +68,7 @@ class ResearcherServer:
         self._access = Access(watched.store.researchers, secure=secure)
 
     def app(self, host: str) -> Starlette:
-        """Create the ASGI application for a server that listens on `host`."""
+        """Create the ASGI application of a server that listens on `host`."""
         return Starlette(
             routes=[
                 Route("/health", self._health),
@@ -222,7 +222,7 @@ class ResearcherServer:
             watching.cancel()
             with suppress(asyncio.CancelledError):
                 await watching
-        with suppress(RuntimeError, WebSocketDisconnect):  # the connection is closed already
+        with suppress(RuntimeError, WebSocketDisconnect):  # the connection is already closed
             await socket.close(1008)
 
     async def _audit(self, request: Request, who: Researcher) -> Response:
@@ -231,7 +231,7 @@ class ResearcherServer:
     def _change(
         self, role: Role, before: StudyState | None, after: StudyState
     ) -> Callable[[Request], Awaitable[Response]]:
-        """Create an endpoint that changes the study's state to `after`, from any state if `before` is None."""
+        """Create an endpoint that sets the state of the study to `after`. The old state must be `before`."""
 
         async def change(request: Request, who: Researcher) -> Response:
             state = (await self._store.study()).state

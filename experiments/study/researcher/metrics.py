@@ -1,4 +1,4 @@
-"""Prometheus metrics and recent log messages, without data that identifies participants."""
+"""Prometheus metrics and recent log messages, which contain no data that identifies participants."""
 
 import logging
 import time
@@ -20,7 +20,7 @@ KEPT = 50  # number of recent warnings and errors to keep
 
 @dataclass(frozen=True)
 class Fault:
-    """A warning or an error from the log."""
+    """A warning or an error that was logged."""
 
     at: datetime
     level: str
@@ -28,7 +28,7 @@ class Fault:
 
 
 class ServerMetrics(Meter):
-    """Metrics of one server since its start."""
+    """The metrics of a server since its start."""
 
     def __init__(self) -> None:
         registry = self._registry = CollectorRegistry()
@@ -83,7 +83,7 @@ class ServerMetrics(Meter):
         self._answers.labels(f"{status // 100}xx").observe(seconds)
 
     def text(self, counts: Counts, sessions: Sessions) -> bytes:
-        """Format all metrics in the Prometheus text format."""
+        """Return all metrics in the Prometheus text format."""
         for gauge in (self._people, self._places, self._sessions):
             gauge.clear()
         for status, number in counts.statuses.items():
@@ -100,7 +100,7 @@ class ServerMetrics(Meter):
 
 
 class FaultLog(logging.Handler):
-    """Log handler that counts warnings and errors and keeps the most recent ones."""
+    """A log handler that counts warnings and errors and keeps the most recent ones."""
 
     def __init__(self, counter: Counter) -> None:
         super().__init__(logging.WARNING)
@@ -118,7 +118,7 @@ class FaultLog(logging.Handler):
 
 
 class Timed:
-    """ASGI middleware that measures response times."""
+    """An ASGI middleware that measures response times."""
 
     def __init__(self, app: ASGIApp, metrics: ServerMetrics) -> None:
         self._app, self._metrics = app, metrics

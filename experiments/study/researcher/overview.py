@@ -1,4 +1,4 @@
-"""Summary of a study for the researcher's page: cells, phases, dropouts, frame rates and payments."""
+"""Summarize the progress of a study for the researcher's page."""
 
 import statistics
 from collections import Counter
@@ -17,7 +17,7 @@ LEFT: tuple[Status, ...] = ("no_consent", "screened_out", "withdrawn", "timed_ou
 
 @dataclass(frozen=True)
 class CellLine:
-    """Numbers of places in a cell of the design."""
+    """The number of participants in a cell of the study design, by state."""
 
     index: int
     label: str
@@ -29,7 +29,7 @@ class CellLine:
 
 @dataclass(frozen=True)
 class PhaseLine:
-    """Numbers of active (`here`), idle (`away`) and dropped-out (`left`) participants in a phase."""
+    """The number of active (`here`), idle (`away`) and dropped-out (`left`) participants in a phase."""
 
     name: str
     here: int
@@ -39,7 +39,7 @@ class PhaseLine:
 
 @dataclass(frozen=True)
 class Frames:
-    """Number of participants whose frame rate was measured, and the lowest and median rate in fps."""
+    """The number of participants with a measured frame rate, and the lowest and the median rate in fps."""
 
     people: int
     lowest: float
@@ -48,7 +48,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class PayLine:
-    """Payments of one type and currency. Amounts are in hundredths of the currency."""
+    """A summary of all payments of one type and currency. Amounts are in hundredths of the currency."""
 
     kind: str
     currency: str
@@ -62,7 +62,7 @@ class PayLine:
 
 @dataclass(frozen=True)
 class Overview:
-    """Summary of a study. Frame rates are from device checks (`checked`) and from current sessions (`playing`)."""
+    """A summary of a study. Frame rates come from device checks (`checked`) and sessions (`playing`)."""
 
     at: datetime
     state: StudyState

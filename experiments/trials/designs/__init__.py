@@ -1,4 +1,4 @@
-"""Study files of this package, the metrics to analyse, and studies with simulated participants."""
+"""Study files that come with this package, and functions that find and read them."""
 
 import itertools
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent
 
 
 def study_path(name: str) -> Path:
-    """Return the path of a study file. `name` is a path, or the name of a study in this package (`paper`)."""
+    """Return the path of a study file. `name` is a path or the name of an included study such as `paper`."""
     own, packaged = Path(name), FOLDER / f"{name}.toml"
     if not own.is_file() and not packaged.is_file():
         raise ConfigError(
@@ -24,10 +24,10 @@ def study_path(name: str) -> Path:
 
 
 def read_study(path: Path, people: int | None = None) -> Design:
-    """Read the simulated participants of a study file, alternating between its cells. `people` limits their number.
+    """Read the trials of all simulated participants in a study file, or of the first `people` participants.
 
     Raises:
-        ConfigError: The file, the number, or a trial for a person is invalid.
+        ConfigError: The file or the number of participants is invalid, or a trial is for human participants.
     """
     cells: dict[Any, dict[str, list[TrialConfig]]] = {}
     for trial in read_design(path).trials:

@@ -1,1 +1,1 @@
-"""Replays of recorded runs, which are simulated again, compared with the record, and filmed in other views."""
+"""Replay recorded runs in order to verify them or to film them in other views."""

@@ -1,4 +1,4 @@
-"""Compares a replay with the record, and reports the result for each file."""
+"""Compare a replay with the record of the run, and report the result for each file."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,16 +28,16 @@ from experiments.session.assistant import WORLD_EVENTS
 from experiments.session.familiarise import watch_flythrough
 from experiments.trials.replay.replayer import Replayer
 
-# Events that a replay recomputes. Plans and regrets come from the log, because a replay does not search for them again,
-# so only the hashes of the log protect plans and regrets.
+# Events that a replay recomputes. Plans and regrets are copied from the log instead of being computed again,
+# so they are protected only by the hashes of the log.
 COMPARED_EVENTS = frozenset({*WORLD_EVENTS, "attempt", "visit", "plan", "end"})
 REGRETS = frozenset({"regret_m", "suggested_regret_m"})
-SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # verified by simulating the run again
-DERIVED = (records.PLAN, records.METRICS)  # computed from the files above
+SIMULATED = (records.EVENTS, records.TRAJECTORY, records.RECORDING)  # files verified by the simulation
+DERIVED = (records.PLAN, records.METRICS)  # files computed from the files above
 
 
 def simulated_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
-    """Compare the states, poses, checkpoints and events of a finished replay with the record. Yield the mismatches."""
+    """Yield the differences between a finished replay and the record of the run."""
     if replayer.mismatch is not None:
         yield replayer.mismatch
     replayed = replayer.replayed()
@@ -83,7 +83,7 @@ def _compare_checkpoints(replayer: Replayer, replayed: Record) -> Iterator[Misma
 def _compare_events(replayer: Replayer, replayed: Record) -> Iterator[Mismatch]:
     record = replayer.record
     broke_off = record.reason not in (*COMPLETE, PHYSICS_ERROR)
-    end = max(record.steps - broke_off, 1)  # the last step of an interrupted run is not simulated again
+    end = max(record.steps - broke_off, 1)  # the last step of an interrupted run is not replayed
     logged = [
         (step, _comparable(event))
         for step, event in zip(record.steps_of_events, record.events, strict=True)
@@ -121,7 +121,7 @@ def _describe(event: Event) -> str:
 
 
 def phase_mismatches(replayer: Replayer) -> Iterator[Mismatch]:
-    """Compare the phases before a simulated participant's task, and the bins seen in them. Yield the mismatches.
+    """Yield the differences between a replay and the record in the phases before a simulated task.
 
     The training has its own run directory, which is replayed separately.
     """
@@ -157,7 +157,7 @@ def _mismatch(message: str) -> Mismatch:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a replay for one file, with a text that describes the check or the fault."""
+    """The result of a replay for one file, with a description of the check or of the fault."""
 
     file: str
     verified: bool
@@ -174,8 +174,8 @@ def verdicts(
 
     Args:
         directory: The run directory.
-        record: Its record.
-        mismatches: All differences.
+        record: Record of the run.
+        mismatches: All mismatches that were found.
         first: First control step that was simulated again.
         end: Control step after the last one that was simulated again.
     """

@@ -1,4 +1,4 @@
-"""Films a run from above or from around the house, with the person and the guidance."""
+"""Film a run from above or from a camera that circles the house."""
 
 import math
 from collections.abc import Callable
@@ -17,24 +17,24 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PersonParameters
 from mjsim.world.world import World
 
-# Maps simulated time in seconds to a camera pose
+# A function that maps the simulated time in seconds to a camera pose
 CameraPath = Callable[[float], CameraPose]
 Bounds = tuple[float, float, float, float]
 
 _TOP_DOWN_FOV = math.radians(20.0)
 _FREE_FOV = math.radians(50.0)
-# Extra camera distance, so that the tops of the walls fit into the picture
+# Factor that increases the distance of the camera so that the tops of the walls are in the picture
 _MARGIN = 1.12
 _ORBIT_PERIOD_S = 90.0
 _ELEVATION = math.radians(52.0)
-_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # not used by any object in a house
+_BODY_COLOUR: Rgba = (0.85, 0.10, 0.55, 1.0)  # a colour that no object has
 _HEAD_COLOUR: Rgba = (0.93, 0.74, 0.22, 1.0)
 
 
 def camera_path(
     camera: str, bounds: Bounds, aspect: float, eye: Vec3 | None = None, target: Vec3 | None = None
 ) -> CameraPath:
-    """Return the pose of an external camera over time.
+    """Return a function that maps the simulated time to the pose of an external camera.
 
     Args:
         camera: `top-down` or `free`.
@@ -54,7 +54,7 @@ def camera_path(
     if eye is not None:
         fixed = CameraPose.looking_at(eye, aim, _FREE_FOV)
         return lambda _: fixed
-    # At this distance, a sphere around the floor fits into the view.
+    # At this distance, the view contains a sphere around the whole floor.
     half_angle = math.atan(math.tan(_FREE_FOV / 2) * min(1.0, aspect))
     distance = 0.5 * math.hypot(width, depth) / math.sin(half_angle)
 
@@ -68,16 +68,16 @@ def camera_path(
 
 
 class ExternalViewer:
-    """A viewer that films a session from outside, without showing ceilings. Use it as a context manager.
+    """A viewer that films a session from outside the house. It must be used as a context manager.
 
     Args:
         scene: The scene to render.
         film: Frame size and render profile.
-        camera: Camera pose by simulated time.
-        video: Receives the frames.
+        camera: Function that returns the camera pose at a simulated time.
+        video: Writer that receives the frames.
 
     Raises:
-        RenderError: No off-screen GL context could be made, or size or profile is invalid.
+        RenderError: No off-screen GL context could be created, or the frame size or the profile is invalid.
     """
 
     def __init__(self, scene: Scene, film: FilmConfig, camera: CameraPath, video: VideoWriter) -> None:
@@ -88,11 +88,11 @@ class ExternalViewer:
         self._video = video
 
     def camera(self, world: World) -> CameraView | None:  # noqa: ARG002 - part of the protocol
-        """Return None, because the HUD is not visible from outside."""
+        """Return None, because the HUD is not shown in an external view."""
         return None
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Film one frame with the house, the person, and the markers that the HUD places in the world."""
+        """Film one frame of the house with the person and the markers of the HUD."""
         markers = [*hud_state.markers, *figure(observation, self._person)]
         self._video.write(self._renderer.rgb(world.data, self._camera(observation.time), markers=markers))
 

@@ -1,4 +1,4 @@
-"""Replays a run: simulates it again, compares every control step with the record, and films it in any view."""
+"""Replay a recorded run, compare every control step with the record, and film the run in any view."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -22,25 +22,25 @@ from mjsim.support.files import replacing
 from mjsim.values.errors import AssetError
 from mjsim.values.person_parameters import PersonParameters
 
-MAX_WIDTH = 1280  # maximum width of the view in pixels, in a film shaped like the participant's page
+MAX_WIDTH = 1280  # maximum width of a film that shows the participant's view, in pixels
 
 Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class ReplayFilm:
-    """Settings of the film of a replay.
+    """Settings of a film that is made from a replay.
 
     Attributes:
         path: Video file to write.
-        config: Frame size and render profile. If it is None, frames are shaped like the participant's page, or have the
-            default size if there was no page.
+        config: Frame size and render profile. If it is None, frames have the shape of the participant's page,
+            or the default size if there was no page.
         camera: `first-person` (with the HUD), `top-down`, or `free`.
         eye: Position of a free camera in metres, or None to circle the house.
         target: Point at which a free camera looks, in metres, or None for the middle of the floor.
 
     Raises:
-        ConfigError: The camera is unknown or cannot be moved.
+        ConfigError: The camera is unknown, or its position cannot be set.
     """
 
     path: Path
@@ -59,16 +59,16 @@ class ReplayFilm:
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """Result of a replay without mismatches.
+    """The result of a replay that agrees with the record.
 
     Attributes:
         first: Control step at which the replay started.
         steps: Number of verified control steps.
         ended: Reason why the run ended.
         failure: Physics error that ended both the run and the replay, or None.
-        differences: Versions and models that differ from those of the recording but did not change the result.
+        differences: Versions and models that differ from those of the recording without changing the result.
         frames_sha256: Hash of the filmed frames, or None.
-        as_filmed: True if these frames equal those of the run's video bit for bit. None unless both were filmed.
+        as_filmed: True if the frames are identical to those of the run's video. None unless both were filmed.
     """
 
     first: int
@@ -94,16 +94,16 @@ def replay(
     language: str = "en",
     on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> ReplayReport:
-    """Simulate a run again and compare every control step with the record.
+    """Simulate a recorded run again, and compare every control step with the record.
 
     Args:
         directory: Run directory.
         start: Simulated time in seconds. The replay starts at the last checkpoint at or before it.
         film: Settings of the film, or None.
-        watch: Makes a viewer that replaces the film, or None.
-        assistance: Assistance condition whose HUD is shown, or None for the recorded one. Actions and plans are always
-            the recorded ones.
-        house: The house of the run, if it is loaded already.
+        watch: Function that creates a viewer to use instead of the film, or None.
+        assistance: Assistance condition whose HUD is shown, or None for the recorded condition. The actions
+            and plans are always those of the record.
+        house: The house of the run, if it is already loaded.
         catalogue: Path of the house's catalogue, if it was moved. Its content must not have changed.
         language: Language of the texts in the film.
         on_progress: Called with the number of control steps replayed so far and the total number.
@@ -118,7 +118,7 @@ def replay(
         faults += checksum_mismatches(directory, record)
         raise mismatch_error(directory, record, faults[0], (), verdicts(directory, record, faults, 0, 0))
     duration = float(record.trajectory["time"][-1])
-    if start > round(duration, 6):  # times in the log are rounded to 6 digits
+    if start > round(duration, 6):  # times in the log have 6 decimals
         raise ConfigError(f"the run lasts {duration:.2f} s; start earlier than {start:g} s")
     house = (house or _house_of(directory, record, catalogue)).in_language(language)
     shown = assistance or str(record.start["assistance"])
@@ -149,7 +149,7 @@ def replay(
 
 
 def _mismatches(replayer: Replayer) -> list[Mismatch]:
-    """Return all mismatches of a replay, sorted by step. Those of checksums come last, being the least specific."""
+    """Return all mismatches of a replay, sorted by control step. Checksum mismatches come last."""
     directory, record = replayer.directory, replayer.record
     simulated = (*phase_mismatches(replayer), *simulated_mismatches(replayer))
     found = sorted(simulated, key=lambda mismatch: mismatch.step)
@@ -177,7 +177,7 @@ def _house_of(directory: Path, record: Record, catalogue: str | None) -> House:
 
 
 def as_seen(record: Record, profile: str) -> FilmConfig:
-    """Return film settings that match the page on which the browser last drew the view, or the defaults."""
+    """Return film settings that match the participant's browser, or the defaults if no size was logged."""
     views = [
         event for event in record.events if event["event"] == "display" and event.get("draw") == "browser"
     ]

@@ -1,4 +1,4 @@
-"""Simulates the session of a recorded run again, with the plans from its log."""
+"""Simulate a recorded run again, using the plans in its log."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,11 +28,11 @@ from planner.service import Planner
 
 
 class Replayer:
-    """A replay of one run.
+    """A replay of a recorded run.
 
     Args:
         directory: The run directory.
-        record: Its record, which must be undamaged.
+        record: Record of the run, which must be undamaged.
         house: The house of the run.
         start: Simulated time in seconds. The replay starts at the last checkpoint at or before it.
         assistance: Assistance condition whose HUD is shown.
@@ -70,7 +70,7 @@ class Replayer:
         self.differences = tuple(_differences(record.start, provenance(self._world)))
 
     def run(self, viewer: Viewer | None, on_progress: Callable[[int, int], None]) -> None:
-        """Replay to the end or to the first mismatch."""
+        """Replay the run until its end or until the first mismatch."""
         session, steps = self._restored_session(viewer), self.record.steps
         try:
             for step in range(self.first, steps):
@@ -83,12 +83,12 @@ class Replayer:
             self.failure = str(error)
 
     def replayed(self) -> Record:
-        """Return the record of the replay from step `first` on. Its log also contains the earlier events."""
+        """Return the record of the replay from step `first` on. The log also contains all earlier events."""
         return self._written.record()
 
     @property
     def logged_before(self) -> int:
-        """Number of events in the replay's log that were copied from the record rather than simulated."""
+        """The number of events in the replay's log that were copied from the record."""
         return self.record.events_before(self.first) if self.first else 0
 
     def _restored_session(self, viewer: Viewer | None) -> Session:
@@ -151,7 +151,7 @@ def mismatch_error(
     differences: tuple[str, ...] = (),
     verdicts: tuple[object, ...] = (),
 ) -> ReplayError:
-    """Return an error that names the control step of a mismatch and its possible causes in one line."""
+    """Return an error that names the control step and the possible causes of a mismatch."""
     timestep = record.start.get("world", {}).get("control_timestep", WorldOptions.control_timestep)
     where = f"first bad step {mismatch.step} (t = {mismatch.step * float(timestep):.2f} s)"
     reasons = f" (since it was recorded: {'; '.join(differences)})" if differences else ""
@@ -172,11 +172,11 @@ def _differences(then: Event, now: Mapping[str, Any]) -> list[str]:
 
 
 class LogSource(PlanSource):
-    """Provides the plans of a log at their logged times, instead of new plans.
+    """A source of plans that returns the logged plans at their logged times.
 
     Args:
         plans: The `plan` events of the log, in order.
-        clock: Returns the simulated time in seconds.
+        clock: Function that returns the simulated time in seconds.
     """
 
     def __init__(self, plans: Sequence[Event], clock: Callable[[], float] = lambda: 0.0) -> None:
@@ -188,7 +188,7 @@ class LogSource(PlanSource):
         return None if self._is_due else tuple(v for v in route.visits if _is_open(v, state))
 
     def plan(self, state: TaskState, route: Route | None, *, shown: bool) -> Route:  # noqa: ARG002 - both are logged
-        """Return the plan logged at the current time. Every run logs a plan at the start."""
+        """Return the plan that was logged at the current time. Every run logs a plan at the start."""
         if not self._is_due:
             raise ReplayError("the log has no plan for the start of the task; the first bad step is 0", 0)
         return _route(self._plans.pop(0), state)
@@ -199,7 +199,7 @@ class LogSource(PlanSource):
         return self._is_due and bool(self._plans[0].get("improved", False))
 
     def better(self, state: TaskState, route: Route) -> Route | None:
-        """Return the better plan logged at the current time, or None."""
+        """Return the better plan that was logged at the current time, or None if there is none."""
         return self.plan(state, route, shown=True) if self.pending else None
 
     @property

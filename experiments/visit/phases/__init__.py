@@ -1,4 +1,4 @@
-"""Phases of a visit."""
+"""The phases that participants pass through, such as the consent form, the trials and the survey."""
 
 import pkgutil
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ KINDS: Mapping[str, Callable[[VisitPlan], Phase]] = {
 
 
 def phases_of(plan: VisitPlan) -> Sequence[Phase]:
-    """Create the phases of a plan, in order. A custom phase is named after its factory, `package.module:attribute`.
+    """Create the phases of a plan, in order. Custom phases have names of the form `package.module:attribute`.
 
     Raises:
         ConfigError: A phase cannot be loaded or created.

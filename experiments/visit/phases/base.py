@@ -1,4 +1,4 @@
-"""Interface of phases, and its implementations for forms and trials."""
+"""The phase interface and its implementations for forms and trials."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -25,13 +25,13 @@ FormData = ImmutableMultiDict[str, str]
 
 @dataclass(frozen=True)
 class Visitor:
-    """The participant's data that a phase can use.
+    """Information about a participant that a phase can use.
 
     Attributes:
         shown_s: Time since the phase was first shown, in seconds.
-        attempts: Number of forms rejected in this phase.
+        attempts: Number of rejected submissions in this phase.
         path: URL path of the participant's pages.
-        metrics: Metrics of the task. None except in the phase `result`.
+        metrics: Metrics of the task in the phase `result`, otherwise None.
     """
 
     answers: Answers
@@ -43,7 +43,7 @@ class Visitor:
 
 @dataclass(frozen=True)
 class Page:
-    """A page to render, given by the name of a template and the values for it."""
+    """A page to be rendered from a template with these values."""
 
     template: str
     values: Mapping[str, Any]
@@ -51,7 +51,7 @@ class Page:
 
 @dataclass(frozen=True)
 class Done:
-    """Result of an accepted form: the answers, and whether the visit continues or ends."""
+    """The result of accepting a form. `outcome` determines whether the visit continues or ends."""
 
     answers: Answers = field(default_factory=dict)
     outcome: Outcome = "next"
@@ -59,7 +59,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Again:
-    """Result of a rejected form. The page is shown again with the error message `note`."""
+    """The result of rejecting a form. The page is shown again with `note` as the error message."""
 
     note: str
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -67,19 +67,19 @@ class Again:
 
 @runtime_checkable
 class Phase(Protocol):
-    """A phase of a visit."""
+    """The interface of a phase, such as a form or a trial."""
 
     name: str
 
     def page(self, visitor: Visitor, refused: Again | None = None) -> Page:
-        """Return the page to show. `refused` is set if the participant's form has just been rejected."""
+        """Return the page to show. `refused` is given if the participant's last form was rejected."""
         ...
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again: ...
 
 
 class FormPhase:
-    """A page with a text, a form and a button, as described in the section `name` of the texts."""
+    """A phase that shows a text and a form. Both come from the section `name` of the texts."""
 
     def __init__(self, plan: VisitPlan, name: str, template: str = "form") -> None:
         self.name, self._template = name, template
@@ -119,11 +119,11 @@ class FormPhase:
         )
 
     def example(self) -> dict[str, str]:
-        """Return a valid form with answers to all required items."""
+        """Return example form data that answers all required questions."""
         return {item.name: item.example() for item in self.items if item.required}
 
     def drafts(self, sent: FormData) -> Answers:
-        """Return the valid answers in a form that has not been submitted yet."""
+        """Return the valid answers from a form that the participant is still filling in."""
         form = self._form(sent, {})
         form.validate()
         given = {item.name: form[item.name] for item in self.items if item.name in sent}
@@ -138,14 +138,14 @@ class FormPhase:
 
 
 class Story(FormPhase):
-    """The page that tells the story of the task."""
+    """The page with the background story of the task."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"paragraphs": self._plan.story_paragraphs}
 
 
 class ResultPhase(FormPhase):
-    """The page with the metrics of the task and, if the plan has several episodes, a link to play again."""
+    """The result page, which shows the metrics of the task and may offer a link to play again."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:
         return {
@@ -157,7 +157,7 @@ class ResultPhase(FormPhase):
 
 
 class Consent(FormPhase):
-    """The consent form, with any further items in the study's texts."""
+    """The consent form, including any additional questions from the study's texts."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         if sent.get("agree") == "no":
@@ -172,7 +172,7 @@ class Consent(FormPhase):
 
 
 class Comprehension(FormPhase):
-    """Comprehension questions. After too many failed attempts, the participant is screened out."""
+    """The comprehension check. A participant who fails too many attempts is screened out."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"story": self._plan.story_paragraphs}
@@ -191,7 +191,7 @@ class Comprehension(FormPhase):
 
 
 class Survey(FormPhase):
-    """The survey. After too many wrong answers to attention checks, the participant is screened out."""
+    """The survey. A participant who fails too many attention checks is screened out."""
 
     def read(self, visitor: Visitor, sent: FormData) -> Done | Again:
         read = super().read(visitor, sent)
@@ -203,9 +203,9 @@ class Survey(FormPhase):
 
 
 def form_of(items: Sequence[Item], scale: Sequence[str], common: Section, language: str = "en") -> BaseForm:
-    """Create a form with one field per item. `scale` contains the labels of the points on rating scales."""
+    """Create a form with one field per item. `scale` contains the labels for the points of rating scales."""
     meta = DefaultMeta()
-    meta.locales = [language]  # language of WTForms' own messages
+    meta.locales = [language]  # language of the validation messages from WTForms
     return BaseForm({item.name: _field(item, scale, common) for item in items}, meta=meta)
 
 
@@ -233,7 +233,7 @@ def _field(item: Item, scale: Sequence[str], common: Section) -> Any:
 
 
 class TrialPhase:
-    """A phase in which a trial is played. It has no form and ends with the trial."""
+    """A phase in which the participant completes a trial. It has no form."""
 
     def __init__(self, plan: VisitPlan, name: str) -> None:
         self.name = name

@@ -1,4 +1,4 @@
-"""Device check of WebGL 2, frame rate, connection, keyboard and window size."""
+"""Check that the participant's computer meets the requirements, such as WebGL 2 and a fast connection."""
 
 import math
 from collections.abc import Mapping
@@ -20,9 +20,9 @@ class _Measured:
     renderer: str
 
     def faults(self, needed: Device, draws: bool) -> list[str]:
-        """Return the names of the texts about unmet requirements.
+        """Return the names of the error texts for all unmet requirements.
 
-        The frame rate is only checked if the browser `draws` the scene, rather than the server.
+        The frame rate is only checked if the browser `draws` the scene itself.
         """
         values = self.values
         found = [
@@ -35,7 +35,7 @@ class _Measured:
 
 
 class DeviceCheck(FormPhase):
-    """A page that tests the participant's computer and submits the measurements."""
+    """A page that tests the participant's computer and submits the results."""
 
     def values(self, visitor: Visitor) -> Mapping[str, Any]:  # noqa: ARG002 - the same for all participants
         return {"keyboard": self._plan.device.keyboard}

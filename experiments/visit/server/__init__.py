@@ -1,1 +1,1 @@
-"""Server of the pages and WebSockets that participants use."""
+"""The server for the pages and WebSockets that participants use."""

@@ -16,14 +16,14 @@ from experiments.visit.tokens import Keys, new_token, token_hash
 from experiments.web.server.guards import Rate, sent_form
 
 LOG = logging.getLogger("mjsim.study")
-NEW_PEOPLE = 60, 60.0  # maximum number of new participants per IP address, and its period in seconds
+NEW_PEOPLE = 60, 60.0  # maximum number of new participants per IP address, and the period in seconds
 COUNTED = 10.0  # how long the number of free places is cached, in seconds
-COUNTED_FULL = 1.0  # how long that number is cached if it is 0, in seconds
-TOKEN = "token"  # form field for the token that the browser has stored
+COUNTED_FULL = 1.0  # how long the number of free places is cached if it is 0, in seconds
+TOKEN = "token"  # name of the form field for the token that the browser has stored
 
 
 class Admission:
-    """Admits participants to a study."""
+    """Request handlers that admit participants to a study."""
 
     def __init__(self, procedure: Procedure, pages: VisitPages, keys: Keys) -> None:
         self._procedure, self._pages, self._keys = procedure, pages, keys
@@ -31,7 +31,7 @@ class Admission:
         self._recruiter = self._plan.recruiter
         self._new = Rate(*NEW_PEOPLE)
         self._counting = asyncio.Lock()
-        self._room, self._counted = 0, 0.0  # cached number of free places, and the time at which it expires
+        self._room, self._counted = 0, 0.0  # cached number of free places, and its expiry time
 
     async def welcome(self, request: Request) -> Response:
         """Show the welcome page, or send a returning participant to their current phase."""
@@ -72,13 +72,13 @@ class Admission:
     async def _again(self, request: Request, came: Candidate, person: PersonRow, token: str = "") -> Response:
         """Let a participant return if all ids match, or if the browser has stored the participant's token.
 
-        The platform id alone does not prove the participant's identity, since others may know it. The id of the
-        submission is known only to the participant.
+        The platform id alone does not prove the participant's identity, because other people may know it. The
+        id of the submission is known only to the participant.
         """
         same = came.identity == await self._store.identity(person.id)
         if came.key is not None and (
             same
-            or person.status == "no_consent"  # ids are not stored without consent
+            or person.status == "no_consent"  # the ids of participants without consent are not stored
             or hmac.compare_digest(token.encode(), self._keys.token(came.key).encode())
         ):
             return await self._arrive(came)
@@ -103,11 +103,11 @@ class Admission:
         return RedirectResponse(f"/play/{token}", 303)
 
     async def _closed(self) -> str | None:
-        """Return the name of the text that explains why no new participant may start, or None."""
+        """Return the name of the text that explains why the study is closed, or None if it is open."""
         state = (await self._store.study()).state
         if state != "open":
             return "paused" if state == "paused" else "full"
-        async with self._counting:  # one query serves all concurrent requests
+        async with self._counting:  # concurrent requests share one database query
             if time.monotonic() > self._counted:
                 self._room = await self._procedure.room()
                 self._counted = time.monotonic() + (COUNTED if self._room > 0 else COUNTED_FULL)

@@ -1,4 +1,4 @@
-"""Web application through which participants visit a study."""
+"""The web application in which participants complete a study."""
 
 import asyncio
 import logging
@@ -37,14 +37,14 @@ MAX_FORM = 64 * 1024  # maximum size of a submitted form, in bytes
 
 @dataclass(frozen=True)
 class ServerOptions:
-    """Options of a server that do not depend on the plan.
+    """Server options that are not part of the study plan.
 
     Attributes:
-        secret: Key from which the tokens of participants with a platform id are derived.
+        secret: Secret key from which tokens are derived for participants with a platform id.
         proxies: Proxies whose X-Forwarded-For header is trusted.
-        host: Name of this host if several share a database, or None.
+        host: Name of this host if several hosts share a database, or None.
         workers: Maximum number of concurrent trials, or None to measure the machine's capacity.
-        background: Tasks that run while the server runs.
+        background: Background tasks that run as long as the server does.
     """
 
     secret: bytes = b""
@@ -56,11 +56,11 @@ class ServerOptions:
 
 
 class _ElsewhereError(Exception):
-    """The participant's visit is handled by another host."""
+    """Raised if the participant's visit is handled by another host."""
 
 
 class VisitServer:
-    """Serves the pages and WebSockets of all visits."""
+    """A server for the pages and WebSockets of a study."""
 
     def __init__(self, procedure: Procedure, pool: WorkerPool, options: ServerOptions) -> None:
         self._procedure, self._options, self._pool = procedure, options, pool
@@ -75,7 +75,7 @@ class VisitServer:
         self._locks: dict[str, asyncio.Lock] = {}
 
     def app(self, host: str, public: str | None = None) -> Starlette:
-        """Create the application for a server that listens on `host`. `public` is its URL behind a proxy, if any."""
+        """Create the web application of a server at `host`. `public` is its URL behind a proxy, or None."""
         return Starlette(
             routes=[
                 Route("/", self._arrivals.welcome),
@@ -127,7 +127,7 @@ class VisitServer:
             await self.sessions.release()
             await self._pool.close()
             if self._host is not None:
-                with suppress(StoreError):  # not critical, since the lease expires soon
+                with suppress(StoreError):  # an error does no harm, because the lease expires soon anyway
                     await self._host.leave()
             await self._store.close()
 
@@ -145,7 +145,7 @@ class VisitServer:
 
     async def _save(self, request: Request) -> Response:
         person, form = await self._person(request), await sent_form(request)
-        async with self._lock(person):  # keeps an older answer from replacing a newer one
+        async with self._lock(person):  # prevents an older answer from overwriting a newer one
             now = await self._procedure.now(person, request.url.path)
             await self._procedure.save(now, str(form.get("phase", "")), form)
         return Response(status_code=204)
@@ -162,7 +162,7 @@ class VisitServer:
             raise HTTPException(404)
         async with self._lock(person):
             await self.sessions.release(lambda session: session.player.key == person.token_hash)
-            self.sessions.limit.release(person.token_hash)  # the slot may have no session yet
+            self.sessions.limit.release(person.token_hash)  # a participant may have a slot but no session yet
             await self._procedure.withdraw(person, delete=form.get("data") == "delete")
         return RedirectResponse(f"/play/{request.path_params['token']}", 303)
 
@@ -186,7 +186,7 @@ class VisitServer:
         token = socket.path_params["token"]
         person = await self._store.find(token_hash(token)) if TOKEN.fullmatch(token) else None
         if person is not None and self._host is not None and not await self._host.has(person):
-            await socket.send_denial_response(Response(status_code=404))  # a proxy tries the next host
+            await socket.send_denial_response(Response(status_code=404))  # makes a proxy try the next host
             return
         if person is None:
             await socket.close(1008)
@@ -206,7 +206,7 @@ class VisitServer:
 
     async def _played(self, request: Request, now: PhaseState) -> Response:
         person = now.person
-        begun = self._procedure.folders.find(person.token_hash)  # a small file, so no thread is needed
+        begun = self._procedure.folders.find(person.token_hash)  # the file is small, so no thread is needed
         here = begun or await self._procedure.assign(person)
         if here is None:
             return self._pages.left(request, await self._procedure.turn_away(person))
@@ -229,7 +229,7 @@ class VisitServer:
         return self._pages.message(request, "unknown", 404)
 
     async def _elsewhere(self, request: Request, _: Exception) -> Response:
-        """Respond with status 404, so that a proxy tries the next host. Without a proxy, participants see this page."""
+        """Return a page with status 404, which makes a proxy try the next host."""
         return self._pages.message(request, "paused", 404)
 
     async def _person(self, request: Request) -> PersonRow:
@@ -242,5 +242,5 @@ class VisitServer:
         return person
 
     def _lock(self, person: PersonRow) -> asyncio.Lock:
-        """Return the lock that keeps two pages of a participant from changing the phase at the same time."""
+        """Return a lock that prevents concurrent requests of a participant from changing the phase."""
         return self._locks.setdefault(person.token_hash, asyncio.Lock())

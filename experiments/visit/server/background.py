@@ -1,4 +1,4 @@
-"""Background tasks that time out absent participants and send a host's heartbeats."""
+"""Background tasks that time out inactive participants and send heartbeats."""
 
 import asyncio
 import datetime
@@ -14,21 +14,21 @@ from experiments.visit.store.hosts import LEASE
 from experiments.web.server.sessions import Sessions
 
 LOG = logging.getLogger("mjsim.study")
-HEARTBEAT_S = 10.0  # time between two heartbeats to the database
-SWEEP_S = 60.0  # time between two searches for absent participants
-CLOCK_SET_S = 30.0  # if two clocks deviate by more, the clock was set or the machine was suspended
+HEARTBEAT_S = 10.0  # interval between heartbeats to the database
+SWEEP_S = 60.0  # interval between searches for inactive participants
+CLOCK_SET_S = 30.0  # clock deviation that indicates a clock change or a suspended machine
 
 
 class HostOfVisits:
-    """This host, as one of several that share a database. `name` must be unique among them."""
+    """A host that shares a database with other hosts. Each host needs a unique `name`."""
 
     def __init__(self, name: str, store: Store, folders: VisitFolders) -> None:
         self._name, self._store, self._folders = name, store, folders
-        self._until = 0.0  # time at which the lease expires, by the monotonic clock
+        self._until = 0.0  # monotonic time at which the lease expires
         self._new = False
 
     async def keep(self, sessions: Sessions) -> None:
-        """Send heartbeats until cancelled. End all sessions if no heartbeat has reached the database for too long."""
+        """Send heartbeats until cancelled. End all sessions if the database is unreachable for too long."""
         while True:
             began = time.monotonic()
             try:
@@ -41,7 +41,7 @@ class HostOfVisits:
             await asyncio.sleep(HEARTBEAT_S)
 
     async def has(self, person: PersonRow) -> bool:
-        """Claim a visit if possible. Return True if this host may serve it, as any host may before the trials begin."""
+        """Return True if this host may serve the participant. Claim the visit for this host if necessary."""
         if person.host is None and person.phase not in PLAYED:
             return True
         if time.monotonic() > self._until:
@@ -52,26 +52,26 @@ class HostOfVisits:
         return await self._store.claim(person.id, self._name, new=self._new, journal=journal)
 
     async def leave(self) -> None:
-        """Record that this host no longer runs sessions."""
+        """Record that this host has stopped running sessions."""
         await self._store.greet(self._name, leaves=True)
 
 
 async def end_absent(procedure: Procedure) -> None:
-    """Time out absent participants until cancelled. Absence is not counted while the server is down."""
+    """Time out inactive participants until cancelled. Time during which the server is down does not count."""
     away = procedure.plan.limits.timed_out_after
     since = time.monotonic()
     ahead = time.time() - since
     while True:
         await asyncio.sleep(SWEEP_S)
         now = time.monotonic()
-        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # wait again, since activity is timed by this clock
+        if abs(time.time() - now - ahead) > CLOCK_SET_S:  # start over if the clock was changed
             since, ahead = now, time.time() - now
         if now - since < away:
             continue
         try:
             before = utc_now() - datetime.timedelta(seconds=away)
-            await procedure.recover(before)  # record trials that have ended
+            await procedure.recover(before)  # record completed trials before the timeout
             if gone := await procedure.store.time_out(before):
                 LOG.info("%d participants did not return", gone)
-        except StoreError as error:  # will be tried again at the next sweep
+        except StoreError as error:  # the next sweep tries again
             LOG.warning("%s", error)

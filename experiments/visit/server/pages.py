@@ -1,4 +1,4 @@
-"""Render phases, last pages and messages as HTML pages."""
+"""Render the HTML pages for phases, messages and the end of a visit."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from experiments.web.client_files import page
 
 
 class VisitPages:
-    """Renders pages with the texts of a plan."""
+    """A renderer for pages that contain the texts of a study plan."""
 
     def __init__(self, plan: VisitPlan) -> None:
         self._plan, self._recruiter, self._steps = plan, plan.recruiter, len(plan.phases)
@@ -31,20 +31,20 @@ class VisitPages:
         return page(request, template, status, common=common, lang=lang, **values)
 
     def message(self, request: Request, name: str, status: int = 200) -> Response:
-        """Show a page with the message that has this name in the texts."""
+        """Show a page with a message. `name` is the name of the message in the texts."""
         words = self._plan.texts["welcome"]
         heading = {"title": words[f"{name}_title"]}
         return self.show(request, "study", status, section=heading, paragraphs=[words[name]])
 
     def closed(self, request: Request, name: str) -> Response:
-        """Show a message to a person who is not admitted to the study. `name` is the name of the text."""
+        """Show a message to a person who is not admitted. `name` is the name of the message in the texts."""
         remembers = self._recruiter.platform == "link"
         return self._last(request, "welcome", name, "withdrawn", "closed", remembers=remembers)
 
     def phase(
         self, request: Request, now: PhaseState, identity: Mapping[str, str], refused: Again | None = None
     ) -> Response:
-        """Show the participant's current phase, which must not be a trial."""
+        """Show the page of the participant's current phase, which must not be a trial."""
         if now.phase is None:
             return self.left(request, now.person)
         shown = now.phase.page(now.visitor, refused)

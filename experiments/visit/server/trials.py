@@ -1,4 +1,4 @@
-"""Serve the pages and WebSockets of participants' trials."""
+"""Serve the web page and the WebSocket of each participant's trials."""
 
 import asyncio
 import logging
@@ -26,17 +26,17 @@ from experiments.web.server.pool import WorkerPool
 from experiments.web.server.sessions import Capacity, Sessions, usable_cores
 
 LOG = logging.getLogger("mjsim.study")
-BEAT_PERIOD = 60.0  # period at which a participant's activity is recorded, in seconds
-SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # maximum numbers of open WebSockets
-REAL_TIME_EVERY = 20  # one out of this many participants plays in real time during a rehearsal
-NEVER = 1e9  # replaces infinite durations in HTML, in seconds
-REFRESH = 10.0, 30.0  # shortest and longest polling period of the queue page, in seconds
-PATIENCE = 2.5  # number of missed polling periods after which a page loses its position in the queue
+BEAT_PERIOD = 60.0  # interval at which a participant's activity is recorded, in seconds
+SOCKETS_OF_A_PERSON, SOCKETS_OF_AN_ADDRESS = 2, 20  # maximum WebSockets per participant and per address
+REAL_TIME_EVERY = 20  # during a rehearsal, one in this many participants plays in real time
+NEVER = 1e9  # finite number of seconds that represents an infinite duration in HTML
+REFRESH = 10.0, 30.0  # shortest and longest polling interval of the queue page, in seconds
+PATIENCE = 2.5  # number of polling intervals without a request after which other pages may overtake a page
 
 
 @dataclass(frozen=True)
 class Queued:
-    """A visit's position in the queue.
+    """A participant's position in the queue.
 
     Attributes:
         position: Position in the queue, counted from 1.
@@ -50,7 +50,7 @@ class Queued:
 
 
 class Trials:
-    """The trials that currently run on this server.
+    """The trials that are currently running on this server.
 
     Args:
         workers: Maximum number of concurrent trials, or None to measure the machine's capacity.
@@ -63,11 +63,11 @@ class Trials:
         capacity = Capacity(usable_cores()) if workers is None else None
         self._limit = SessionLimit(workers or (capacity.measure({}, ()) if capacity else 1))
         self.sessions = Sessions(pool, self._limit, self._plan.limits.idle, meter, capacity)
-        self._default_wait = 60.0 * self._plan.minutes  # used until trials have ended, in seconds
+        self._default_wait = 60.0 * self._plan.minutes  # assumed duration of a trial, in seconds
         self._sockets: Counter[str] = Counter()  # number of open WebSockets, by participant and by address
 
     def queued(self, visit: str) -> Queued | None:
-        """Return the position of a visit in the queue, or None if its trial may start."""
+        """Return a participant's position in the queue, or None if the trial may start."""
         wait = self._limit.expected_wait(self._limit.waiting + 1, self._default_wait)
         refresh = min(max(REFRESH[0], wait / 10.0), REFRESH[1])
         position = self._limit.ask(visit, PATIENCE * refresh)
@@ -76,7 +76,7 @@ class Trials:
         return Queued(position, self._limit.expected_wait(position, self._default_wait), refresh)
 
     def page(self, request: Request, now: PhaseState, folder: VisitFolder) -> Response:
-        """Show the page of the current or next trial."""
+        """Show the page of the participant's current or next trial."""
         phase = now.person.phase
         settings = folder.settings(phase)
         by_hand = self._plan.minimum.get(TASK, 0.0) < math.inf
@@ -110,13 +110,13 @@ class Trials:
             await BrowserSocket(socket).serve(session)
         finally:
             self._sockets.subtract(sockets)
-            self._sockets += Counter()  # drops entries that are zero
+            self._sockets += Counter()  # removes counts that have dropped to zero
             beating.cancel()
             with suppress(asyncio.CancelledError):
                 await beating
 
     def _has_room(self, participant: str, address: str) -> bool:
-        # All participants may have the same address, and a page briefly has two WebSockets when it is reloaded.
+        # All participants may share one address. A page that is reloaded briefly has two WebSockets.
         playing = max(self._limit.count, len(self._limit.held))
         from_address = max(SOCKETS_OF_AN_ADDRESS, SOCKETS_OF_A_PERSON * playing)
         return self._sockets[participant] < SOCKETS_OF_A_PERSON and self._sockets[address] < from_address
@@ -125,6 +125,6 @@ class Trials:
         while True:
             try:
                 await self._store.beat(person.id)
-            except StoreError as error:  # will be tried again after the period
+            except StoreError as error:  # the next heartbeat tries again
                 LOG.warning("%s", error)
             await asyncio.sleep(BEAT_PERIOD)

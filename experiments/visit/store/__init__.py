@@ -1,4 +1,4 @@
-"""The database of a study, which no other package accesses directly."""
+"""Access to the database of a study. Other packages never access the database directly."""
 
 from experiments.visit.store.copies import restore
 from experiments.visit.store.store import Store, change_database

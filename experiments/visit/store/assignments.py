@@ -1,4 +1,4 @@
-"""Assign participants to places in the cells of the design, in transactions that lock the study."""
+"""Assign participants to the cells of the experimental design, in transactions that lock the study."""
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
@@ -22,11 +22,11 @@ from experiments.visit.store.values import (
     utc_now,
 )
 
-SEEDS = 2**53  # seeds are smaller than this, so that JavaScript represents them exactly
+SEEDS = 2**53  # seeds are below this value, because JavaScript represents such integers exactly
 FIELDS = [column for column in assignment.c if column.name not in ("id", "study_id", "active")]
 _PLACE = select(*FIELDS).where(assignment.c.person_id == bindparam("person"))
 
-# Queries are built only once, because building one takes as long as running it.
+# These queries are built at import, because building a query takes as long as running it.
 _ACTIVE = update(person).where(
     person.c.id == bindparam("person"),
     person.c.study_id == bindparam("study"),
@@ -52,7 +52,7 @@ _HOLDERS = (
 
 
 class Assignments(StorePart):
-    """Store methods that assign participants to places."""
+    """Store methods that assign participants to the cells of the design."""
 
     async def assign(
         self,
@@ -63,17 +63,17 @@ class Assignments(StorePart):
         now: datetime | None = None,
         abandoned_after: timedelta = timedelta(minutes=30),
     ) -> Assignment | None:
-        """Return the participant's place, assigning one if needed, or None if all cells are full.
+        """Assign a participant to a cell if needed. Return the place, or None if all cells are full.
 
-        A place is held while its participant is active. It is abandoned after `abandoned_after` without activity, and
-        is then assigned to the next participant of the cell if no other place is free. Participants who return later
-        keep their place if it is still free. Otherwise, they get a new place in any cell. Once a trial has started,
-        call :meth:`assignment` instead.
+        A place counts as abandoned after its participant has been inactive for `abandoned_after`. It is then
+        given to the next participant of the cell unless another place is free. Participants who return later
+        keep their place if no other participant has it. Otherwise, they get a new place in any cell. Once
+        a trial has started, call :meth:`assignment` instead.
 
         Args:
-            cells: Quotas from the study file, unless :meth:`set_quota` has changed them.
+            cells: Quotas from the study file. Quotas set by :meth:`set_quota` take precedence.
             rule: Rule for choosing a cell; see :func:`choose`.
-            abandoned_after: Inactivity after which a place counts as abandoned.
+            abandoned_after: Period of inactivity after which a place counts as abandoned.
 
         Raises:
             StoreError: The participation has ended.
@@ -91,7 +91,7 @@ class Assignments(StorePart):
                     return await place_of(connection, person_id)
             wanted = [quotas.get(str(index), cell.wanted) for index, cell in enumerate(cells)]
             here = {"study": self._study_id, "since": now - abandoned_after}
-            while True:  # try again if an absent participant returned between the two queries
+            while True:  # repeat if an inactive participant returned between the two queries
                 taken = await _tally(connection, _TAKEN, here)
                 cell = choose([taken.get(index, 0) for index in range(len(cells))], wanted, rule, rng)
                 if cell is None:
@@ -107,12 +107,12 @@ class Assignments(StorePart):
     async def room(
         self, wanted: Sequence[int], first: str, abandoned_after: timedelta, now: datetime | None = None
     ) -> int:
-        """Return the number of free places that participants in earlier phases do not need. It may be negative.
+        """Return the number of free places minus the number of participants who still need one.
 
         Args:
             wanted: Quotas from the study file.
             first: Name of the first phase. Participants in this phase are not counted.
-            abandoned_after: Inactivity after which participants are not counted.
+            abandoned_after: Period of inactivity after which participants and their places are not counted.
         """
         since = (now or utc_now()) - abandoned_after
         mine, there = person.c.study_id == self._study_id, person.c.seen >= since
@@ -134,7 +134,7 @@ class Assignments(StorePart):
         return int(sum(max(0, number) for number in free) - on_the_way)
 
     async def assignment(self, person_id: int) -> Assignment | None:
-        """Return a participant's place, even if it has been released. Return None if there is none."""
+        """Return a participant's place, even if it has been released, or None if none was ever assigned."""
         async with self._database.reading() as connection:
             return await place_of(connection, person_id)
 
@@ -145,7 +145,7 @@ class Assignments(StorePart):
             return tuple(Assignment(*row) for row in await connection.execute(query))
 
     async def set_quota(self, cell: int, wanted: int, who: str, now: datetime | None = None) -> None:
-        """Change the number of participants wanted in a cell. Places that are already assigned are kept."""
+        """Change the target number of participants in a cell. Places that are already assigned are kept."""
         if cell < 0 or wanted < 0:
             raise StoreError(f"Cell {cell} cannot have {wanted} people; both are counted from 0.")
         now = now or utc_now()
@@ -231,12 +231,12 @@ async def _tally(
 
 
 def choose(counts: Sequence[int], quotas: Sequence[int], rule: Rule, rng: np.random.Generator) -> int | None:
-    """Choose a cell for the next participant: the least filled (`balanced`) or any with free places (`uniform`).
+    """Choose a cell of the design for the next participant.
 
     Args:
         counts: Number of participants in each cell.
         quotas: Number of participants wanted in each cell.
-        rule: Rule for choosing a cell. Ties are broken at random.
+        rule: `balanced` for the least filled cell, or `uniform` for any free cell. Ties are broken at random.
 
     Returns:
         Index of the cell, or None if all are full.
@@ -257,7 +257,7 @@ async def place_of(connection: AsyncConnection, person_id: int) -> Assignment | 
 
 
 async def take_back(connection: AsyncConnection, study_id: int, place: Assignment, state: PlaceState) -> bool:
-    """Assign a released place to its participant again. Return False if another participant has it now."""
+    """Give a released place back to its participant. Return False if another participant has it now."""
     query = select(assignment.c.id).where(
         assignment.c.study_id == study_id,
         assignment.c.cell == place.cell,

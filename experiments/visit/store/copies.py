@@ -1,4 +1,4 @@
-"""Backups of databases. A backup is a single SQLite file that can be restored into any supported database."""
+"""Back up and restore databases. A backup is a SQLite file that can be restored into any database."""
 
 import os
 import shutil
@@ -16,17 +16,17 @@ from experiments.visit.store.engine import Database
 from experiments.visit.store.tables import metadata
 from experiments.visit.store.upgrade import upgrade
 
-ROWS = 1000  # number of rows per INSERT statement
+ROWS = 1000  # maximum number of rows per INSERT statement
 
 
 def check_new(path: Path) -> None:
-    """Raise StoreError if the file of a new backup exists already."""
+    """Raise StoreError if the backup file already exists."""
     if path.exists():
         raise StoreError(f"{path} is there already: name a new file for the backup.")
 
 
 async def back_up(source: Database, path: Path) -> None:
-    """Write a consistent snapshot of the database to a new SQLite file, atomically.
+    """Atomically write a consistent snapshot of the database to a new SQLite file.
 
     Raises StoreError if the file exists or cannot be written.
     """
@@ -44,10 +44,10 @@ async def back_up(source: Database, path: Path) -> None:
 
 
 def one_file(path: Path) -> None:
-    """Checkpoint the WAL of a SQLite database, fsync it, and restrict the file to mode 0600."""
+    """Checkpoint the WAL of a SQLite database, restrict the file to mode 0600, and flush it to disk."""
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("PRAGMA journal_mode = DELETE")
-    path.chmod(0o600)  # only the owner may read platform ids
+    path.chmod(0o600)  # only the owner may read the platform ids in the file
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
@@ -64,7 +64,7 @@ async def restore(path: Path, url: str) -> None:
     """
     if not path.is_file():
         raise StoreError(f"There is no backup {path}.")
-    with TemporaryDirectory() as folder:  # the backup may need an upgrade, so it is copied first
+    with TemporaryDirectory() as folder:  # upgrading must not change the original file
         copy = shutil.copyfile(path, Path(folder, "backup.db"))
         source, target = Database(f"sqlite:///{copy}"), Database(url)
         try:
@@ -101,7 +101,7 @@ async def _copy(source: Database, target: Database) -> None:
                         rows = []
                 if rows:
                     await writing.execute(insert(table), rows)
-                if target.kind == "postgresql":  # PostgreSQL's sequences are not advanced by inserted ids
+                if target.kind == "postgresql":  # explicit ids do not advance PostgreSQL's sequences
                     last = (await writing.execute(select(func.max(table.c.id)))).scalar() or 0
                     after = f"pg_get_serial_sequence('{table.name}', 'id'), {last + 1}, false"
                     await writing.execute(text(f"SELECT setval({after})"))

@@ -29,9 +29,9 @@ PRAGMAS = (
     "PRAGMA journal_mode = WAL",
     "PRAGMA synchronous = FULL",  # makes commits durable
     "PRAGMA foreign_keys = ON",
-    "PRAGMA secure_delete = ON",  # overwrites deleted rows
+    "PRAGMA secure_delete = ON",  # overwrites the content of deleted rows
 )
-# For each server setting that affects durability, the values that make commits durable.
+# Server settings that affect durability, with the values that make commits durable
 DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
     "mysql": {"@@innodb_flush_log_at_trx_commit": ("1",)},
     "postgresql": {
@@ -40,7 +40,7 @@ DURABLE: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 PATIENCE_S = 20  # timeout for locks and for new connections, in seconds
-TURN_S = 60  # timeout for a connection from the pool, in seconds
+TURN_S = 60  # timeout for obtaining a connection from the pool, in seconds
 TRIES = 9
 CONNECTIONS = 10
 TOGETHER = 64  # maximum number of writes per SQLite transaction
@@ -48,7 +48,7 @@ PAUSE_S = 0.01  # delay before a retry, in seconds; it doubles with each attempt
 
 
 class _UnknownError(StoreError):
-    """A commit failed, and it is unknown whether the data was saved."""
+    """Raised if a commit failed and it is unknown whether the data were saved."""
 
 
 class Database:
@@ -59,7 +59,7 @@ class Database:
         self.url = _parsed(url)
         self._engine = _engine(self.url)
         self._sqlite = self.kind == "sqlite"
-        # is called with the duration of each write, in seconds
+        # Callback that receives the duration of each write, in seconds
         self.on_write: Callable[[float], None] = lambda _: None
         self._turn = asyncio.Lock()  # SQLite allows only one writer at a time
         self._waiting: list[_Waiting] = []
@@ -67,7 +67,7 @@ class Database:
 
     @property
     def kind(self) -> str:
-        """Database system: `sqlite`, `mysql` (also for MariaDB) or `postgresql`."""
+        """The database system: `sqlite`, `mysql` (also for MariaDB) or `postgresql`."""
         return self.url.get_backend_name()
 
     @property
@@ -80,21 +80,21 @@ class Database:
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncConnection]:
-        """Open a connection for reading. Each statement sees everything committed before it."""
+        """Open a connection for reading. Each statement sees all data that were committed before it."""
         async with self._connection(begin="") as connection:
             yield connection
 
     @asynccontextmanager
     async def snapshot(self) -> AsyncIterator[AsyncConnection]:
-        """Open a connection for reading a consistent snapshot."""
+        """Open a connection that reads from a consistent snapshot of the database."""
         options = {"begin": "BEGIN"} if self._sqlite else {"isolation_level": "REPEATABLE READ"}
         async with self._connection(**options) as connection:
             yield connection
 
     async def scrub(self) -> None:
-        """Vacuum a SQLite file and truncate its WAL, so that neither contains deleted rows.
+        """Vacuum a SQLite file and truncate its WAL so that neither contains deleted rows.
 
-        Raises StoreError if the WAL cannot be truncated because the database is in constant use.
+        Raises StoreError if the WAL cannot be truncated because other connections are using it.
         """
         if not self._sqlite:
             return
@@ -107,7 +107,7 @@ class Database:
             )
 
     async def check(self) -> None:
-        """Raise StoreError if a SQLite file is damaged."""
+        """Raise StoreError if the database is a damaged SQLite file."""
         if self._sqlite:
             async with self._connection(begin="") as connection:
                 found = (await connection.execute(text("PRAGMA integrity_check(1)"))).scalar()
@@ -153,8 +153,8 @@ class Database:
     async def write(self, work: Callable[[AsyncConnection], Awaitable[T]]) -> T:
         """Run `work` in one transaction and return its result after the commit.
 
-        After a deadlock, a conflict or a lost connection, `work` is run again, so it must change nothing outside the
-        database. If the connection is lost during the commit, an error is raised, since the outcome is unknown.
+        After a deadlock, a conflict or a lost connection, `work` is called again, so it must have no other
+        side effects. A connection that is lost during the commit is an error, as the outcome is unknown.
 
         Raises StoreError if the database fails.
         """
@@ -171,12 +171,12 @@ class Database:
         return result
 
     async def _write_waiting(self) -> None:
-        """Run all waiting writes in groups. Each group shares a transaction, and so a single wait for the disk."""
+        """Run all queued writes in groups. Each group shares a transaction, to save disk writes."""
         while self._waiting:
             group, self._waiting = self._waiting[:TOGETHER], self._waiting[TOGETHER:]
             if len(group) > 1 and await self._write_group(group, alone=False):
                 continue
-            for one in group:  # single writes, or a group that failed as a whole
+            for one in group:  # runs a single write, or retries each write of a failed group
                 await self._write_group([one], alone=True)
 
     async def _write_group(self, group: Sequence[_Waiting], *, alone: bool) -> bool:
@@ -190,7 +190,7 @@ class Database:
                     done.set_exception(error)
         else:
             for (_, done), result in zip(group, results, strict=True):
-                if not done.done():  # the caller may have been cancelled
+                if not done.done():  # the future is done if the caller was cancelled
                     done.set_result(result)
         return True
 
@@ -252,7 +252,7 @@ def _engine(url: URL) -> AsyncEngine:
             connect_args={"timeout": PATIENCE_S, "async_creator_fn": sqlite_connection},
             pool_timeout=TURN_S,
             pool_size=CONNECTIONS,
-            max_overflow=0,  # each connection has a thread; waiting for a free one is faster than starting one
+            max_overflow=0,  # waiting for a free connection is faster than starting a new thread
         )
         event.listen(engine.sync_engine, "connect", _prepare)
         event.listen(engine.sync_engine, "begin", _begin)
@@ -277,7 +277,7 @@ def _prepare(connection: Any, record: Any) -> None:  # noqa: ARG001
 
 
 def _begin(connection: Connection) -> None:
-    """Start a transaction. Writers take the lock immediately, since SQLite may refuse it after a read."""
+    """Begin a transaction. Writers lock the database immediately, because SQLite may refuse a later lock."""
     if statement := connection.get_execution_options()["begin"]:
         connection.exec_driver_sql(statement)
 
@@ -288,5 +288,5 @@ async def _pause(attempt: int) -> None:
 
 
 def _again(error: SQLAlchemyError, attempt: int) -> bool:
-    """Return True if a retry may succeed. A violated constraint is retried once, as two writers may have collided."""
+    """Return True if a retry may succeed. A constraint violation may be a race, so it is retried once."""
     return passes(error) or (isinstance(error, IntegrityError) and attempt == 1)

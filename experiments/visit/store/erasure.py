@@ -1,4 +1,4 @@
-"""Erase participants, or only the data that identifies them."""
+"""Delete all data of participants, or only the data that identify them."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -13,21 +13,21 @@ from experiments.visit.store.ledger import by_key, events_of, paid
 from experiments.visit.store.part import StorePart, lock_study, note
 from experiments.visit.store.values import utc_now
 
-# Tables with data of participants, in an order in which rows can be deleted without violating foreign keys.
+# Tables with participants' data, in an order that allows deletion without violating foreign keys.
 OWN = (tables.answer, tables.trial, tables.phase, tables.assignment, tables.identity, tables.payment)
 
 
 class Erasure(StorePart):
-    """Store methods that delete data of participants."""
+    """Store methods that delete participants' data."""
 
     async def erase(
         self, person_id: int, who: str, now: datetime | None = None, *, unpaid: bool = False
     ) -> None:
         """Delete all rows of a participant. The audit log keeps the participant's number and payments.
 
-        The caller must delete the data in visit folders, backups and exports. SQLite overwrites deleted rows at once,
-        MariaDB and PostgreSQL at their next clean-up. With `unpaid`, payments may still be owed, as is the case in a
-        backup that is older than the payment.
+        The caller must delete the data in visit folders, backups and exports. SQLite overwrites deleted rows
+        immediately. MariaDB and PostgreSQL overwrite them at the next clean-up. Set `unpaid` to erase a
+        participant to whom payments are owed, for example in a backup that is older than the payment.
 
         Raises:
             StoreError: There is no such participant, or a payment is still owed.
@@ -57,7 +57,7 @@ class Erasure(StorePart):
         await self._database.scrub()
 
     async def known(self, before: datetime) -> tuple[int, ...]:
-        """Return the numbers of identifiable participants who have been inactive since `before`."""
+        """Return the numbers of participants with identifying data who have been inactive since `before`."""
         mine = (tables.person.c.study_id == self._study_id, tables.person.c.seen < before)
         recognised = tables.identity.c.id.is_not(None) | tables.person.c.platform_key.is_not(None)
         query = select(tables.person.c.id).outerjoin(tables.identity).where(*mine, recognised)
@@ -66,12 +66,12 @@ class Erasure(StorePart):
             return tuple((await connection.execute(query)).scalars())
 
     async def forget(self, person_ids: Sequence[int], names: Sequence[str], who: str) -> None:
-        """Delete data that identifies participants: platform ids, keys, links and receipts of payments.
+        """Delete the data that identify participants: platform ids, keys, links and payment receipts.
 
         Measures, answers and amounts are kept. The links stop working, and the participants could take part again.
 
         Args:
-            names: New name of each participant's folder, in the same order, which replaces the hash of the link.
+            names: New names of the participants' folders, in the same order. They replace the link hashes.
         """
         now = utc_now()
 

@@ -1,4 +1,4 @@
-"""Classify database errors, and explain their causes and remedies."""
+"""Classify database errors, and explain what causes them and how to fix them."""
 
 from sqlalchemy.exc import DBAPIError, IntegrityError, SQLAlchemyError, TimeoutError
 
@@ -10,7 +10,7 @@ PASSING = {
     "40001",  # PostgreSQL: serialization failure
     "40P01",  # PostgreSQL: deadlock
 }
-# MariaDB error numbers, PostgreSQL SQLSTATE codes or parts of messages, each with its cause and remedy
+# Error numbers of MariaDB, SQLSTATE codes of PostgreSQL or parts of messages, and the text that explains each
 MEANINGS = (
     (
         ("1045", "1044", "28P01", "42501", "authentication failed", "FATAL:  role", "pg_hba.conf"),
@@ -33,14 +33,14 @@ MEANINGS = (
 
 
 def passes(error: SQLAlchemyError) -> bool:
-    """Return True if the transaction may succeed when it is retried."""
+    """Return True if the error is temporary, so that the transaction may succeed when it is retried."""
     if not isinstance(error, DBAPIError):
         return False
     return error.connection_invalidated or bool(_codes(error) & PASSING) or _meaning(error) == UNREACHABLE
 
 
 def advice(error: SQLAlchemyError, database: str) -> str:
-    """Return an error message with the cause and the remedy."""
+    """Return an error message that explains the cause and how to fix it."""
     if isinstance(error, TimeoutError):
         return (
             f"The database {database} is busy: every connection is in use. Try again, or let fewer people in."

@@ -1,6 +1,6 @@
-"""Coordinate several hosts that share a database, by heartbeats and by assigning visits to hosts.
+"""Coordinate several hosts that share a database. Hosts send heartbeats, and each visit belongs to one host.
 
-Times are measured by the database's clock, since the hosts' clocks may be wrong.
+Times are measured with the database's clock, because the clocks of the hosts may be wrong.
 """
 
 from datetime import datetime, timedelta
@@ -13,9 +13,9 @@ from experiments.visit.store.part import StorePart, database_now, note
 from experiments.visit.store.tables import assignment, host, person
 from experiments.visit.store.values import Host
 
-LEASE = timedelta(seconds=60)  # time after the last successful heartbeat when a host ends its sessions
-SILENT = timedelta(seconds=90)  # time after the last heartbeat when a host's visits may be handed over
-HANDED_OVER = "-"  # replaces the host's name if any host with the journal may take over the visit
+LEASE = timedelta(seconds=60)  # time without a successful heartbeat after which a host ends its sessions
+SILENT = timedelta(seconds=90)  # time without a heartbeat after which a host's visits may be handed over
+HANDED_OVER = "-"  # host name of a visit that any host with the journal may take over
 
 
 class Hosts(StorePart):
@@ -40,16 +40,16 @@ class Hosts(StorePart):
             return tuple(Host(*row) for row in await connection.execute(query.order_by(host.c.name)))
 
     async def claim(self, person_id: int, name: str, *, new: bool, journal: bool) -> bool:
-        """Assign a participant's visit to a host if possible. Return True if it is assigned to this host.
+        """Claim a participant's visit for a host if possible. Return True if the visit belongs to this host.
 
         Args:
             new: True if the host accepts new visits.
-            journal: True if the journal of the visit is on the host.
+            journal: True if the host has the journal of the visit.
         """
         may = [person.c.host == name]
         if journal:
             may += [person.c.host.is_(None), person.c.host == HANDED_OVER]
-        elif new:  # the journal of a participant with a place is on another host
+        elif new:  # if the participant has a place, another host has the journal
             may += [person.c.host.is_(None) & ~exists().where(assignment.c.person_id == person.c.id)]
 
         async def work(connection: AsyncConnection) -> bool:
@@ -59,7 +59,7 @@ class Hosts(StorePart):
         return await self._database.write(work)
 
     async def drain(self, name: str, draining: bool, who: str) -> None:
-        """Stop or allow new visits on a host. Visits that have begun continue."""
+        """Stop or allow new visits on a host. Visits that have already begun are not affected."""
 
         async def work(connection: AsyncConnection) -> None:
             mine = (host.c.study_id == self._study_id, host.c.name == name)
@@ -73,9 +73,9 @@ class Hosts(StorePart):
         await self._database.write(work)
 
     async def hand_over(self, name: str, who: str, now: datetime | None = None) -> int:
-        """Let other hosts continue the visits of a failed host if they have the journals. Return the number of visits.
+        """Allow other hosts to take over the visits of a failed host. Return the number of visits.
 
-        Raises StoreError if the host may still be running.
+        The other host must have the journal of the visit. Raises StoreError if the host may still be running.
         """
 
         async def work(connection: AsyncConnection) -> int:

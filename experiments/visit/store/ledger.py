@@ -1,8 +1,8 @@
-"""Ledger of payments to participants, an append-only list of events that determines which payments are owed.
+"""Record payments to participants in an append-only ledger, which determines the payments that are owed.
 
 Every payment has a key. The event `sending` is written before the request is sent to the platform. If no event follows,
-for example after a crash, the payment is in doubt, and the platform must be asked about the key before another request.
-Times are measured by the database's clock.
+for example after a crash, the payment is in doubt. The platform must then be asked about the key before the
+payment is requested again. Times are measured with the database's clock.
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from experiments.visit.store.part import StorePart, database_now, lock_study
 from experiments.visit.store.tables import payment, person
 from experiments.visit.store.values import PaymentEvent, PaymentKind
 
-# types of payments that exclude each other: a participant receives at most one of them
+# A participant receives at most one payment of these types.
 ONCE: tuple[PaymentKind, ...] = ("reward", "screen_out", "partial")
 IN_DOUBT_AFTER = timedelta(minutes=10)
 _FIELDS = [column for column in payment.c if column.name != "study_id"]
 
 
 class Ledger(StorePart):
-    """Records payment events, which are never changed afterwards."""
+    """A ledger of payment events, which are never changed after they have been recorded."""
 
     async def decide(
         self,
@@ -71,9 +71,9 @@ class Ledger(StorePart):
     async def begin_sending(self, key: str, now: datetime | None = None) -> int | None:
         """Record a new attempt to send a payment. Return its number, or None if the payment must not be sent now.
 
-        This is the case if it is paid or another attempt has no known outcome. Send the request to the platform
-        immediately, with a timeout well below ten minutes. After ten minutes, :meth:`owed` returns the payment to other
-        callers, who ask the platform about its key.
+        It must not be sent if it has been paid or the outcome of another attempt is unknown. Send the request
+        to the platform immediately, with a timeout well below ten minutes. After ten minutes, :meth:`owed`
+        returns the payment to other callers, who ask the platform about its key.
         """
 
         async def work(connection: AsyncConnection) -> int | None:
@@ -89,7 +89,7 @@ class Ledger(StorePart):
     async def confirm(
         self, key: str, attempt: int, reference: str, note: str = "", now: datetime | None = None
     ) -> bool:
-        """Record that the platform has paid, with its reference. Return False if this is already recorded."""
+        """Record that the platform has made a payment. Return False if this has already been recorded."""
 
         async def work(connection: AsyncConnection) -> bool:
             events = await self._known(connection, key)
@@ -119,10 +119,10 @@ class Ledger(StorePart):
     async def owed(
         self, now: datetime | None = None, in_doubt_after: timedelta = IN_DOUBT_AFTER
     ) -> tuple[PaymentEvent, ...]:
-        """Return the last event of each unconfirmed payment, except those that another process has begun to send.
+        """Return the last event of each unconfirmed payment, except for those that are currently being sent.
 
-        If the event is `sending`, the payment is in doubt. Ask the platform about the key, then call :meth:`confirm` or
-        :meth:`fail`.
+        If the event is `sending`, the payment is in doubt. Ask the platform about the key, and then call
+        :meth:`confirm` or :meth:`fail`.
         """
         limit = (now or await self.now()) - in_doubt_after
         payments = by_key(await self.history()).values()
@@ -130,12 +130,12 @@ class Ledger(StorePart):
         return tuple(last for last in unpaid if not last.in_doubt or last.at <= limit)
 
     async def now(self) -> datetime:
-        """Return the current time of the database's clock, which timestamps events."""
+        """Return the current time of the database's clock, which is also used to timestamp events."""
         async with self._database.reading() as connection:
             return await database_now(connection)
 
     async def history(self, person_id: int | None = None) -> tuple[PaymentEvent, ...]:
-        """Return the events of all participants or of one, in order."""
+        """Return the payment events of one or all participants, in order."""
         which = [payment.c.study_id == self._study_id]
         if person_id is not None:
             which.append(payment.c.person_id == person_id)
@@ -149,7 +149,7 @@ class Ledger(StorePart):
         return events
 
     async def _events(self, connection: AsyncConnection, key: str) -> Sequence[PaymentEvent]:
-        """Lock the study so that no other process adds events, and return the events of a key."""
+        """Lock the study so that no other process can add events, and return the events of a payment."""
         await lock_study(connection, self._study_id)
         return await events_of(connection, payment.c.study_id == self._study_id, payment.c.key == key)
 
@@ -215,5 +215,5 @@ def by_key(events: Sequence[PaymentEvent]) -> dict[str, list[PaymentEvent]]:
 
 
 def paid(events: Sequence[PaymentEvent]) -> bool:
-    """Return True if a payment's events include a confirmation by the platform."""
+    """Return True if one of a payment's events confirms that the platform has paid."""
     return any(event.event == "confirmed" for event in events)

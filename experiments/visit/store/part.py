@@ -1,4 +1,4 @@
-"""Base class of the store's parts."""
+"""The base class for all parts of the store."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -18,7 +18,7 @@ _NOW = {
 
 
 class StorePart:
-    """A part of the store, with access to the rows of one study."""
+    """A base class for groups of store methods, which access the rows of one study."""
 
     def __init__(self, database: Database, study_id: int) -> None:
         self._database, self._study_id = database, study_id
@@ -35,7 +35,7 @@ async def database_now(connection: AsyncConnection) -> datetime:
 
 
 async def lock_study(connection: AsyncConnection, study_id: int) -> dict[str, int]:
-    """Lock the study's row until the transaction ends, and return the quotas that were changed, by cell."""
+    """Lock the study's row until the transaction ends. Return all quotas that have been changed, by cell."""
     query = select(tables.study.c.quotas).where(tables.study.c.id == study_id).with_for_update()
     return dict((await connection.execute(query)).scalar_one())
 

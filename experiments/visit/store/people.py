@@ -1,4 +1,4 @@
-"""Store the arrival, activity and platform ids of participants."""
+"""Store participants, the times of their last activity, and their platform ids."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,7 +25,7 @@ _FIELDS = (
     person.c.delete_wanted,
     person.c.host,
 )
-# Queries are built only once, because building one takes as long as running it.
+# This query is built at import, because building a query takes as long as running it.
 _FIND = select(*_FIELDS).where(
     person.c.study_id == bindparam("study"), person.c.token_hash == bindparam("token")
 )
@@ -43,7 +43,7 @@ class People(StorePart):
         phase: str,
         now: datetime | None = None,
     ) -> PersonRow:
-        """Find the participant who arrives with a link, or add a new one.
+        """Return the participant who has opened a link. Add a new participant if necessary.
 
         Returning participants keep the token hash of their first arrival, so the token must be derived from the key.
 
@@ -90,7 +90,7 @@ class People(StorePart):
             return None if row is None else PersonRow(*row)
 
     async def person(self, person_id: int) -> PersonRow:
-        """Return the participant with a number. Raises StoreError if there is none."""
+        """Return the participant with this number. Raises StoreError if there is no such participant."""
         async with self._database.reading() as connection:
             row = (await connection.execute(self._select(person.c.id == person_id))).first()
         if row is None:
@@ -106,13 +106,13 @@ class People(StorePart):
             return tuple(PersonRow(*row) for row in await connection.execute(query.order_by(person.c.id)))
 
     async def identity(self, person_id: int) -> dict[str, str]:
-        """Return a participant's platform ids, which are only needed for payment. Empty if they have been deleted."""
+        """Return a participant's platform ids, or an empty dictionary if they have been deleted."""
         query = select(ids.c.ids).where(ids.c.person_id == person_id)
         async with self._database.reading() as connection:
             return dict((await connection.execute(query)).scalar() or {})
 
     async def beat(self, person_id: int, now: datetime | None = None) -> None:
-        """Record that a participant is active and keeps the assigned place."""
+        """Record that a participant is active, so that the participant's place is not given away."""
         now = now or utc_now()
 
         async def work(connection: AsyncConnection) -> None:

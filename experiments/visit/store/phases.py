@@ -1,4 +1,4 @@
-"""Store the progress of participants: phases, answers, trials and the final status."""
+"""Store the phases, answers, trials and final status of each participant."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -14,7 +14,7 @@ from experiments.visit.store.tables import answer, identity, person, trial
 from experiments.visit.store.tables import phase as phases
 from experiments.visit.store.values import ACTIVE, Answer, PhaseRow, Status, TrialRow, utc_now
 
-# Queries are built only once, because building one takes as long as running it.
+# These queries are built at import, because building a query takes as long as running it.
 _PHASE = select(*[column for column in phases.c if column.name != "id"]).where(
     phases.c.person_id == bindparam("person"), phases.c.name == bindparam("phase")
 )
@@ -72,7 +72,7 @@ class Phases(StorePart):
     ) -> bool:
         """Advance a participant to the next phase and make the answers final, in one transaction.
 
-        Return False if the participant is no longer in the phase, for example after submitting its form twice.
+        Return False if the participant has already left the phase, for example if a form is submitted twice.
 
         Args:
             answers: Answers by item, which replace answers saved earlier.
@@ -120,7 +120,7 @@ class Phases(StorePart):
     async def finish_trial(
         self, person_id: int, phase: str, folder: str, ended: str, now: datetime | None = None
     ) -> None:
-        """Record that a trial has ended, and where its run directory is, relative to the study's folder."""
+        """Record that a trial has ended. `folder` is its run directory, relative to the study's folder."""
         values = {"folder": folder, "ended": ended, "finished": now or utc_now()}
 
         async def work(connection: AsyncConnection) -> None:
@@ -224,7 +224,7 @@ class Endings(StorePart):
         return await self._database.write(work)
 
     async def time_out(self, before: datetime) -> int:
-        """Time out participants inactive since `before` and release their places. Return how many there were."""
+        """Time out all participants who have been inactive since `before`, and return their number."""
         gone = (person.c.study_id == self._study_id, person.c.status.in_(ACTIVE), person.c.seen < before)
 
         async def work(connection: AsyncConnection) -> int:
@@ -237,7 +237,7 @@ class Endings(StorePart):
         return await self._database.write(work)
 
     async def withdraw(self, person_id: int, delete: bool, now: datetime | None = None) -> bool:
-        """Withdraw a participant, who may have finished already. Return False if nothing changed.
+        """Withdraw a participant, who may already have finished the study. Return False if nothing changed.
 
         With `delete`, the answers are deleted immediately and the place is released. The number and platform ids are
         kept until all payments are made and :meth:`Store.erase` is called.
@@ -264,9 +264,9 @@ class Endings(StorePart):
 async def end(
     connection: AsyncConnection, study_id: int, person_id: int, status: Status, *, keep_finished: bool = True
 ) -> None:
-    """Set a participant's final status, and keep or release the place accordingly. The study must be locked."""
+    """Set a participant's final status, and keep or release their place. The study must be locked."""
     await connection.execute(update(person).where(person.c.id == person_id).values(status=status))
-    if status == "no_consent":  # without payments, ids are not needed
+    if status == "no_consent":  # the ids are only needed for payments
         await connection.execute(delete_rows(identity).where(identity.c.person_id == person_id))
     place = await place_of(connection, person_id)
     if place is None:
@@ -276,5 +276,5 @@ async def end(
             await set_place(connection, person_id, "released")
     elif place.state == "held":
         await set_place(connection, person_id, "finished")
-    else:  # the place was released, and another participant may have it now
+    else:  # the place was released, so another participant may have it now
         await take_back(connection, study_id, place, "finished")

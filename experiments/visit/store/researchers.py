@@ -1,4 +1,4 @@
-"""Store accounts of researchers, with passwords, roles and revocable logins."""
+"""Store the accounts of researchers, with passwords, roles and logins that can be revoked."""
 
 import asyncio
 import re
@@ -65,7 +65,7 @@ class Researchers:
     async def check(self, name: str, password: str) -> Researcher | None:
         """Return the researcher with these credentials, or None if they are wrong or the account is disabled.
 
-        Unknown names take as long as known ones. The caller must limit the number of attempts.
+        The check takes the same time for unknown names. The caller must limit the number of attempts.
         """
         row = await self._row(name) if NAME.fullmatch(name) else None
         if row is None:
@@ -88,7 +88,7 @@ class Researchers:
         disabled: bool | None = None,
         now: datetime | None = None,
     ) -> None:
-        """Change a researcher's password, role or access, and revoke all logins of the researcher."""
+        """Change a researcher's password, role or access. All logins of the researcher are revoked."""
         values: dict[str, object] = {}
         if password is not None:
             values["password"] = await self._hash(password)
@@ -113,7 +113,7 @@ class Researchers:
     async def log_in(
         self, researcher_id: int, token_hash: str, expires: datetime, now: datetime | None = None
     ) -> None:
-        """Add a login. Only the SHA-256 of its token is stored."""
+        """Record a login. Only the SHA-256 of the login's token is stored."""
         values = {"researcher_id": researcher_id, "token_hash": token_hash, "expires": expires}
 
         async def work(connection: AsyncConnection) -> None:

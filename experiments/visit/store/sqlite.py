@@ -1,4 +1,4 @@
-"""SQLite connections for an event loop. Fast statements run without a thread, which saves time."""
+"""SQLite connections for asyncio. To save time, fast statements run directly in the event loop."""
 
 import sqlite3
 from collections.abc import Callable
@@ -11,7 +11,7 @@ SLOW = ("Connection.commit", "Connection.close")
 
 
 class SqliteConnection(aiosqlite.Connection):
-    """Connection that uses its thread only for operations that may wait for a lock or the disk.
+    """A connection that only uses a thread for operations that may wait for a lock or the disk.
 
     In WAL mode, reads never wait, and neither do writes, because their transaction already has the lock.
     """
@@ -25,7 +25,7 @@ class SqliteConnection(aiosqlite.Connection):
 
 
 def sqlite_connection(database: str, **options: Any) -> SqliteConnection:
-    """Create a connection that is not open yet, as SQLAlchemy's `async_creator_fn` requires."""
+    """Create an unopened connection, as required for SQLAlchemy's `async_creator_fn`."""
     connection = SqliteConnection(
         lambda: sqlite3.connect(database, **{**options, "check_same_thread": False}), iter_chunk_size=64
     )

@@ -1,4 +1,4 @@
-"""Store of a study's participants, progress, answers and payments."""
+"""The store, which contains the participants, progress, answers and payments of a study."""
 
 import sqlite3
 from collections.abc import Awaitable, Callable, Mapping
@@ -76,7 +76,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
         )
 
     async def backup(self, path: Path) -> None:
-        """Write a consistent snapshot of the database to a new SQLite file. The study can continue meanwhile."""
+        """Write a consistent snapshot of the database to a new SQLite file. The study may be running."""
         await back_up(self._database, path)
 
     async def study(self) -> StudyRow:
@@ -114,7 +114,7 @@ class Store(People, Assignments, Phases, Endings, Erasure, Hosts):
 
 
 async def change_database(path: Path, study_name: str, work: Callable[[Store], Awaitable[bool]]) -> bool:
-    """Apply `work` to a study in a SQLite file, such as a backup, and return the result.
+    """Call `work` with the store of a study in a SQLite file, such as a backup, and return the result.
 
     Raises StoreError if the file cannot be read or changed.
     """

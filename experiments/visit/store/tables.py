@@ -1,4 +1,4 @@
-"""Tables of a study's database. Migrations create the same tables, which a test checks."""
+"""Table definitions of a study's database. A test checks that the migrations create the same tables."""
 
 import json
 from datetime import UTC, datetime
@@ -28,7 +28,7 @@ HASH = 64  # length of a SHA-256, in hexadecimal digits
 
 
 class Utc(TypeDecorator[datetime]):
-    """Column type for times with a timezone. They are stored in UTC, since SQLite and MariaDB store no timezones."""
+    """A column type for times with a timezone. They are stored in UTC, as some databases lack timezones."""
 
     impl = DateTime().with_variant(mysql.DATETIME(fsp=6), "mysql")
     cache_ok = True
@@ -46,7 +46,7 @@ class Utc(TypeDecorator[datetime]):
 
 
 class Json(TypeDecorator[Any]):
-    """Column type for JSON values. They are stored as ASCII, which every database preserves."""
+    """A column type for JSON values. They are stored as ASCII text, which every database preserves."""
 
     impl = Text().with_variant(mysql.MEDIUMTEXT(), "mysql")
     cache_ok = True

@@ -1,4 +1,4 @@
-"""Migrate a database to the current schema, in one process at a time."""
+"""Migrate a database to the current schema. A lock prevents two processes from migrating it at once."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from experiments.visit.store.tables import metadata
 
 MIGRATIONS = Path(__file__).parent / "migrations"
 VERSIONS = "alembic_version"
-LOCK = 7_303_014  # arbitrary number of the lock that all upgrading processes use
+LOCK = 7_303_014  # arbitrary number that identifies the lock for upgrades
 
 
 async def upgrade(database: Database, migrations: Path = MIGRATIONS) -> None:

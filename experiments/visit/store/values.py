@@ -1,4 +1,4 @@
-"""Immutable values that the store accepts and returns."""
+"""Immutable data classes that the store accepts and returns."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class StudyRow:
 
     Attributes:
         file_hash: SHA-256 of the study file when the database was last opened.
-        quotas: Numbers of participants wanted, for cells in which they differ from the study file.
+        quotas: Target numbers of participants, for all cells in which they differ from the study file.
     """
 
     id: int
@@ -67,7 +67,7 @@ class PersonRow:
 
 @dataclass(frozen=True)
 class Host:
-    """One of several hosts that serve a study."""
+    """One of several hosts that serve the same study."""
 
     name: str
     seen: datetime
@@ -76,7 +76,7 @@ class Host:
 
 @dataclass(frozen=True)
 class PhaseRow:
-    """A phase of a participant's visit. `ended` and the following fields are None until the phase has ended."""
+    """A phase of a participant's visit. `ended` and all later fields are None until the phase has ended."""
 
     person_id: int
     name: str
@@ -101,7 +101,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class TrialRow:
-    """A trial that has been played. `folder` is its run directory, relative to the study's folder."""
+    """A completed trial. `folder` is its run directory, relative to the study's folder."""
 
     person_id: int
     phase: str
@@ -112,7 +112,7 @@ class TrialRow:
 
 @dataclass(frozen=True)
 class AuditRow:
-    """An entry of the audit log."""
+    """An entry in the audit log."""
 
     id: int
     at: datetime
@@ -123,19 +123,19 @@ class AuditRow:
 
 @dataclass(frozen=True)
 class CellQuota:
-    """The number of participants wanted in a cell, and the house seeds that they are given in turn."""
+    """The target number of participants in a cell, and the house seeds that are assigned to them in turn."""
 
     wanted: int
     house_seeds: Sequence[int]
 
     def house_seed(self, place: int) -> int:
-        """Return the house seed of a place in the cell, counted from 0."""
+        """Return the house seed for a place in the cell. Places are numbered from 0."""
         return self.house_seeds[place % len(self.house_seeds)]
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """A participant's place in a cell of the design, and the seeds of its trials. `cell` and `place` count from 0."""
+    """A participant's place in a cell of the design, and the trial seeds. Places are numbered from 0."""
 
     person_id: int
     cell: int
@@ -149,7 +149,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class CellCount:
-    """Numbers of places in a cell, by state. `held` includes abandoned places that are not reassigned yet."""
+    """The numbers of places in a cell, by state. Abandoned places are `held` until they are reassigned."""
 
     held: int = 0
     finished: int = 0
@@ -158,7 +158,7 @@ class CellCount:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of participants by status, of active participants by phase, and of places by cell."""
+    """The numbers of participants by status, of active participants by phase, and of places by cell."""
 
     statuses: Mapping[str, int]
     phases: Mapping[str, int]
@@ -167,7 +167,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class PaymentEvent:
-    """An event in the ledger of payments.
+    """An event in the payment ledger.
 
     Attributes:
         key: Permanent key of the payment.
@@ -190,7 +190,7 @@ class PaymentEvent:
 
     @property
     def in_doubt(self) -> bool:
-        """True if it is unknown whether the platform has paid. Only meaningful for the last event of a key."""
+        """True if it is unknown whether the platform has paid. This is only meaningful for the last event."""
         return self.event == "sending"
 
 

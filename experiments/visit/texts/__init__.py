@@ -1,4 +1,4 @@
-"""Texts for participants. For each language, `experiments/texts` has a file of texts and a story."""
+"""Texts that participants read. The folder `experiments/texts` has a text file and a story per language."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ _PLACE = re.compile(r"\{(\w+)\}")
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Texts of a page, by name, and the items of its form."""
+    """The texts of a page, by name, and the items of its form."""
 
     words: dict[str, str]
     items: tuple[Item, ...] = ()
@@ -81,7 +81,7 @@ def read_texts(language: str, path: Path | None, values: Mapping[str, str]) -> T
 
 
 def story_file(language: str) -> Path | None:
-    """Return the path of a language's story, or None for English. Raises ConfigError if there is none."""
+    """Return the path of a language's story, or None for English. Raises ConfigError if it is missing."""
     if language == "en":
         return None
     path = FOLDER / f"story.{language}.md"

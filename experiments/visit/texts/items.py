@@ -1,4 +1,4 @@
-"""Items of forms, as defined in the files of texts."""
+"""Form items, which are the questions of a form. They are defined in text files."""
 
 from typing import Annotated, Any, Literal
 
@@ -13,7 +13,7 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A question in a form.
 
     Attributes:
-        name: Name of the item, from which the names of table columns are formed.
+        name: Name of the item, which is also used to name columns of exported tables.
         kind: Type of the answer: `scale` (a point from 1), `choice` or `several` (of `choices`), `number` (an integer),
             `line` or `text`.
         right: Right answer of an attention or comprehension check. For a scale, this is the number of the point.
@@ -44,7 +44,7 @@ class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.right is not None and answer != self.right
 
     def example(self) -> str:
-        """Return a valid answer as the text of a form field. It is the right answer if the item has one."""
+        """Return a valid answer as form input. If the item has a right answer, return the right answer."""
         if self.right is not None:
             return str(self.right)
         match self.kind:

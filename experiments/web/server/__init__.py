@@ -1,4 +1,4 @@
-"""Server of live trials: WebSockets, sessions, the queue for slots, and the pool of workers.
+"""The server for live trials, with WebSockets, sessions, a queue for slots, and a pool of workers.
 
-The server validates all messages from browsers. Simulation takes place in the workers.
+The server validates all messages from browsers. The workers run the simulations.
 """

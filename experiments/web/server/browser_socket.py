@@ -1,4 +1,4 @@
-"""WebSocket of a browser, which validates messages and never waits for a slow browser."""
+"""The WebSocket connection to a browser. It validates messages and never waits for a slow browser."""
 
 import asyncio
 import time
@@ -13,11 +13,11 @@ from experiments.web.protocol import BEAT_PERIOD, Beat, Error, Hello, Inputs, Oc
 from experiments.web.server.played_session import PlayedSession
 from experiments.web.state import OVER, State, WireMessage
 
-HELLO_TIMEOUT = 10.0  # timeout for the first message, in seconds
+HELLO_TIMEOUT = 10.0  # timeout for receiving the first message, in seconds
 OCCUPIED_TIMEOUT = 60.0  # timeout for the reply to `occupied`, in seconds
 CLOSE_TIMEOUT = 0.5  # how long to wait for a connection to close, in seconds
 MAX_WAITING = 300  # maximum number of messages in the send queue
-RATE, BURST = 200.0, 1200.0  # maximum number of messages and inputs per second, and in a burst
+RATE, BURST = 200.0, 1200.0  # maximum numbers of messages and inputs per second and in a burst
 MAX_ERRORS = 50  # number of rejected messages after which a connection is closed
 
 
@@ -32,7 +32,7 @@ class BrowserSocket:
         self._errors = 0
 
     def send(self, message: WireMessage) -> None:
-        """Queue a message. Disconnect a browser that falls behind."""
+        """Queue a message. If the queue is full, disconnect the browser."""
         waiting = self._waiting.qsize()
         if waiting < MAX_WAITING:
             self._waiting.put_nowait(message)
@@ -51,7 +51,7 @@ class BrowserSocket:
             await asyncio.wait((sending, receiving), return_when=asyncio.FIRST_COMPLETED)
             session.detach(self)
             self.close(protocol.REFUSED, "")
-            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # until the last message is sent
+            await asyncio.wait([sending], timeout=CLOSE_TIMEOUT)  # waits until the last message is sent
         finally:
             session.detach(self)
             for task in (sending, receiving, beating):
@@ -76,7 +76,7 @@ class BrowserSocket:
                     await task
 
     async def _send_all(self) -> None:
-        with suppress(WebSocketDisconnect, RuntimeError, OSError):  # the browser has disconnected
+        with suppress(WebSocketDisconnect, RuntimeError, OSError):  # raised if the browser has disconnected
             while isinstance(item := await self._waiting.get(), WireMessage):
                 if isinstance(item, protocol.FrameMessage):
                     await self._socket.send_bytes(item.packed())

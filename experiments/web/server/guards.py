@@ -1,4 +1,4 @@
-"""Checks of requests, response headers and limits on connections."""
+"""Request checks, response headers and connection limits of the web servers."""
 
 import asyncio
 import re
@@ -40,11 +40,11 @@ POLICY = (
 )
 MAX_FIELDS = 500
 REQUEST_TIMEOUT = 10.0  # timeout for receiving a complete request, in seconds
-MAX_OPEN = 2000  # maximum number of open connections, without WebSockets
+MAX_OPEN = 2000  # maximum number of open connections, not counting WebSockets
 
 
 def allowed_hosts(host: str, public: str | None) -> Sequence[str]:
-    """Return the host names accepted by a server at `host`. Others are rejected to prevent DNS rebinding."""
+    """Return the host names that a server at `host` accepts. Rejecting others prevents DNS rebinding."""
     addresses = {host, "127.0.0.1", "::1"}
     if host in ("0.0.0.0", "::"):
         addresses |= _own_addresses()
@@ -58,11 +58,11 @@ def _own_addresses() -> set[str]:
     for family, target in ((socket.AF_INET, "192.0.2.1"), (socket.AF_INET6, "2001:db8::1")):
         try:
             with socket.socket(family, socket.SOCK_DGRAM) as probe:
-                probe.connect((target, 9))  # selects the outgoing interface, but sends no packet
+                probe.connect((target, 9))  # selects the outgoing interface without sending a packet
                 found.add(str(probe.getsockname()[0]))
             found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, family)}
         except OSError:
-            continue  # no network with this type of address
+            continue  # the machine has no network with this address family
     return found
 
 
@@ -129,7 +129,7 @@ class Guards:
         return machine_of(peer)
 
     def _origin(self, host: str) -> str:
-        """Return the origin of pages served for a `Host` header, or an empty string if the header is not valid."""
+        """Return the origin that a `Host` header implies, or an empty string if the header is not valid."""
         if not HOST.fullmatch(host):
             return ""
         public = host == self._public.netloc and self._public.scheme == "https"
@@ -137,7 +137,7 @@ class Guards:
 
 
 class Rate:
-    """Rate limit of `count` requests per address in `period` seconds."""
+    """A rate limit of `count` requests per address within `period` seconds."""
 
     def __init__(self, count: int, period: float) -> None:
         self._count, self._period = count, period
@@ -161,12 +161,12 @@ def address_of(text: str) -> Address | None:
 
 
 def machine_of(address: Address | None) -> str:
-    """Return an IPv4 address, or the /64 network of an IPv6 address, whose addresses can all belong to one machine."""
+    """Return an IPv4 address, or the /64 network of an IPv6 address, as one machine may use all of it."""
     return str(ip_network((address, 64), strict=False) if isinstance(address, IPv6Address) else address)
 
 
 async def _whole(receive: Receive) -> Receive | None:
-    """Read the whole request body. Return a `receive` function that yields it, or None if the client disconnected."""
+    """Read the request body. Return a `receive` function for it, or None if the client has disconnected."""
     body = b""
     while (message := await receive())["type"] == "http.request":
         body += message.get("body", b"")
@@ -198,7 +198,7 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
     for name, value in HEADERS.items():
         headers[name] = value
     if embedded_by:
-        del headers["X-Frame-Options"]  # this header cannot allow other sites
+        del headers["X-Frame-Options"]  # this header cannot allow individual sites
     headers.setdefault("Cache-Control", cache)
     headers["Content-Security-Policy"] = POLICY.format(
         sockets=origin.replace("http", "ws", 1),
@@ -208,7 +208,7 @@ def _add_headers(headers: MutableHeaders, origin: str, cache: str, embedded_by: 
 
 
 async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
-    """Return the fields of a submitted form, or no fields if the form is malformed or too large."""
+    """Return the fields of a submitted form, or an empty mapping if the form is malformed or too large."""
     text = (await request.body()).decode("utf-8", "replace")
     try:
         return ImmutableMultiDict(parse_qsl(text, keep_blank_values=True, max_num_fields=MAX_FIELDS))
@@ -217,7 +217,10 @@ async def sent_form(request: Request) -> ImmutableMultiDict[str, str]:
 
 
 class TimedConnection(H11Protocol):
-    """A uvicorn connection with timeouts. If there are too many, the busiest address loses its oldest connection."""
+    """A uvicorn connection with timeouts and an overall limit on the number of connections.
+
+    If the limit is exceeded, the oldest connection of the address with the most connections is closed.
+    """
 
     _open: ClassVar[dict["TimedConnection", str]] = {}  # address of each open connection, oldest first
     _timer: asyncio.TimerHandle | None = None
@@ -242,7 +245,7 @@ class TimedConnection(H11Protocol):
             self._watch()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Exempt the connection, because WebSockets have separate limits."""
+        """Exempt a WebSocket connection from the limits, because WebSockets have limits of their own."""
         self._forget()
         super().handle_websocket_upgrade(event)
 

@@ -1,4 +1,4 @@
-"""Limit on concurrent sessions, and the queue of pages that wait for a slot."""
+"""Limit the number of concurrent sessions, and queue the pages that wait for a slot."""
 
 import time
 from collections import deque
@@ -6,14 +6,14 @@ from collections.abc import Collection
 from statistics import fmean
 
 ADMITTED_S = 60.0  # how long the slot of an admitted page is reserved, in seconds
-FORGOTTEN_S = 3600.0  # silence after which a page loses its position in the queue, in seconds
+FORGOTTEN_S = 3600.0  # time without polling after which a page loses its position in the queue, in seconds
 
 
 class SessionLimit:
-    """Limits the number of concurrent sessions, first come, first served. Every session has a name.
+    """A limit on the number of concurrent sessions. Slots are given out by name, first come, first served.
 
-    A waiting page polls for a slot by :meth:`ask`. If it stops polling, later pages may overtake it, but it regains its
-    position when it polls again. The session of an admitted page occupies the slot by :meth:`hold`.
+    A waiting page polls for a slot with :meth:`ask`. If it stops polling, later pages may overtake it, but it
+    regains its position when it polls again. The session of an admitted page then calls :meth:`hold`.
     """
 
     def __init__(self, count: int) -> None:
@@ -63,7 +63,7 @@ class SessionLimit:
         return None
 
     def hold(self, name: str) -> bool:
-        """Occupy a slot for a session until :meth:`release`. Return False if its page has to wait first."""
+        """Occupy a slot for a session until :meth:`release` is called. Return False if the page must wait."""
         self._tidy()
         if name not in self._held and (name in self._queue or len(self._present()) >= self._free):
             return False
@@ -71,7 +71,7 @@ class SessionLimit:
         return True
 
     def release(self, name: str, duration: float | None = None) -> None:
-        """Release a slot. `duration` is given if the session has ended, and is measured in seconds."""
+        """Release a slot. `duration` is the session's duration in seconds, or None if it has not ended."""
         if duration is not None:
             self._durations.append(duration)
         self._held.pop(name, None)

@@ -1,4 +1,4 @@
-"""A live session, which connects a participant, a worker and a browser."""
+"""A live session, which connects a participant's browser with a worker process."""
 
 import asyncio
 import logging
@@ -46,23 +46,23 @@ from experiments.web.state import (
 )
 
 LOG = logging.getLogger("mjsim.play")
-MAX_CRASHES = 3  # worker crashes without progress after which a session fails
-MAX_AHEAD = 1000  # maximum number of unprocessed inputs
+MAX_CRASHES = 3  # number of worker crashes without progress after which a session fails
+MAX_AHEAD = 1000  # maximum number of inputs that have not been processed
 FAILURE = "The session cannot continue at the moment. Nothing is lost: reload this page to try again."
 
 
 class Browser(Spectator, Protocol):
-    """Connection to a participant's page. `tab` is the name of the page."""
+    """The connection to a participant's page. `tab` is the name of the page."""
 
     tab: str
 
 
 class PlayedSession:
-    """Plays a participant's trials, one after the other.
+    """A session in which a participant completes trials one after the other.
 
     Attributes:
         heard: Time of the participant's last activity, as returned by `time.monotonic`.
-        display: Display quality last reported by the page, or None.
+        display: Last report on the display quality from the page, or None.
     """
 
     def __init__(
@@ -88,13 +88,13 @@ class PlayedSession:
         self._task: asyncio.Task[None] | None = None
         self._worker: WorkerProcess | None = None
         self._view: View | None = None
-        self._taken = self._step = 0  # last input on disk, and next control step
-        self._lost = False  # True if a worker died and the browser may not have noticed
+        self._taken = self._step = 0  # numbers of the last input on disk and the next control step
+        self._lost = False  # True if a worker died and the browser may not know this yet
         self._came = deque[tuple[int, float]](maxlen=MAX_AHEAD)  # numbers and arrival times of unsaved inputs
 
     @property
     def processor_time(self) -> float | None:
-        """CPU time of the worker in seconds, or None if the clock is stopped."""
+        """The CPU time of the worker in seconds, or None if the clock is stopped."""
         if self._worker is None or self.state.phase is not RUNNING:
             return None
         return self._worker.processor_time()
@@ -154,7 +154,7 @@ class PlayedSession:
         return None
 
     async def release(self) -> None:
-        """Stop the session and release its worker and slot. The journal keeps its state."""
+        """Stop the session and release its worker and slot. The state remains in the journal."""
         self.spectators.close()
         task, self._task = self._task, None
         if task is not None:
@@ -163,7 +163,7 @@ class PlayedSession:
                 await task
 
     def _lacks_some_before(self, inputs: Sequence[Input]) -> bool:
-        """Return True if earlier inputs were lost with a dead worker, so that later ones must be rejected."""
+        """Return True if inputs before these inputs were lost because a worker died."""
         return self._lost and len(inputs) > 0 and inputs[0].number > self.state.input + 1
 
     def _input_error(self, message: Inputs) -> Error | None:

@@ -1,4 +1,4 @@
-"""Interfaces between the server of live trials and the code that schedules a participant's trials."""
+"""Interfaces between the server for live trials and the code that schedules a participant's trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,12 +8,12 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class LiveTrial:
-    """A trial to be played in a browser.
+    """A trial that a participant completes in a browser.
 
     Attributes:
         run: Path of the run directory to be written.
         before: Fields of the `phase_ended` events of earlier phases.
-        leave_at: Monotonic time from which the participant may end the trial, in seconds, or infinity.
+        leave_at: Monotonic time in seconds from which the participant may end the trial. It may be infinite.
         texts: HUD texts that override those of the language.
     """
 
@@ -29,7 +29,7 @@ class LiveTrial:
 
 
 class Player(Protocol):
-    """A participant who plays trials.
+    """The interface of a participant who completes trials.
 
     Attributes:
         key: Name of the participant's slot and session, which is the same in all connections.
@@ -47,10 +47,10 @@ class Player(Protocol):
 
 
 class Meter:
-    """Receiver of session metrics. This implementation discards them."""
+    """A receiver of session metrics. This base class discards them."""
 
     def acknowledged(self, seconds: float) -> None:
-        """Record how long inputs took from their arrival until they were on disk."""
+        """Record how many seconds passed between the arrival of inputs and their storage on disk."""
 
     def worker_lost(self) -> None:
         """Record that the worker of a session has died."""

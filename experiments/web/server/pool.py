@@ -1,4 +1,4 @@
-"""Worker processes, forked from a `multiprocessing` fork server that has loaded the house and all kernels."""
+"""Worker processes. They are forked from a `multiprocessing` fork server that has preloaded the house."""
 
 import asyncio
 import multiprocessing
@@ -16,16 +16,16 @@ from experiments.web.state import WireMessage
 PRELOADED = "experiments.web.worker.preload"
 SETTINGS = {
     "MALLOC_ARENA_MAX": "1",  # with one heap per thread, each thread would keep its peak memory
-    "LP_NUM_THREADS": "1",  # threads of the software renderer; many workers share the machine
+    "LP_NUM_THREADS": "1",  # one thread for the software renderer, because many workers share the machine
 }
 END_TIMEOUT = 5.0  # timeout for a process to exit, in seconds
 RETRY = 0.1  # delay before retrying to start a worker, in seconds
 
 
 class WorkerProcess:
-    """A worker process and its socket. Create it in a thread, because the constructor blocks, and then call `connect`.
+    """A worker process and its socket. The constructor blocks, so run it in a thread. Then call `connect`.
 
-    The socket is read in the event loop. With threads for reading and writing, 50 workers delayed the loop by 60 ms.
+    The event loop reads the socket, because threads for the sockets of 50 workers delayed the loop by 60 ms.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class WorkerProcess:
         self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
 
     def send(self, message: WireMessage) -> None:
-        """Queue a message. If the worker has died, `receive` reports it."""
+        """Queue a message for the worker. If the worker has died, only `receive` reports this."""
         if not self._writer.is_closing():
             self._writer.write(packed(message))
 
@@ -56,7 +56,7 @@ class WorkerProcess:
             return None
 
     def processor_time(self) -> float | None:
-        """Return the CPU time of the process in seconds, or None if unknown."""
+        """Return the CPU time of the process in seconds, or None if it is unknown."""
         try:
             fields = Path(f"/proc/{self._process.pid}/stat").read_text().rsplit(")", 1)[1].split()
         except OSError:
@@ -69,12 +69,12 @@ class WorkerProcess:
         self._process.join(END_TIMEOUT)
         self._process.kill()
         self._process.join()
-        with suppress(RuntimeError):  # the event loop has been closed
+        with suppress(RuntimeError):  # raised if the event loop has been closed
             self._loop.call_soon_threadsafe(self._writer.close)
 
 
 class WorkerPool:
-    """Starts and ends workers. They share a preloaded house, and load other houses when needed."""
+    """A pool of workers that share a preloaded house. Workers load other houses when needed."""
 
     def __init__(self, house: str) -> None:
         os.environ.update({**SETTINGS, HOUSE: house})  # inherited by child processes
@@ -85,7 +85,7 @@ class WorkerPool:
         forkserver.ensure_running()
 
     async def start(self) -> WorkerProcess:
-        """Start a worker, retrying for some seconds.
+        """Start a worker. Failed attempts are repeated for several seconds.
 
         Retries are needed because a killed fork server accepts connections until it is replaced.
         """
@@ -95,7 +95,7 @@ class WorkerPool:
             try:
                 return await asyncio.shield(starting)
             except asyncio.CancelledError:
-                starting.add_done_callback(self._discard_started)  # its thread cannot be cancelled
+                starting.add_done_callback(self._discard_started)  # the starting thread cannot be cancelled
                 raise
             except (EOFError, ConnectionError) as error:
                 if time.monotonic() > until:
@@ -123,6 +123,6 @@ async def _started_worker() -> WorkerProcess:
 
 
 def _run_worker(connection: socket.socket) -> None:
-    from experiments.web.worker.main import Worker  # imported late, because the server does not need it
+    from experiments.web.worker.main import Worker  # imported here because only workers need it
 
     Worker(connection).run()

@@ -1,4 +1,4 @@
-"""All live sessions, the release of idle sessions, and the estimated capacity of the machine."""
+"""Manage live sessions: release idle sessions, and estimate how many sessions the machine can run."""
 
 import asyncio
 import os
@@ -17,19 +17,19 @@ from experiments.web.server.pool import WorkerPool
 
 WATCH_PERIOD = 5.0  # interval between searches for abandoned sessions, in seconds
 MAX_AWAY = 20.0  # how long a session without a page keeps its slot while other pages wait, in seconds
-SHARE = 0.7  # usable fraction of the cores; the rest is reserved for load peaks
+SHARE = 0.7  # fraction of the cores that sessions may use; the rest is reserved for load peaks
 MOST = 1 / 3  # assumed load of a new session whose frames are drawn on the server, in cores
-SERVER = 0.7  # load of the server's core above which no session is admitted
-WINDOWS = 6  # number of recent measurements per session, of which the largest is used
-QUOTA = Path("/sys/fs/cgroup/cpu.max")  # quota and period of a container's CPU time, in microseconds
+SERVER = 0.7  # CPU load of the server process above which no session is admitted
+WINDOWS = 6  # number of recent load measurements per session, of which the largest is used
+QUOTA = Path("/sys/fs/cgroup/cpu.max")  # file with the CPU quota and its period, in microseconds
 
 
 class Capacity:
-    """Estimates how many sessions can run on the machine."""
+    """An estimator of how many sessions can run on the machine."""
 
     def __init__(self, cores: float) -> None:
         self._cores = cores
-        self._seen: dict[str, tuple[float, float]] = {}  # time and CPU time of each last measurement
+        self._seen: dict[str, tuple[float, float]] = {}  # time and CPU time of the last measurement
         self._shares: dict[str, deque[float]] = {}
         self._own = time.monotonic(), time.process_time()
 
@@ -62,7 +62,7 @@ class Capacity:
 
 
 class Sessions:
-    """All live sessions. A session without activity for `idle` seconds releases its worker.
+    """The live sessions of a server. A session that is inactive for `idle` seconds releases its worker.
 
     If `capacity` is given, the limit of concurrent sessions follows its estimates.
     """
@@ -81,9 +81,9 @@ class Sessions:
         self._scenes: dict[str, str] = {}  # URL path of each house's scene, as reported by workers
 
     def of(self, player: Player, *, as_inputs_come: bool = False) -> PlayedSession:
-        """Return a participant's session, and create it if needed.
+        """Return a participant's session. Create the session if it does not exist.
 
-        If `as_inputs_come` is true, its clock advances with the inputs instead of in real time.
+        If `as_inputs_come` is true, the clock of a new session advances with the inputs, not in real time.
         """
         if player.key not in self.under_way:
             self.under_way[player.key] = PlayedSession(
@@ -97,11 +97,11 @@ class Sessions:
         return self.under_way[player.key]
 
     def scene(self, settings: Mapping[str, Any]) -> str | None:
-        """Return the URL path of the scene that a trial's page is expected to draw, or None if unknown."""
+        """Return the URL path of the scene that a trial's page will probably draw, or None if unknown."""
         return None if settings["draw"] == "server" else self._scenes.get(settings["house"])
 
     async def watch(self) -> None:
-        """Release abandoned sessions and update the capacity estimate until cancelled."""
+        """Until cancelled, release abandoned sessions and update the capacity estimate periodically."""
         while True:
             await asyncio.sleep(WATCH_PERIOD)
             await self.release(self._is_idle)
@@ -126,9 +126,9 @@ class Sessions:
 
 
 def usable_cores() -> float:
-    """Return the number of usable cores, from the process's CPU affinity and the container's quota."""
+    """Return the number of CPU cores that the process may use, given its affinity and container quota."""
     cores = float(len(os.sched_getaffinity(0)))
     with suppress(OSError, ValueError):
         quota, period = QUOTA.read_text().split()
-        cores = min(cores, float(quota) / float(period))  # ValueError for "max", which means no limit
+        cores = min(cores, float(quota) / float(period))  # raises ValueError for "max", which means no limit
     return cores

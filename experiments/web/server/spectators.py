@@ -1,4 +1,4 @@
-"""Spectators of a session, who see the participant's page."""
+"""Spectators, who watch a participant's page during a session."""
 
 from typing import Any, Protocol
 
@@ -14,21 +14,21 @@ KEPT = (
     Hud,
     Markers,
     Moment,
-)  # each of these replaces the previous message of its type
+)  # for these types, a new message replaces the previous one
 
 
 class Spectator(Protocol):
-    """Connection to a spectator's page."""
+    """The connection to a spectator's page."""
 
     def send(self, message: WireMessage) -> None:
-        """Queue a message."""
+        """Queue a message for the page."""
 
     def close(self, code: int, reason: str) -> None:
         """Close the connection after sending all queued messages."""
 
 
 class Spectators:
-    """The spectators of a session, and the messages to send to a new spectator."""
+    """The spectators of a session, and the latest messages, which new spectators receive first."""
 
     def __init__(self) -> None:
         self._all: set[Spectator] = set()
@@ -54,12 +54,12 @@ class Spectators:
         self._all.discard(spectator)
 
     def close(self) -> None:
-        """Disconnect all spectators. Their pages reconnect."""
+        """Disconnect all spectators. Their pages then reconnect automatically."""
         for spectator in self._all:
             spectator.close(IDLE, "the session has stopped")
 
     def tell(self, message: Any) -> None:
-        """Forward a message to all spectators, and keep it for new ones."""
+        """Forward a message to all spectators, and store it for new spectators."""
         match message:
             case Snapshot(objects=objects, models=models, gone=gone):
                 self._snapshot = message
@@ -68,7 +68,7 @@ class Spectators:
                 for name in gone:
                     self._objects.pop(name, None)
                     self._models.pop(name, None)
-            case SceneMessage() | FrameMessage():  # discard earlier snapshots
+            case SceneMessage() | FrameMessage():  # earlier snapshots are obsolete
                 self._snapshot = None
                 self._objects, self._models = {}, {}
         if isinstance(message, KEPT):

@@ -1,1 +1,1 @@
-"""Pages that show recorded runs (`mjsim view`) or many homes (`mjsim house gallery`)."""
+"""Web pages that show recorded runs (`mjsim view`) or a gallery of homes (`mjsim house gallery`)."""

@@ -1,4 +1,4 @@
-"""Gallery of homes: a folder with contact sheets, an index page, and a page for each home."""
+"""Create a gallery of homes: a folder with contact sheets, an index page, and a page for each home."""
 
 import errno
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,14 +19,14 @@ from mjsim.values.errors import MjsimError, RenderError
 
 HOMES, SHEET = "homes", "sheet_{}.png"
 COLUMNS, ROWS = 2, 5
-GAP, CAPTION = 24, 44  # space between cards and height of a caption, in pixels
-WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of a home's card in pixels
+GAP, CAPTION = 24, 44  # gap between cards and height of a caption, in pixels
+WIDTH, HEIGHT = PLAN[0] + VIEW[0], PLAN[1] + CAPTION  # size of the card that shows a home, in pixels
 INK, QUIET, PAPER = (22, 33, 43), (74, 85, 96), 255
 Image = NDArray[np.uint8]
 
 
 def homes_of(sources: Sequence[str]) -> Mapping[str, str]:
-    """Return the name of each home by its folder in the gallery, without duplicates.
+    """Return a mapping from gallery folders to the names of homes, without duplicates.
 
     Raises:
         AssetError, HouseError: A source is not a house.
@@ -70,7 +70,7 @@ def write_gallery(
         with replacing(out / SHEET.format(count)) as temporary:
             cv2.imwrite(str(temporary), sheet[..., ::-1])
     number = count + 1
-    while (old := out / SHEET.format(number)).is_file():  # remains of a larger gallery
+    while (old := out / SHEET.format(number)).is_file():  # contact sheets that remain from a larger gallery
         old.unlink()
         number += 1
     page = own_page("gallery.html", "gallery.js", homes=[(home, f"{HOMES}/{f.name}") for home, f in shown])
@@ -94,7 +94,7 @@ def _drawn(
 
 
 def sheets(homes: Sequence[tuple[GalleryHome, Path]]) -> Iterator[Image]:
-    """Yield RGB contact sheets of up to ten homes. Each home is paired with the folder of its pictures."""
+    """Yield RGB contact sheets of up to ten homes. `homes` pairs each home with its picture folder."""
     for first in range(0, len(homes), COLUMNS * ROWS):
         cards = [_card(home, folder) for home, folder in homes[first : first + COLUMNS * ROWS]]
         rows = -(-len(cards) // COLUMNS)

@@ -1,4 +1,4 @@
-"""A home in a gallery: its pictures, description, and page with a tour."""
+"""Create the pictures, the description and the tour page of a home in a gallery."""
 
 import functools
 import hashlib
@@ -26,17 +26,17 @@ from mjsim.render import Renderer
 from mjsim.support.files import exchange, source_digest, work_folder
 from mjsim.values.person_parameters import PersonParameters
 
-PLAN, VIEW = (480, 400), (300, 200)  # width and height of pictures, in pixels
+PLAN, VIEW = (480, 400), (300, 200)  # width and height of the floor plan and of a view, in pixels
 PAGE, ABOUT = "index.html", "home.json"
 _WEBP = (cv2.IMWRITE_WEBP_QUALITY, 85)
-INTERVAL = 0.2  # time between two poses of the tour, in seconds; the page interpolates between them
+INTERVAL = 0.2  # interval between poses of the tour, in seconds; the page interpolates between them
 NEAR = 0.05  # distance at which a viewpoint counts as reached, in metres
-INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands in metres, hidden inside the body
+INSIDE = (0.0, 0.0, 0.8) * 2  # positions of both hands in metres, which hide them inside the body
 _HUD = HudState("", (), (), (None, InventorySlot()))
 
 
 class GalleryHome(msgspec.Struct, frozen=True):
-    """Description of a home in a gallery.
+    """The description of a home in a gallery.
 
     Attributes:
         name: Full name of a generated house, otherwise the given name or path.
@@ -58,7 +58,7 @@ class GalleryHome(msgspec.Struct, frozen=True):
 
     @property
     def origin(self) -> str:
-        """Seed and version of a generated home, or the name of another home."""
+        """The seed and version of a generated home, or the name of any other home."""
         found = re.fullmatch(r"generated:(\d+)\?rooms=\d+&version=(\d+)", self.name)
         return f"seed {found[1]}, version {found[2]}" if found else self.name
 
@@ -120,7 +120,7 @@ def _draw(house: House, folder: Path) -> tuple[str, ...]:
     compiled, rooms = compiled_house(house.catalogue), house.rooms
     areas = dict.fromkeys(house.viewpoints, 0.0)
     for key, half in zip(rooms.keys, rooms.half_sizes, strict=True):
-        if key in areas:  # large enough for a person to stand in
+        if key in areas:  # true for rooms in which a person has space to stand
             areas[key] += float(half.prod())
     largest = sorted(areas, key=lambda key: -areas[key])[:2]
     views = list(room_views(house, largest).values())
@@ -154,7 +154,7 @@ def tour_page(house: House, scene: Mapping[str, bytes], caption: str) -> str:
 
 
 def _tour(house: House) -> dict[str, Any]:
-    """Return the tour in the format `Run` of view/run.js."""
+    """Return the data of the tour in the `Run` format of view/run.js."""
     path, person = camera_path(house), PersonParameters()
     times = np.arange(0.0, path.duration, INTERVAL)
     rows = path.at(times)

@@ -1,4 +1,4 @@
-"""Self-contained HTML page of a recorded run, with the client's modules, the scene and the data."""
+"""Create self-contained HTML pages that show recorded runs."""
 
 import base64
 import gzip
@@ -61,7 +61,7 @@ def view_page(
 
 
 def run_page(title: str, run: Mapping[str, Any], scene: Mapping[str, bytes], **values: Any) -> str:
-    """Return an HTML page that shows a run. `scene` holds the scene's files, and `values` go to the template."""
+    """Return an HTML page that shows a run. `scene` has the scene's files. `values` go to the template."""
     urls = {name: _data_url(name, content) for name, content in scene.items()}
     texts = trial_texts(read_words())
     packed = {"run": _packed(run), "scene": _packed(urls)}
@@ -85,7 +85,7 @@ def own_page(template: str, entry: str, **values: Any) -> str:
 
 
 def _run(record: Record, house: House, seen: RunRecorder) -> dict[str, Any]:
-    """Return the data of the page in the format `Run` of view/run.js."""
+    """Return the data of the page in the `Run` format of view/run.js."""
     person = record.person
     catalogue = house.catalogue.objects
     return {

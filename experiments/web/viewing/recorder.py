@@ -1,4 +1,4 @@
-"""Recorder of poses and HUD states for a page that shows a run."""
+"""Record the poses and HUD states for a page that shows a run."""
 
 import dataclasses
 from typing import Any
@@ -16,12 +16,12 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-DECIMALS = 4  # number of decimal places of metres, radians and quaternions
-HEIGHT = 480  # assumed height of the picture when placing pointers, in pixels
+DECIMALS = 4  # number of decimal places of positions, angles and quaternions
+HEIGHT = 480  # assumed height of the picture for which pointers are placed, in pixels
 
 
 class RunRecorder(Viewer):
-    """A session viewer that records all states that it shows.
+    """A session viewer that records every state.
 
     Attributes:
         body: Flat list with four numbers per control step: position in metres, heading and pitch in radians.
@@ -29,8 +29,8 @@ class RunRecorder(Viewer):
             body's frame.
         objects: Flat list for each object with eight numbers per changed pose: control step, position in metres, and
             quaternion wxyz.
-        hud: Control step and new state, without markers, of each change of the HUD.
-        shown: Control step and indices into `markers` of each change of the visible markers.
+        hud: Pairs of a control step and the new state without markers, one for each change of the HUD.
+        shown: Pairs of a control step and indices into `markers`, one for each change of the visible markers.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -51,7 +51,7 @@ class RunRecorder(Viewer):
         return CameraView(pose.position, pose.rotation, pose.fovy, round(PICTURE_ASPECT * HEIGHT), HEIGHT)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Record the current state unless it has been recorded."""
+        """Record the current state unless it has already been recorded."""
         if self.time and self.time[-1] == observation.time:
             return
         step = len(self.time)

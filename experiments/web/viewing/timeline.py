@@ -1,4 +1,4 @@
-"""Events and plans for the timeline on the page of a run."""
+"""Collect the events and plans that the page of a run shows on its timeline."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ DONE = {"pick": "in the hand", "place": "in its bin"}
 
 
 def moments(record: Record, house: House) -> list[dict[str, Any]]:
-    """Return the events of the timeline: time `t` in seconds, `kind` as in the log, and `text`."""
+    """Return the timeline's events, each with a time `t` in seconds, a `kind` as in the log, and a `text`."""
     words = _words(record, house)
     return [
         {"t": event["t"], "kind": event["event"], "text": words[event["event"]](event)}
@@ -23,7 +23,7 @@ def moments(record: Record, house: House) -> list[dict[str, Any]]:
 
 
 def plans(record: Record, house: House) -> list[dict[str, Any]]:
-    """Return all plans: time `t` in seconds, `cost_m`, `status`, and `path`, a flat list of coordinates in metres."""
+    """Return all plans. Each has a time `t` in seconds and a `path`, a flat list of coordinates in metres."""
     found = []
     for event, step in zip(record.events, record.steps_of_events, strict=True):
         if event["event"] == "plan":

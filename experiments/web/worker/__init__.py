@@ -1,4 +1,4 @@
-"""Worker process with the world, clock, frames and journal of one session.
+"""The worker process, which simulates a session, draws its frames and writes its journal.
 
-The server starts one worker per session and forwards its messages to the browser.
+The server starts one worker per session and forwards the worker's messages to the browser.
 """

@@ -1,4 +1,4 @@
-"""Clock of a session, which takes 25 control steps per second and acknowledges each step once it is on disk."""
+"""The clock of a session. It runs 25 control steps per second and acknowledges steps that are on disk."""
 
 import time
 from collections.abc import Callable
@@ -10,17 +10,17 @@ from experiments.web.worker.control import Promise, SessionControl
 from experiments.web.worker.live_session import LiveSession
 
 LATE = 0.02  # delay above which a control step counts as late, in seconds
-MAX_LAG = 1.0  # delay after which the clock restarts, as after a suspension of the process, in seconds
-MAX_UNWRITTEN = 10  # maximum number of unsynced control steps if there are no inputs
+MAX_LAG = 1.0  # delay after which the clock restarts, for example after a suspension, in seconds
+MAX_UNWRITTEN = 10  # maximum number of control steps without inputs before the journal is synced
 SHOW_PERIOD = 0.1  # interval between polls of a session that is not running, in seconds
 
 Send = Callable[[WireMessage], None]
 
 
 class Clock:
-    """Runs a session in real time. `sync` writes the journal to disk, and `show` shows the current state.
+    """A clock that runs a session in real time. `sync` writes the journal to disk. `show` shows the state.
 
-    If `as_inputs_come` is true, each control step is due as soon as its inputs have been promised, and intermediate
+    If `as_inputs_come` is true, each control step is due as soon as its inputs have arrived, and intermediate
     states are not shown.
     """
 
@@ -38,7 +38,7 @@ class Clock:
         self._live, self._control, self._show = live, control, show
         self._schedule = Schedule(live.world.control_timestep, time.monotonic())
         self._acknowledger = _Acknowledger(sync, send)
-        self._missed = False  # True if the last step lacked its promised inputs
+        self._missed = False  # True if promised inputs were missing in the last step
 
     def run(self) -> str:
         """Run the session until it ends, and return the reason for its end.
@@ -67,7 +67,7 @@ class Clock:
         return control.state.reason
 
     def _wait_and_step(self) -> None:
-        """Take a control step when it is due and its inputs have arrived, unless the session stops before that."""
+        """Wait until the next control step is due and its inputs have arrived, and then run the step."""
         live, schedule = self._live, self._schedule
         session, step = live.session, live.session.record.step
         if self._as_inputs_come:
@@ -83,7 +83,7 @@ class Clock:
         live.step(self._control.take_inputs(step))
         schedule.take(promise.came)
         if not self._follows_at_once():
-            self._show()  # if the next step follows at once, this state is skipped
+            self._show()  # a state is not shown if the next step follows immediately
         self._acknowledger.request(live.input, session.record.step)
 
     def _follows_at_once(self) -> bool:
@@ -97,7 +97,7 @@ class Clock:
         return self._schedule.wait(time.monotonic(), promised=True) <= 0.0
 
     def _note_lateness(self, promise: Promise) -> None:
-        """Log each control step delayed by this machine, and the first of a series without promised inputs."""
+        """Log steps that this machine delays, and the first of a series of steps without promised inputs."""
         due, now = self._schedule.due, time.monotonic()
         late = now - (due if promise.came is None else max(due, promise.came))
         if promise.missing:
@@ -116,7 +116,7 @@ class Clock:
 
 
 class _Acknowledger:
-    """Syncs the journal in a separate thread, then acknowledges the synced inputs and control steps."""
+    """A thread that syncs the journal and then acknowledges the synced inputs and control steps."""
 
     def __init__(self, sync: Callable[[], None], send: Send) -> None:
         self._sync, self._send = sync, send
@@ -125,7 +125,7 @@ class _Acknowledger:
         self._error: OSError | None = None
 
     def request(self, number: int, step: int) -> None:
-        """Request acknowledgement of all inputs and control steps up to these. Steps without a new input may wait."""
+        """Request an acknowledgement up to this input and step. Steps without new inputs may be delayed."""
         if number == self._number and step < self._newest + MAX_UNWRITTEN:
             return
         self._number, self._newest = number, step
@@ -150,16 +150,16 @@ class _Acknowledger:
 
 
 PATIENCE = 0.75  # how long a control step waits for its promised inputs, in seconds
-WINDOW = 25  # interval between adjustments to the page's clock, in control steps
+WINDOW = 25  # number of control steps between adjustments of the schedule to the page's clock
 PULL = 0.05  # maximum speed-up per adjustment, as a fraction of the clock's rate
 
 
 class Schedule:
-    """Schedule of control steps, one every `period` seconds.
+    """A schedule with one control step every `period` seconds.
 
-    The clock of a page that promises its inputs may differ from this one, and promises take time to arrive. If all
-    promises in an interval arrive after their steps are due, the schedule is delayed. If all arrive before, it is
-    advanced. After a single late promise, the steps that have become due follow immediately.
+    A page that promises its inputs has its own clock, and its promises take time to arrive. If all promises
+    in an interval arrive after their steps are due, the schedule is delayed. If all of them arrive early, the
+    schedule is advanced. After a single late promise, the steps that have become due follow immediately.
 
     Attributes:
         due: Due time of the next control step, in seconds.
@@ -171,7 +171,7 @@ class Schedule:
         self._late: list[float] = []  # delay of each promise relative to the due time of its step, in seconds
 
     def start(self, now: float) -> None:
-        """Restart the schedule, so that a control step is due now."""
+        """Restart the schedule so that the next control step is due now."""
         self.due = now
         self._late.clear()
 
@@ -180,7 +180,7 @@ class Schedule:
         return max(0.0, self.due + (0.0 if promised else PATIENCE) - now)
 
     def take(self, came: float | None) -> None:
-        """Record a control step. `came` is the arrival time of its inputs, or None if no inputs were promised."""
+        """Record a control step. `came` is the arrival time of its promised inputs, or None."""
         if came is None:
             self._late.clear()
         else:

@@ -1,4 +1,4 @@
-"""State and queued inputs of a session, shared by the receiving thread and the stepping thread."""
+"""The state and the input queue of a session, which the receiving and the stepping thread share."""
 
 import threading
 import time
@@ -14,39 +14,39 @@ from experiments.web.state import PAUSED, READY, RUNNING, SessionPhase, State, T
 
 MAX_NOTES = 1000  # maximum number of queued log events
 MAX_PROMISES = 64  # maximum number of stored promises
-Note = tuple[str, dict[str, Any]]  # name and fields of an event for the log
+Note = tuple[str, dict[str, Any]]  # name and fields of a log event
 
 
 class Promise(NamedTuple):
-    """Arrival of a control step's promised inputs. `came` is the monotonic arrival time, or None."""
+    """The arrival of a control step's promised inputs. `came` is the monotonic arrival time, or None."""
 
     came: float | None
     missing: bool  # True if promised inputs have not arrived
 
 
 class SessionControl:
-    """Thread-safe state machine and input queue of a session. `announce` is called with each new state."""
+    """A thread-safe state machine and input queue of a session. `announce` is called with each new state."""
 
     def __init__(self, announce: Callable[[State], None], now: Callable[[], float] = time.monotonic) -> None:
         self.state = State()
         self._now = now
         self._announce = announce
         self._inputs: list[Input] = []
-        # Promises, oldest first: (control step before which all inputs have arrived, arrival time of the promise)
+        # Promises, oldest first. Each pair is (control step before which inputs are complete, arrival time).
         self._promises: deque[tuple[int, float]] = deque(maxlen=MAX_PROMISES)
         self._notes: list[Note] = []
         self._changed = threading.Condition()
-        self._asked = False  # True if a frame was requested
+        self._asked = False  # True if a frame has been requested
         self._ready = 0.0  # monotonic time at which the session became ready, or 0
         self._heard = now()  # monotonic time of the page's last message
 
     def apply(
         self, trigger: Trigger, reason: str = "", *, last: int | None = None, until: int | None = None
     ) -> None:
-        """Change the state according to the table of transitions.
+        """Change the state according to `TRANSITIONS`.
 
-        `last` is the number of the last input in a restored session. `until` is the first promise of a page that starts
-        the clock.
+        `last` is the number of the last input in a restored session. `until` is the first promise of a page
+        that starts the clock.
         """
         with self._changed:
             before = self.state if last is None else msgspec.structs.replace(self.state, input=last)
@@ -70,9 +70,9 @@ class SessionControl:
             self._changed.notify_all()
 
     def add(self, inputs: list[Input], until: int | None = None) -> None:
-        """Queue inputs. Those that a reconnected browser sends again are ignored.
+        """Queue inputs. Inputs that a reconnected browser sends again are ignored.
 
-        `until` promises that all inputs for earlier control steps have arrived.
+        `until` is a promise that all inputs for earlier control steps have arrived.
         """
         with self._changed:
             running = self.state.phase is RUNNING
@@ -95,13 +95,13 @@ class SessionControl:
                 self.apply(Trigger.PAUSE, "silent")
 
     def note(self, event: str, **fields: Any) -> None:
-        """Queue an event of the page for the log. Drop it if the queue is full."""
+        """Queue an event for the log. Drop the event if the queue is full."""
         with self._changed:
             if len(self._notes) < MAX_NOTES:
                 self._note(event, **fields)
 
     def take_inputs(self, step: int) -> tuple[Input, ...]:
-        """Remove and return all queued inputs up to the first one for a later control step."""
+        """Remove and return all queued inputs before the first input for a later control step."""
         with self._changed:
             later = (i for i, new in enumerate(self._inputs) if new.step is not None and new.step > step)
             count = next(later, len(self._inputs))

@@ -1,4 +1,4 @@
-"""Drawing of the participant's view, which is as large and frequent as the browser and the worker allow."""
+"""Draw the participant's view at a size and frame rate that the browser and the worker can handle."""
 
 import dataclasses
 import threading
@@ -17,8 +17,8 @@ from mjsim.house.scene.scene import Scene
 from mjsim.render import FAST, Renderer
 from mjsim.world.world import World
 
-COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile of the smallest frame size
-MAX_IN_FLIGHT = 3  # maximum number of frames sent but not yet shown
+COARSE = dataclasses.replace(FAST, name="coarse", supersampling=1.0)  # profile for the smallest frame size
+MAX_IN_FLIGHT = 3  # maximum number of sent frames that the browser has not yet shown
 
 
 class _Moment(NamedTuple):
@@ -26,7 +26,7 @@ class _Moment(NamedTuple):
     markers: tuple[Marker, ...]
     step: int
     input: int
-    hidden: bool  # True for a black frame while the clock is stopped
+    hidden: bool  # True if the frame is black because the clock is stopped
 
     def content(self) -> object:
         return self.hidden or (self.data.qpos.tobytes(), self.markers)
@@ -40,7 +40,7 @@ class _Job(NamedTuple):
 
 
 class Drawer:
-    """Draws and sends frames in a thread. If drawing fails, the session fails."""
+    """A thread that draws frames and sends them. If drawing fails, the session fails."""
 
     def __init__(
         self,
@@ -57,13 +57,13 @@ class Drawer:
         self._drawn: object = None
         self._sent = self._seen = 0
         self._key = self._closed = False
-        self._spare: list[Any] = []  # simulator data to be reused
+        self._spare: list[Any] = []  # copies of simulator data that can be reused
         self._renderers: dict[int, Renderer] = {}
         self._thread = threading.Thread(target=self._run, name="drawing", daemon=True)
         self._thread.start()
 
     def set_view(self, view: View) -> None:
-        """Draw for a new connection, starting with a key frame."""
+        """Draw frames for a new connection, starting with a key frame."""
         with self._changed:
             self._view, self._key, self._drawn = view, True, None
             if view.codec == "none":
@@ -82,7 +82,7 @@ class Drawer:
         return self._control.state.phase is not RUNNING
 
     def draw(self, world: World, state: HudState, step: int, number: int, hidden: bool) -> None:
-        """Queue a state for drawing. It replaces a queued state that has not been drawn."""
+        """Queue a state for drawing. It replaces a queued state that has not been drawn yet."""
         if self._view is None or self._view.codec == "none":
             return
         with self._changed:
@@ -145,8 +145,8 @@ class Drawer:
             self._spare.append(moment.data)
 
     def _next(self) -> _Job | None:
-        """Wait for a new state and until the browser has caught up. Return None after `close`."""
-        ready: float | None = None  # time since which a state has been waiting for the connection
+        """Wait for a new state and for the browser to catch up. Return None after `close` is called."""
+        ready: float | None = None  # time at which a state began to wait for the connection
         with self._changed:
             while not self._closed:
                 moment, view = self._moment, self._view

@@ -1,4 +1,4 @@
-"""Compression of frames as JPEG or low-latency H.264."""
+"""Compress frames as JPEG or low-latency H.264."""
 
 import base64
 import statistics
@@ -20,19 +20,22 @@ H264_OPTIONS = {
     "profile": "baseline",
     "threads": "1",
 }
-KEY_EVERY = 250  # maximum interval between key frames, in frames
+KEY_EVERY = 250  # maximum number of frames from one key frame to the next
 
 
 class Encoder(Protocol):
-    """Compresses frames of one size."""
+    """The interface of an encoder for frames of a fixed size."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:
-        """Compress a uint8 RGB frame (h, w, 3). Return the bytes, and True for a key frame, which `key` can request."""
+        """Compress a uint8 RGB frame (h, w, 3), as a key frame if `key` is true.
+
+        Return the compressed bytes, and True if the result is a key frame.
+        """
         ...
 
 
 class JpegEncoder:
-    """JPEG encoder. Each frame is a key frame."""
+    """A JPEG encoder. Each frame is a key frame."""
 
     def encode(self, frame: Image, *, key: bool) -> tuple[bytes, bool]:  # noqa: ARG002 - each is a key frame
         _, data = cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
@@ -40,7 +43,7 @@ class JpegEncoder:
 
 
 class H264Encoder:
-    """Low-latency H.264 encoder with one Annex B packet per frame. Width and height must be even."""
+    """A low-latency H.264 encoder with one Annex B packet per frame. Width and height must be even."""
 
     def __init__(self, width: int, height: int) -> None:
         self._codec: Any = av.CodecContext.create("libx264", "w")
@@ -61,24 +64,24 @@ class H264Encoder:
 
 
 def data_url(picture: Image) -> str:
-    """Return a uint8 RGBA picture (h, w, 4) as a data URL in WebP format."""
+    """Encode a uint8 RGBA picture (h, w, 4) as a data URL in WebP format."""
     _, data = cv2.imencode(
         ".webp", cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA), [cv2.IMWRITE_WEBP_QUALITY, 85]
     )
     return f"data:image/webp;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
-SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # width and height in pixels
+SIZES = ((320, 240), (480, 360), (640, 480), (800, 600), (960, 720))  # possible frame sizes, in pixels
 FIRST_SIZE = 2
 FRAMES = 20  # number of frames from which median times are computed
 SLOW, QUICK = 0.033, 0.022  # frame times above and below which the frame size changes, in seconds
-HELD_UP = 0.06  # wait for the connection above which frames become smaller, in seconds
+HELD_UP = 0.06  # waiting time for the connection above which frames become smaller, in seconds
 SHARE = 0.65  # fraction of time spent on drawing; the rest is left to other sessions
 RETRY = 30.0  # time until a size that was too large is tried again, in seconds
 
 
 class FrameSize:
-    """Adapts the size of frames to the speed of drawing and of the connection. `index` is the position in `SIZES`."""
+    """A frame size from `SIZES` that adapts to the speed of drawing and of the connection."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self.index, self._largest = FIRST_SIZE, len(SIZES) - 1
@@ -88,13 +91,13 @@ class FrameSize:
         self._retry_at = 0.0
 
     def limit(self, width: int, height: int) -> None:
-        """Limit frames to the size of a view in pixels. The smallest size is always allowed."""
+        """Limit the frame size to the size of a view in pixels. The smallest frame size is always allowed."""
         fitting = [i for i, (w, h) in enumerate(SIZES) if w <= width and h <= height]
         self._largest = max(fitting, default=0)
         self._set(min(self.index, self._largest))
 
     def note(self, took: float, waited: float) -> None:
-        """Record the time for drawing and compressing a frame, and the wait for the connection. Both are in seconds."""
+        """Record the time in seconds to produce a frame, and how long it had to wait for the connection."""
         self._frames.append((took, waited))
         if len(self._frames) < FRAMES:
             return
@@ -112,5 +115,5 @@ class FrameSize:
 
 
 def pause_after(took: float) -> float:
-    """Return how long to pause after a frame that took `took` seconds."""
+    """Return the length of the pause after a frame that took `took` seconds to draw, in seconds."""
     return took / SHARE - took

@@ -1,4 +1,4 @@
-"""Houses and pictures of their objects, loaded once and shared with forked processes."""
+"""Load houses and the pictures of their objects only once, and share them with forked processes."""
 
 import functools
 import gc
@@ -32,7 +32,7 @@ def pictures(name: str) -> dict[str, Image]:
 
 @functools.cache
 def encoded_pictures(name: str, floor_plan: bool) -> dict[str, str]:
-    """Return a house's pictures as data URLs, with the floor plan if requested. OpenGL must be available."""
+    """Return a house's pictures as data URLs, with the floor plan if requested. This requires OpenGL."""
     found = dict(pictures(name))
     if floor_plan:
         found[FLOORPLAN] = render_house_map(house(name).catalogue, house(name).bounds)
@@ -52,10 +52,10 @@ def scene_files(house: House) -> tuple[str, str]:
 
 
 def preload(name: str) -> None:
-    """Load a house, its pictures and the kernels before workers are forked. Failures are left to the workers.
+    """Load a house, its pictures and the compiled kernels before workers are forked. Errors are ignored.
 
-    Threads and OpenGL contexts do not survive a fork. One child process therefore draws the pictures, and another one
-    exports the scene.
+    Threads and OpenGL contexts do not survive a fork. One child process therefore draws the pictures, and
+    another one exports the scene.
     """
     with suppress(Exception):
         loaded = house(name)
@@ -65,7 +65,7 @@ def preload(name: str) -> None:
             warmup.compile_kernels(loaded)  # also caches hashes and versions
             _pictures[name] = drawn.get(DRAWING_TIMEOUT)
         encoded_pictures(name, False)
-    gc.freeze()  # garbage collection would copy shared memory pages
+    gc.freeze()  # prevents garbage collection from copying shared memory pages
 
 
 def _begin(work: Callable[[House], object], house: House) -> None:
@@ -75,6 +75,6 @@ def _begin(work: Callable[[House], object], house: House) -> None:
         try:
             if not os.fork():
                 work(house)
-        finally:  # the workers retry and report errors
+        finally:  # workers repeat the work and report errors
             os._exit(0)
     os.waitpid(between, 0)

@@ -1,4 +1,4 @@
-"""Live session with a participant, which is journalled at each step and can resume after a crash."""
+"""A live session with a participant. Its journal records each step, so that it can resume after a crash."""
 
 import json
 import logging
@@ -41,18 +41,18 @@ from mjsim.world.world import World
 from planner.service import Mode, Planner
 
 LOG = logging.getLogger("mjsim.play")
-MAX_JOURNAL = 512 * 1024**2  # size at which a session ends, in bytes; reached after 7 h with 6 objects
+MAX_JOURNAL = 512 * 1024**2  # journal size in bytes at which a session ends (after about 7 h with 6 objects)
 
 
 class InputState(msgspec.Struct):
-    """State of a participant's inputs, which is stored in the journal."""
+    """The state of a participant's inputs, which is stored in the journal."""
 
     controls: Controls = Controls()
     input: int = 0
 
 
 class BrowserParticipant:
-    """Participant of a live session, controlled by a person.
+    """A participant in a live session who is controlled by a real person.
 
     Attributes:
         inputs: Inputs for the next control step.
@@ -84,7 +84,7 @@ class BrowserParticipant:
 
 
 class LiveSession:
-    """Live session of a trial, continued from the last control step in its journal.
+    """A live session of a trial. It continues after the last control step in its journal.
 
     Args:
         journal: Journal of all control steps. If it is empty, `config` is written first.
@@ -125,7 +125,7 @@ class LiveSession:
             journal.append(Header(config.settings(), self.scene.episode.to_json()))
             journal.sync()
         record = read_journal(journal.entries) if len(journal.entries) > 1 else None
-        journal.entries = ()  # free memory: the entries of an hour take about 80 MB
+        journal.entries = ()  # frees memory, which is about 80 MB per hour of entries
         self.resumed = record is not None
         options = WorldOptions(fidelity=config.fidelity, capacity=config.capacity)
         self.world = World(self.scene, options, walls=self.house.navmesh.outline)
@@ -163,19 +163,19 @@ class LiveSession:
 
     @property
     def input(self) -> int:
-        """Number of the last input in effect."""
+        """The number of the last input in effect."""
         return self._human.state.input
 
     @property
     def end_reason(self) -> str | None:
-        """Reason for the end of the task, or None."""
+        """The reason for the end of the task, or None if the task has not ended."""
         return self.session.end_reason or (INTERRUPTED if self._journal.size > MAX_JOURNAL else None)
 
     def release(self) -> None:
         self._human.state.controls = Controls()
 
     def step(self, inputs: Sequence[Input]) -> None:
-        """Take a control step. It is durable once the journal is synced. Raises PhysicsError or OSError."""
+        """Run a control step. It is durable once the journal is synced. Raises PhysicsError or OSError."""
         for new in inputs:
             if new.scroll:
                 self.session.scroll(new.scroll)
@@ -184,7 +184,7 @@ class LiveSession:
         self.session.record.commit(self._human.state)
 
     def end(self, reason: str) -> None:
-        """End the session, after which `save_run` can write the run directory."""
+        """End the session so that `save_run` can write the run directory."""
         self.session.end(reason)
         self.session.record.commit(self._human.state)
         self._journal.sync()
@@ -207,7 +207,7 @@ def is_over(journal: Journal) -> bool:
 
 
 def open_journal(folder: Path) -> Journal:
-    """Open the journal in a folder. Create the folder and the journal if needed."""
+    """Open the journal in a folder. Create the folder and the journal if they do not exist."""
     folder.mkdir(parents=True, exist_ok=True)
     return Journal(folder / JOURNAL)
 
@@ -219,7 +219,7 @@ def journal_of(run: Path) -> Path | None:
 
 
 def save_run(folder: Path, run: Path, house: House | None = None, *, floor_plan: bool = True) -> None:
-    """Write the run directory of a session from its journal, and then the floor plan. The session may be unfinished.
+    """Write the run directory and the floor plan of a session from its journal, even if it is unfinished.
 
     Args:
         run: Path of the run directory. Existing parts are kept.
@@ -265,6 +265,6 @@ def remove_journal(folder: Path, run: Path) -> None:
     except (RecordError, ReplayError, OSError) as error:
         LOG.warning("%s is kept: %s", folder / JOURNAL, error)
         return
-    with suppress(OSError):  # the folder contains the journal of another trial
+    with suppress(OSError):  # raised if the folder contains the journal of another trial
         folder.rmdir()
         folder.parent.rmdir()

@@ -1,4 +1,4 @@
-"""Main loop of a worker process, which runs one session at a time and exits with the server."""
+"""The main loop of a worker process. It runs one session at a time and exits when the server closes."""
 
 import os
 import socket
@@ -47,7 +47,7 @@ from hud.texts import HudTexts
 
 
 class Worker:
-    """Runs the sessions that the server opens, one at a time."""
+    """A worker that runs the sessions opened by the server, one at a time."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
@@ -66,11 +66,11 @@ class Worker:
                 control.apply(Trigger.FAIL, describe(error))
 
     def _send(self, message: WireMessage) -> None:
-        with self._sending, suppress(OSError):  # the receiving thread notices that the server has closed
+        with self._sending, suppress(OSError):  # the receiving thread handles a closed connection
             self._connection.sendall(protocol.packed(message))
 
     def _receive(self) -> None:
-        """Handle messages until the server closes, then exit immediately. The journal keeps the session."""
+        """Handle messages until the server closes, then exit immediately. The journal stays on disk."""
         with suppress(OSError), self._connection.makefile("rb") as stream:
             while len(head := stream.read(protocol.LENGTH.size)) == protocol.LENGTH.size:
                 (length,) = protocol.LENGTH.unpack(head)
@@ -80,7 +80,7 @@ class Worker:
         os._exit(0)
 
     def _take(self, message: WireMessage) -> None:
-        if not isinstance(message, Open | Pause):  # these messages can come from the server itself
+        if not isinstance(message, Open | Pause):  # the server itself can also send these messages
             self._control.hear()
         match message:
             case Open():
@@ -118,7 +118,7 @@ class Worker:
     def _play(self, opened: Open, control: SessionControl, config: TrialConfig, house: House) -> None:
         viewer = self._viewer
         with open_journal(Path(opened.folder)) as journal:
-            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have written the run
+            if not (is_over(journal) or is_run(Path(opened.run))):  # another worker may have finished the run
                 live = LiveSession(
                     journal,
                     house,

@@ -1,4 +1,4 @@
-"""Module imported by the fork server to load everything that workers share."""
+"""Load everything that workers share. The fork server imports this module."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Snapshots of a session for clients that draw: objects that may come into view, and their changes."""
+"""Snapshots of a session for clients that draw the view. They contain objects that may come into view."""
 
 import logging
 
@@ -14,14 +14,14 @@ from mjsim.values.observation import Observation
 from mjsim.world.fidelity import kinematics
 
 LOG = logging.getLogger("mjsim.play")
-HORIZON = 0.3  # time ahead for which visible objects are predicted, in seconds
-LINGERING = 25  # how long objects that are out of view are still sent, in control steps
-LOOK_EVERY = 3  # interval between updates of the set of objects to send, in control steps
+HORIZON = 0.3  # how far ahead visible objects are predicted, in seconds
+LINGERING = 25  # number of control steps for which objects are still sent after they leave the view
+LOOK_EVERY = 3  # number of control steps between updates of the set of objects to send
 DECIMALS = 4  # number of decimal places of positions in metres and of quaternions
 
 
 def field_of_view(live: LiveSession, view: View) -> float:
-    """Return the field of view in radians: the participant's choice if the study allows it, or the default."""
+    """Return the field of view in radians. It is the participant's choice if the study allows one."""
     own, limits = live.scene.person.field_of_view, live.config.view_limits
     if limits is None or view.codec != "none":
         return own
@@ -50,14 +50,14 @@ def scene_of(live: LiveSession, view: View) -> SceneMessage:
 
 
 class SnapshotStream:
-    """Snapshots of a session for a new client with a certain view."""
+    """A stream of snapshots of a session for a new client."""
 
     def __init__(self, live: LiveSession, view: View) -> None:
         self._live, self._aspect = live, view.width / view.height
         self._potential_visibility = PotentialVisibility(live.scene, HORIZON, field_of_view(live, view))
         self._until: dict[str, int] = {}  # control step until which each object is sent
         self._models = {item.name: item.model for item in live.scene.episode.objects}
-        self._looked = -LOOK_EVERY  # control step of the last update of sent objects
+        self._looked = -LOOK_EVERY  # control step of the last update of the objects to send
         self._hands: tuple[str | None, str | None] = (None, None)  # held objects at the last update
         self._poses = np.full((len(self._models), 7), np.nan)
         self._sent: dict[str, list[float]] = {}

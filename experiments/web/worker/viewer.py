@@ -1,4 +1,4 @@
-"""Session viewer for the browser, which sends the HUD and either frames or snapshots."""
+"""A session viewer that sends the HUD and either frames or snapshots to a browser."""
 
 import dataclasses
 import math
@@ -25,12 +25,12 @@ from mjsim.values.observation import Observation
 from mjsim.values.person_parameters import PICTURE_ASPECT
 from mjsim.world.world import World
 
-HUD_EVERY = 4  # HUD update interval for clients that draw, in control steps
-HEIGHT = 480  # assumed height of the picture for projections, in pixels
+HUD_EVERY = 4  # control steps between HUD updates for clients that draw the view
+HEIGHT = 480  # assumed height of the picture for projecting points, in pixels
 
 
 class BrowserViewer(Viewer):
-    """Sends the changes of each control step to the page. `live` and `drawer` are None if no session is open."""
+    """A viewer that sends all changes to the page. `live` and `drawer` are None if no session is open."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -46,7 +46,7 @@ class BrowserViewer(Viewer):
         self._glance: object = None  # state at the last HUD update
 
     def set_view(self, view: View | None) -> None:
-        """Send everything to a new connection. If `view` is None, keep the previous view."""
+        """Send the complete state to a new connection. If `view` is None, keep the previous view."""
         self.view = view or self.view
         if self.drawer is not None and self.view is not None:
             self.drawer.set_view(self.view)
@@ -66,7 +66,7 @@ class BrowserViewer(Viewer):
         return CameraView(eye, rotation, fovy, max(1, round(HEIGHT * aspect)), HEIGHT)
 
     def look(self) -> None:
-        """Show the current state. Clients that draw receive the HUD less often."""
+        """Show the current state. Clients that draw the view receive the HUD less often."""
         live = self.live
         if live is None:
             return
@@ -80,7 +80,7 @@ class BrowserViewer(Viewer):
             self._send_snapshot(self._snapshots, seen, step)
 
     def show(self, world: World, observation: Observation, hud_state: HudState) -> None:
-        """Send all changes since the last call."""
+        """Send everything that has changed since the last call."""
         view, live = self.view, self.live
         if live is None or self.drawer is None or view is None:
             return
@@ -153,7 +153,7 @@ class BrowserViewer(Viewer):
 
 
 def page_hud(state: HudState) -> Hud:
-    """Return the HUD state without markers and the values sent in `Moment`."""
+    """Return the state of the HUD without the markers and the values in `Moment` messages."""
     message = state.message
     if message is not None:
         message = dataclasses.replace(message, opacity=1.0) if message.opacity > 0.0 else None

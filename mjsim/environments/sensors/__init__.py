@@ -1,4 +1,4 @@
-"""Sensors: the named arrays of an observation."""
+"""Sensors, each of which computes one named array of an observation."""
 
 from collections.abc import Sequence
 
@@ -32,10 +32,10 @@ BUNDLES = {"state": _VECTORS}
 
 
 def resolve_sensors(observations: Sequence[str | Sensor]) -> tuple[Sensor, ...]:
-    """Return the sensors with the given names, in order and without repetition. Bundles are expanded.
+    """Return the sensors with the given names, in order and without duplicates. Bundles are expanded.
 
     Raises:
-        EnvironmentConfigError: A name is unknown, there is no sensor, or different sensors have the same name.
+        EnvironmentConfigError: A name is unknown, the list is empty, or different sensors have the same name.
     """
     if isinstance(observations, str):
         observations = (observations,)

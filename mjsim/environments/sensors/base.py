@@ -1,4 +1,4 @@
-"""Sensors, each with the spec of its array and a function that computes the array."""
+"""Types for defining sensors, and the input that sensors receive."""
 
 import math
 from collections.abc import Callable
@@ -23,14 +23,14 @@ IMAGES = ("rgb", "depth", "segmentation")
 
 @dataclass(frozen=True)
 class CameraOptions:
-    """Options of the eye camera's images.
+    """Options for images from the person's eye camera.
 
     Attributes:
-        profile: Render profile: `draft`, `fast` or `quality`.
-        far: Distance to which depths are clipped, in metres.
+        profile: Render profile, which is `draft`, `fast` or `quality`.
+        far: Maximum depth in metres. Larger depths are clipped to this value.
 
     Raises:
-        EnvironmentConfigError: A size or `far` is not positive.
+        EnvironmentConfigError: The image size or `far` is not positive.
     """
 
     width: int = 128
@@ -49,25 +49,25 @@ class CameraOptions:
 
 @dataclass(frozen=True, eq=False)
 class ObservationLayout:
-    """Sizes and scales of an environment's observation arrays."""
+    """The sizes and normalization constants of an environment's observation arrays."""
 
-    slots: int  # number of rows in arrays with one row per object; row i belongs to object i of the episode
-    categories: tuple[str, ...]  # category keys, in the catalogue's order
-    receptacles: tuple[str, ...]  # receptacle keys, in the catalogue's order
+    slots: int  # number of rows in per-object arrays; row i belongs to object i of the episode
+    categories: tuple[str, ...]  # keys of the object categories, in catalogue order
+    receptacles: tuple[str, ...]  # keys of the receptacles, in catalogue order
     floor: Footprint  # obstacles and bounds of the floor
     camera: CameraOptions
-    max_speed: float  # speed by which velocities are divided, in m/s
+    max_speed: float  # maximum speed, used to normalize velocities, in m/s
     time_limit: float  # simulated time after which an episode is truncated, in seconds
 
     @property
     def scale(self) -> float:
-        """Diagonal of the floor's bounds in metres, by which lengths are divided."""
+        """The diagonal of the floor in metres, which is used to normalize lengths."""
         x_min, y_min, x_max, y_max = self.floor.bounds
         return math.hypot(x_max - x_min, y_max - y_min)
 
     @cached_property
     def edges(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Start points and vectors of the edges of all obstacles, in metres, each of shape (edges, 2)."""
+        """The start points and vectors of all obstacle edges, in metres, each of shape (edges, 2)."""
         outlines = self.floor.obstacles
         if not outlines:
             return np.empty((0, 2)), np.empty((0, 2))
@@ -80,12 +80,12 @@ class ObservationLayout:
 
 @dataclass(frozen=True, eq=False)
 class SensorInput:
-    """Input of sensors: the current state of an episode."""
+    """The input of a sensor, which contains the current state of an episode."""
 
     layout: ObservationLayout
     episode: CompiledEpisode
     state: Observation
-    images: frozenset[str]  # channels of `frame` that the environment's sensors need
+    images: frozenset[str]  # image channels that the environment's sensors need
 
     @property
     def world(self) -> World:
@@ -98,7 +98,7 @@ class SensorInput:
 
     @cached_property
     def frame(self) -> Frame:
-        """The first-person view with the channels in `images`, rendered at first use for all sensors.
+        """The first-person view with the channels in `images`. It is rendered once and shared by all sensors.
 
         Raises:
             RenderError: No OpenGL context can be created.
@@ -114,20 +114,20 @@ class SensorInput:
 
 
 def rotated(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
-    """Rotate vectors, shape (..., 2), counter-clockwise by an angle in radians."""
+    """Rotate vectors of shape (..., 2) counter-clockwise by an angle in radians."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(vectors @ np.array([[c, s], [-s, c]]))
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """One array of an observation.
+    """A sensor that computes one array of an observation.
 
     Attributes:
-        name: Key of the array in the observation.
-        declare: Function that returns the array's spec for a layout. `name` replaces the name of the spec.
-        read: Function that computes a new array, which conforms to the spec.
-        images: Channels of `SensorInput.frame` that `read` uses: `rgb`, `depth`, `segmentation`.
+        name: Key of the sensor's array in the observation.
+        declare: Function that returns the spec of the array for a layout. The spec is renamed to `name`.
+        read: Function that returns a new array that conforms to the spec.
+        images: Channels of `SensorInput.frame` that `read` uses, out of `rgb`, `depth` and `segmentation`.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Sensors of the house: map, distances to obstacles, receptacles."""
+"""Sensors for the floor map, the distances to obstacles and the positions of receptacles."""
 
 import math
 
@@ -11,17 +11,17 @@ from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInp
 
 MAP_SIZE = 64
 RAYS = 24
-RANGE = 3.0  # maximum distance that the rangefinder measures, in metres
-_SUBPIXEL = 8  # fractional bits of OpenCV's polygon vertices
+RANGE = 3.0  # maximum range of the rangefinder, in metres
+_SUBPIXEL = 8  # number of fractional bits in polygon coordinates passed to OpenCV
 
 
 def occupancy(layout: ObservationLayout) -> NDArray[np.uint8]:
-    """Return a square grid with 1 for obstacles. Row 0 is at the minimum y, column 0 at the minimum x."""
+    """Return a square grid with 1 in all cells with an obstacle. Rows are ordered by y and columns by x."""
     raster = np.zeros((MAP_SIZE, MAP_SIZE), np.uint8)
     x_min, y_min, x_max, y_max = layout.floor.bounds
     cells = np.array([MAP_SIZE / (x_max - x_min), MAP_SIZE / (y_max - y_min)])
     for outline in layout.floor.obstacles:
-        # OpenCV puts the centre of the first pixel at 0.
+        # In OpenCV, the centre of the first pixel has the coordinates (0, 0).
         corners = (outline - (x_min, y_min)) * cells - 0.5
         cv2.fillConvexPoly(raster, np.round(corners * 2**_SUBPIXEL).astype(np.int32), 1, shift=_SUBPIXEL)
     return raster
@@ -30,7 +30,7 @@ def occupancy(layout: ObservationLayout) -> NDArray[np.uint8]:
 def ray_distances(
     layout: ObservationLayout, position: NDArray[np.float64], heading: float
 ) -> NDArray[np.float64]:
-    """Return distances in metres from a point to obstacles, at most `RANGE`, counter-clockwise from `heading`."""
+    """Return obstacle distances along rays, at most `RANGE` metres, counter-clockwise from `heading`."""
     start, edge = _edges_in_front(layout, position)
     angles = heading + 2 * math.pi * np.arange(RAYS) / RAYS
     ray = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -46,7 +46,7 @@ def ray_distances(
 def _edges_in_front(
     layout: ObservationLayout, position: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return start points and vectors of edges in range that face `position`. Outlines are counter-clockwise."""
+    """Return the start points and vectors of all obstacle edges that face `position` and are in range."""
     start, edge = layout.edges
     offset = start - position
     facing = edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0] > 0

@@ -1,4 +1,4 @@
-"""Sensors of the person: pose, velocity, and the objects in the hands."""
+"""Sensors for the pose and velocity of the person, and for the objects in their hands."""
 
 import math
 

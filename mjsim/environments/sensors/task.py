@@ -1,4 +1,4 @@
-"""Sensors of the objects and the remaining task. Arrays have one row per slot, with zeros in unused slots."""
+"""Sensors for the objects and the progress of the task. Unused rows of per-object arrays are zero."""
 
 from collections.abc import Sequence
 
@@ -35,7 +35,7 @@ def _positions(inputs: SensorInput) -> Array:
 
 def _rotations(inputs: SensorInput) -> Array:
     quaternions = inputs.state.object_quaternions
-    # A quaternion and its negative are the same rotation: use the one with w >= 0.
+    # A quaternion and its negative describe the same rotation, so the one with w >= 0 is used.
     upper = np.where(quaternions[:, :1] < 0, -quaternions, quaternions)
     unit = upper / np.linalg.norm(upper, axis=1, keepdims=True)
     return _padded(inputs, np.clip(unit, -1.0, 1.0).astype(np.float32))
@@ -53,9 +53,10 @@ def _categories(inputs: SensorInput) -> Array:
 
 
 def goals(inputs: SensorInput) -> NDArray[np.float64]:
-    """Return the floor point of each object's next pick or place, in metres, shape (objects, 2).
+    """Return the floor position of the next pick or place of each object, in metres, shape (objects, 2).
 
-    This is the position of a loose object, and otherwise the position of its receptacle.
+    For a loose object, this is the object's own position. For any other object, it is the receptacle's
+    position.
     """
     state, scene = inputs.state, inputs.world.scene
     bins = np.array([scene.receptacles[scene.episode.targets[n]].center[:2] for n in state.object_names])

@@ -1,4 +1,4 @@
-"""Sensors of the person's view: images from the eye, and the objects in view."""
+"""Sensors for first-person images and for the objects in view."""
 
 from typing import Any
 
@@ -10,13 +10,13 @@ from mjsim.environments.sensors.base import ObservationLayout, Sensor, SensorInp
 from mjsim.house.sight.sight import visible_objects
 from mjsim.values.errors import EnvironmentConfigError
 
-# Labels of `mjsim.render.Labels`: background -1, house 0, person 1, then receptacles, then the objects by slot
+# Segmentation labels: -1 is the background, 0 the house, 1 the person. Receptacles and objects follow.
 MIN_LABEL = -1
 FIRST_RECEPTACLE = 2
 
 
 def first_object(layout: ObservationLayout) -> int:
-    """Return the label of the object in slot 0, which is the same in every episode."""
+    """Return the segmentation label of the first object, which is the same in every episode."""
     return FIRST_RECEPTACLE + len(layout.receptacles)
 
 

@@ -1,1 +1,1 @@
-"""Export of houses and scenes as glTF with WebP textures, and readers of glTF files."""
+"""Readers for glTF files, and writers that export houses and scenes as glTF with WebP textures."""

@@ -1,4 +1,4 @@
-"""Cache of compressed scene files on disk."""
+"""A disk cache of compressed scene files."""
 
 import fcntl
 import gzip
@@ -20,19 +20,20 @@ from mjsim.support.files import WORK, replacing, source_digest, work_folder
 from mjsim.support.kernels import UNUSED
 
 _LEVEL = 9
-_COMPRESSED = (".webp",)  # suffixes of file formats that are already compressed
+_COMPRESSED = (".webp",)  # file name suffixes of formats that are already compressed
 
 
 def scene_hash(catalogue: Catalogue) -> str:
-    """Hash everything that determines the scene files: the house, mjsim, MuJoCo and OpenCV. Return 20 hex digits."""
+    """Return a hash (20 hex digits) of the house and the software that determine the scene files."""
     parts = (catalogue.content, source_digest("mjsim"), mujoco.__version__, cv2.__version__)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
 
 def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
-    """Write the files of a house into a folder named by their hash, unless the folder exists. Return the folder.
+    """Return the folder with the scene files of a house. Write the files first if they are not in the cache.
 
-    Compressible files are stored only as `NAME.gz`. If another process is writing the same files, wait for it.
+    The name of the folder is the scene hash. Compressible files are stored only as `NAME.gz`. If another
+    process is writing the same files, wait until it has finished.
 
     Raises:
         AssetError: The house cannot be exported.
@@ -50,7 +51,7 @@ def cached_scene(catalogue: Catalogue, folder: Path) -> Path:
 
 
 def cached_floor(catalogue: Catalogue, scene: Path, body_radius: float) -> str:
-    """Write the floor data for walking with this trunk radius, in metres, unless the file exists. Return its name.
+    """Return the name of the floor data file for a trunk radius in metres. Write the file if it is missing.
 
     Raises:
         OSError: The file cannot be written.

@@ -1,4 +1,4 @@
-"""Cube textures for glTF, which has none: triangles are cut along the cube's edges and mapped to one flat image."""
+"""Map cube textures to flat images for glTF, after cutting triangles along the edges of the cube."""
 
 import itertools
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from mjsim.formats.gltf.shapes import Floats, Indices, Shape
 
-FACES = 6  # number of cube faces, stacked in the image in the order +x, -x, +y, -y, +z, -z
-_MAX_SHIFT = 0.015  # maximum shift of the image at the midpoint of an edge, as a fraction of the face width
+FACES = 6  # number of cube faces, which are stacked in the image in the order +x, -x, +y, -y, +z, -z
+_MAX_SHIFT = 0.015  # maximum image distortion at the midpoint of an edge, as a fraction of the face width
 _MAX_CUTS = 4  # maximum number of times an edge is halved
 _EDGE = 1e-6  # relative tolerance for directions that lie on an edge of the cube
-# For each face, the cube axis and the sign along which its columns and rows increase (OpenGL's convention).
+# Cube axis and direction in which the columns and rows of each face increase, as in OpenGL.
 _COLUMNS = ((2, -1.0), (2, 1.0), (0, 1.0), (0, 1.0), (0, 1.0), (0, -1.0))
 _ROWS = ((1, -1.0), (1, -1.0), (2, 1.0), (2, -1.0), (1, -1.0), (1, -1.0))
 
 
 def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
-    """Return a shape with texture coordinates for a cube texture that surrounds it.
+    """Add texture coordinates for a surrounding cube texture to a shape.
 
     Args:
-        shape: Triangles. The direction of a vertex from the cube's centre is `unscaled * scale`.
-        scale: Factors (3,).
-        side: Width of a face in pixels.
-        faces: Number of faces in the image, 6 or 1. A single face is shown on all sides.
+        shape: The shape. The direction of a vertex from the centre of the cube is `unscaled * scale`.
+        scale: Scale factors of the directions, shape (3,).
+        side: Width of a cube face in pixels.
+        faces: Number of faces in the image, which is 6, or 1 if all sides show the same face.
     """
     directions = shape.unscaled * scale
     corners = np.concatenate((shape.positions, shape.normals, directions), axis=1)[shape.triangles]
@@ -33,7 +33,7 @@ def laid_out(shape: Shape, scale: Floats, side: int, faces: int) -> Shape:
         corners = _halved(corners)
     face = _faces_of(corners)
     uv = _coordinates(corners[..., 6:], face)
-    inset = 0.5 / side  # keeps the texture filter from blending in the next face
+    inset = 0.5 / side  # half a pixel, so that texture filtering does not blend adjacent faces
     uv = np.clip(uv, inset, 1.0 - inset)
     if faces > 1:
         uv[..., 1] = (uv[..., 1] + face[:, None]) / faces
@@ -46,7 +46,7 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
     crossing = (values.min(axis=1) < 0.0) & (values.max(axis=1) > 0.0)
     pieces = [corners[~crossing]]
     corners, values = corners[crossing], values[crossing]
-    # Rotate the corners so that the first is alone on its side of the cut, or is on it and the others on both sides.
+    # Order the corners so that the first is alone on its side of the cut, or on a cut between the others.
     signs = np.sign(values)
     alone = np.where(
         (signs == 0.0).any(axis=1),
@@ -66,13 +66,13 @@ def _cut(corners: Floats, sign: float, i: int, j: int) -> Floats:
 
 
 def _between(a: Floats, b: Floats, at: Floats, bt: Floats) -> Floats:
-    """Return points (t, k) between `a` and `b` where values that change linearly from `at` to `bt` are zero."""
+    """Return the points (t, k) between `a` and `b` at which values that go from `at` to `bt` are zero."""
     share = np.divide(at, at - bt, out=np.zeros_like(at), where=at != bt)[:, None]
     return a + share * (b - a)
 
 
 def _halved(corners: Floats) -> Floats:
-    """Cut triangles into four if linear interpolation would shift the image by more than `_MAX_SHIFT`."""
+    """Divide triangles into four if linear interpolation would shift the image by more than `_MAX_SHIFT`."""
     after = np.roll(corners, -1, axis=1)
     face = _faces_of(corners)
     ends = _coordinates(corners[..., 6:], face), _coordinates(after[..., 6:], face)

@@ -1,4 +1,4 @@
-"""Export of a house for other renderers: GLB files of the house, its objects and the person, and a JSON index."""
+"""Export a house for other renderers, as GLB files with a JSON index."""
 
 import json
 import re
@@ -26,30 +26,33 @@ from mjsim.values.episode import Episode, PlacedObject, StartPose
 from mjsim.values.errors import AssetError
 
 HOUSE, PERSON, SKY, SHADOW = "house.glb", "person.glb", "sky.webp", "shadow.webp"
-_AWAY = -100.0  # height of the object models in metres, far below the house
+_AWAY = -100.0  # height at which object models are placed for the export, in metres, far below the house
 _HANDS = tuple(f"{avatar.PREFIX}{hand}_hand" for hand in avatar.HANDS)
 
 
 def export_scene(catalogue: Catalogue) -> dict[str, bytes]:
-    """Return the files of a house by name. `scene.json` describes the others.
+    """Return all files of an exported house by name. The file `scene.json` describes the others.
 
     Raises:
-        AssetError: The house breaks a convention of docs/models.md, or shows something that cannot be exported.
+        AssetError: The house breaks a convention of docs/models.md, or a geom cannot be exported.
     """
     return _Export(_one_of_each(catalogue)).files()
 
 
 def export_episode(scene: Scene) -> bytes:
-    """Return a GLB file of an episode at its start: the house, its receptacles, and its objects in their start poses.
+    """Return a GLB file that shows the house, the receptacles and the objects at the start of an episode.
 
     Raises:
-        AssetError: The scene shows something that cannot be exported.
+        AssetError: The scene contains a geom that cannot be exported.
     """
     return _Export(scene).episode()
 
 
 def floor_json(catalogue: Catalogue, body_radius: float) -> bytes:
-    """Return the floor data for walking with this trunk radius, in metres, as JSON. Arrays are flattened row by row."""
+    """Return JSON data about the floor on which a person with this trunk radius, in metres, can walk.
+
+    Arrays are flattened in row-major order.
+    """
     floor = Floor.of(compiled_house(catalogue).model, body_radius)
     plain = {
         name: np.ravel(value).tolist() if isinstance(value, np.ndarray) else value
@@ -148,7 +151,7 @@ class _Export:
         return glb, glb.node("house", self._rooms(glb), rotation=UPRIGHT, extras=lights_of(self._drawn))
 
     def _rooms(self, glb: Glb) -> list[int]:
-        """Return nodes of static geoms, split for culling. Ceilings are separate, since top-down views omit them."""
+        """Add nodes for the static geoms of each part of the house. Ceilings have nodes of their own."""
         groups: dict[tuple[bool, str], list[GeomSurface]] = {}
         for surface, part in divided(self._by_body.get(0, []), self._scene.rooms):
             groups.setdefault((surface.is_ceiling, part), []).append(surface)
@@ -173,7 +176,7 @@ class _Export:
         return (surface.within(position, rotation) for surface in found)
 
     def _person(self) -> tuple[Glb, int]:
-        """Return the hands at rest, in the frame of a person's body. The body itself is not drawn."""
+        """Build the hands at rest, in the frame of the person's body. The body itself is not exported."""
         glb = Glb(self._images)
         base, turned, _ = self._frame(self._model.body(avatar.BODY).id)
         hands = []
@@ -206,16 +209,16 @@ class _Export:
         }
 
     def _sky(self) -> bytes | None:
-        """Return the six faces of the sky stacked as right, left, up, down, front, back, or None if there is no sky."""
+        """Return an image of the sky as six stacked faces (right, left, up, down, front, back), or None."""
         found = np.flatnonzero(self._model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
         if not len(found):
             return None
         image = pixels(self._model, found[0])
-        faces = FACES * image.shape[1] // image.shape[0]  # 1 if the image contains all six faces
+        faces = FACES * image.shape[1] // image.shape[0]  # 1 if the image already contains six faces
         return webp(np.tile(image, (faces, 1, 1)), lossless=True)
 
     def _shadow(self) -> tuple[dict[str, Any], bytes] | None:
-        """Return parameters and texture of contact shadows, or None if the house has no material for them."""
+        """Return the parameters and texture of contact shadows, or None if there is no shadow material."""
         material = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_MATERIAL, shadows.MATERIAL)
         textures = self._model.mat_texid[:, mujoco.mjtTextureRole.mjTEXROLE_RGB]
         texture = textures[material] if material >= 0 else -1
@@ -240,7 +243,7 @@ def _rooms(rooms: RoomMap) -> list[dict[str, Any]]:
 
 
 def _file_name(key: str) -> str:
-    """Turn a catalogue key, which may contain any character, into a name for files and URLs."""
+    """Convert a catalogue key, which may contain any character, to a safe name for files and URLs."""
     if re.fullmatch(r"[A-Za-z0-9_-]{1,80}", key):
         return key
     return f"{re.sub(r'[^A-Za-z0-9_-]', '_', key)[:40]}-{zlib.crc32(key.encode()):08x}"

@@ -1,4 +1,4 @@
-"""Writer for GLB files with merged meshes, quantised vertices, materials and WebP textures."""
+"""Write GLB files with merged meshes, quantized vertices, materials and WebP textures."""
 
 import functools
 import json
@@ -18,26 +18,26 @@ from mjsim.formats.gltf.surfaces import GeomSurface
 from mjsim.house.compiled.sites import RoomMap
 
 UPRIGHT = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion (x, y, z, w) that rotates the z axis to the y axis
-# Quantisation steps of positions, from 1/128 mm to 128 mm.
+# Possible quantization steps of vertex positions, from 1/128 mm to 128 mm.
 _STEPS = [2.0**-k / 1000.0 for k in range(7, -8, -1)]
 _UV_STEP = 2.0**-13
 _COMPONENTS = {
     np.dtype(kind): code
     for kind, code in (("i1", 5120), ("u1", 5121), ("u2", 5123), ("u4", 5125), ("f4", 5126))
 }
-_VERTICES, _TRIANGLES = 34962, 34963  # targets of buffer views, as defined by glTF
+_VERTICES, _TRIANGLES = 34962, 34963  # values of bufferView.target in glTF
 _EXTENSIONS = {"mesh": "KHR_mesh_quantization", "texture": "EXT_texture_webp"}
-_MANY_TRIANGLES = 50_000  # a material with more triangles is drawn by one call per room
-_SQUARE = 16.0  # side of a square of floor in metres; positions in it are quantised to 0.25 mm
-_QUALITY, _LOSSLESS = 90, 101  # quality settings of OpenCV's WebP encoder
+_MANY_TRIANGLES = 50_000  # number of triangles above which a material is divided by room
+_SQUARE = 16.0  # side length of the smallest floor squares into which surfaces are grouped, in metres
+_QUALITY, _LOSSLESS = 90, 101  # quality settings for OpenCV's WebP encoder
 
 
 class MaterialKey(NamedTuple):
-    """Properties shared by the surfaces that are drawn by one call."""
+    """Material properties that surfaces must share to be merged into one draw call."""
 
-    texture: int  # texture id, or -1 for none
+    texture: int  # texture id, or -1 without a texture
     is_translucent: bool
-    is_decal: bool  # True for a translucent plane, which MuJoCo draws before other translucent geoms
+    is_decal: bool  # True for a translucent plane, which is drawn before other translucent geoms
 
     @classmethod
     def of(cls, surface: GeomSurface) -> "MaterialKey":
@@ -45,9 +45,10 @@ class MaterialKey(NamedTuple):
 
 
 class Glb:
-    """A GLB file under construction.
+    """A builder for a GLB file.
 
-    `image` returns the name and the WebP file of a texture, given its id and whether its alpha channel is used.
+    `image` is a function that returns the name and the WebP file of a texture. Its arguments are the texture
+    id and a flag that is True if the alpha channel is used.
     """
 
     def __init__(self, image: Callable[[int, bool], tuple[str, bytes]]) -> None:
@@ -65,7 +66,7 @@ class Glb:
         self.primitives = 0
 
     def node(self, name: str, children: Sequence[int] = (), **properties: Any) -> int:
-        """Add a node without a mesh, and return its number. `properties` are glTF properties of the node."""
+        """Add a node without a mesh, and return its index. `properties` are additional glTF properties."""
         node = {"name": name, **properties}
         if children:
             node["children"] = list(children)
@@ -73,7 +74,7 @@ class Glb:
         return len(self._nodes) - 1
 
     def mesh(self, name: str, surfaces: Iterable[GeomSurface], **properties: Any) -> int:
-        """Add a node with surfaces, which are merged by material. Return its number."""
+        """Add a node with a mesh of surfaces that are merged by material. Return the index of the node."""
         groups: dict[MaterialKey, list[GeomSurface]] = {}
         for surface in surfaces:
             groups.setdefault(MaterialKey.of(surface), []).append(surface)
@@ -141,7 +142,7 @@ class Glb:
     def _attribute(
         self, values: NDArray[Any], kind: str, *, normalized: bool = False, bounds: bool = False
     ) -> int:
-        """Add an accessor of vertex values (n, k). Each vertex is aligned to 4 bytes."""
+        """Add an accessor for vertex values (n, k), which are aligned to 4 bytes. Return its index."""
         width = values.shape[1] * values.itemsize
         stride = -(-width // 4) * 4
         padded = np.zeros((len(values), stride // values.itemsize), values.dtype)
@@ -180,7 +181,7 @@ class Glb:
         return len(self._views) - 1
 
     def content(self, root: int) -> bytes:
-        """Return the complete file. Its scene has a single root node."""
+        """Return the content of the GLB file, whose scene has a single root node."""
         sampler = {"magFilter": 9729, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497}
         lists: Mapping[str, Any] = {
             "nodes": self._nodes,
@@ -216,17 +217,17 @@ class Glb:
 
 
 def linear(rgba: Floats) -> Floats:
-    """Convert a displayed colour (4,) to linear light, which glTF requires for vertex colours."""
+    """Convert an sRGB colour (4,) to the linear colour that glTF requires for vertices."""
     rgb = rgba[:3]
     return np.append(np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), rgba[3])
 
 
 def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[GeomSurface, str]]:
-    """Divide static surfaces into parts that are few enough to draw fast and small enough to cull and quantise well.
+    """Divide static surfaces into parts, so that they can be culled, quantized and drawn efficiently.
 
-    Yield each surface with the name of its part. The part is the room if the material has many triangles. Otherwise it
-    is the smallest square of floor as wide as the surface, because small surfaces would be quantised more coarsely next
-    to much larger ones.
+    Yield each surface with the name of its part. If its material has many triangles, the part is the room.
+    Otherwise, the part is a square of the floor that is about as wide as the surface, because positions in
+    larger parts are quantized more coarsely.
     """
     x_min, y_min, x_max, y_max = rooms.bounds
     centre = np.array([x_min + x_max, y_min + y_max]) / 2
@@ -244,9 +245,9 @@ def divided(surfaces: Sequence[GeomSurface], rooms: RoomMap) -> Iterator[tuple[G
 
 
 def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
-    """Return the image of a texture, uint8, shape (height, width, channels).
+    """Return the image of a texture as a uint8 array of shape (height, width, channels).
 
-    For cubes and skies, it holds six stacked faces, or a single face that is shown on all sides.
+    The image of a cube or sky texture contains six stacked faces, or one face that is shown on all sides.
     """
     sizes = model.tex_height, model.tex_width, model.tex_nchannel
     shape = tuple(int(size[texture]) for size in sizes)
@@ -256,7 +257,7 @@ def pixels(model: Any, texture: int) -> NDArray[np.uint8]:
 
 
 def texture_encoder(model: Any) -> Callable[[int, bool], tuple[str, bytes]]:
-    """Return a cached function that encodes a model's textures for `Glb`."""
+    """Return a cached function that encodes the textures of a model for `Glb`."""
 
     @functools.cache
     def encode(texture: int, alpha: bool) -> tuple[str, bytes]:

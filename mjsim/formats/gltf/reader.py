@@ -1,4 +1,4 @@
-"""Readers for mesh files (glTF, GLB, OBJ and others) and for Habitat's scene_instance.json, which combines several."""
+"""Import houses from mesh files such as glTF, GLB and OBJ, and from Habitat scenes."""
 
 import math
 import re
@@ -32,18 +32,18 @@ from mjsim.values.errors import AssetError
 
 INSTANCE = ".scene_instance.json"
 SEMANTICS = ".semantic_config.json"
-# Key in the user_defined section of templates that were exported from an mjsim bin.
+# Key in the user_defined section of a Habitat template that marks an exported mjsim bin.
 RECEPTACLE = "mjsim_receptacle"
 
 
 def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a mesh file of a house. Each node becomes a piece."""
+    """Read a house from a mesh file. Each node of the scene becomes a piece."""
     parts = read_parts(path)
     points = np.concatenate([surface.corners.reshape(-1, 3) for _, surface in parts])
     sides = np.ptp(points, axis=0)
     frame = np.eye(4)
     notes: list[ImportDecision] = []
-    known = path.suffix.lower() in (*GLTF, ".dae")  # these formats define the unit and the vertical axis
+    known = path.suffix.lower() in (*GLTF, ".dae")  # True if the format defines unit and vertical axis
     given = options.up or _stage_up(path)
     up = given or ("z" if known else "y" if sides[1] <= sides[2] else "z")
     if up == "y" and not known:
@@ -52,7 +52,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
     elif known and given == ("z" if path.suffix.lower() in GLTF else "y"):
         frame = np.linalg.inv(Y_TO_Z) if up == "z" else Y_TO_Z
     unit, longest = options.units, float(sides.max())
-    # Many glTF files are not in metres, contrary to the standard.
+    # Many glTF files use other units than metres, contrary to the standard.
     if unit is None and (not known or longest > MAX_SIDE):
         unit = unit_of(longest) or "m"
         notes.append(ImportDecision("unit", unit, f"then its longest side is {longest * UNITS[unit]:.1f} m"))
@@ -62,7 +62,7 @@ def read_mesh_scene(path: Path, options: HouseOptions) -> SourceScene:
 
 
 def read_habitat(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a Habitat stage with its objects. Raise `AssetError` if a template or its mesh is missing."""
+    """Read a Habitat scene with its objects. Raise `AssetError` if a template or its mesh is missing."""
     scene = _read(path)
     missing = MissingFiles(options.skip_missing)
     reader = _HabitatReader(path, missing)
@@ -104,7 +104,7 @@ class _HabitatReader:
         }
 
     def rooms(self, name: str) -> tuple[NamedRoom, ...]:
-        """Return the rooms described by a semantic_config.json, or none if the file is missing."""
+        """Return the rooms from a semantic_config.json file, or no rooms if the file is missing."""
         found: dict[str, NamedRoom] = {}
         if (file := self._files.get(name + SEMANTICS)) is None:
             return ()
@@ -126,7 +126,7 @@ class _HabitatReader:
         return tuple(found.values())
 
     def instance(self, item: dict[str, Any], kind: str) -> Iterator[ScenePiece]:
-        """Yield the pieces of a stage or an object in its pose, with z up."""
+        """Yield the pieces of a stage or object in its pose, converted to z up."""
         name = str(item.get("template_name", "")).rpartition("/")[2]
         config_file = self._files.get(f"{name}.{kind}_config.json")
         config = _read(config_file) if config_file else {}
@@ -147,7 +147,7 @@ class _HabitatReader:
         scale = numbers(config.get("scale", [1, 1, 1]), 3, config_file or self._path)
         scale = scale * float(item.get("uniform_scale", 1.0))
         upright = np.eye(4)
-        if _is_z_up(config):  # Habitat rotates such a mesh so that y is up
+        if _is_z_up(config):  # Habitat rotates meshes with z up so that y is up
             upright = np.linalg.inv(Y_TO_Z)
         own: Floats = Y_TO_Z @ frame @ np.diag([*scale, 1.0]) @ upright @ np.linalg.inv(Y_TO_Z)
         marks = config.get("user_defined")

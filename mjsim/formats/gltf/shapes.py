@@ -1,4 +1,4 @@
-"""Triangulation of geoms with the same vertices and normals as MuJoCo's renderer."""
+"""Triangulate geoms with the same vertices and normals as MuJoCo's renderer."""
 
 import math
 from typing import Any, NamedTuple
@@ -12,21 +12,21 @@ Indices = NDArray[np.int64]
 
 _Geom = mujoco.mjtGeom
 MESHES = (_Geom.mjGEOM_MESH, _Geom.mjGEOM_SDF)
-_FLATTENED_BELOW = 0.8  # cosine between vertex and face normal below which MuJoCo uses the face normal
+_FLATTENED_BELOW = 0.8  # cosine between vertex and face normals below which shading is flat
 
 
 class Shape(NamedTuple):
-    """Triangles in a geom's frame."""
+    """A triangle mesh in the frame of a geom."""
 
     positions: Floats  # vertices in metres, shape (n, 3)
     normals: Floats  # unit normals, shape (n, 3)
-    triangles: Indices  # vertex indices, counter-clockwise seen from outside, shape (t, 3)
-    unscaled: Floats  # directions from the centre of a cube texture, shape (n, 3)
-    uv: Floats | None  # texture coordinates with v downwards, shape (n, 2), or None for a mesh without them
+    triangles: Indices  # vertex indices in counter-clockwise order seen from outside, shape (t, 3)
+    unscaled: Floats  # vertex directions from the centre of a cube texture, shape (n, 3)
+    uv: Floats | None  # texture coordinates with v pointing down, shape (n, 2), or None if a mesh has none
 
 
 def shape_of(model: Any, geom: Any) -> Shape:
-    """Return the triangles of an `MjvGeom` of a model. Raise `ValueError` if this type of geom cannot be drawn."""
+    """Triangulate a geom (`MjvGeom`) of a model. Raise `ValueError` if its type is not supported."""
     kind, size = _Geom(geom.type), np.array(geom.size, np.float64)
     if kind in MESHES:
         return _mesh(model, geom.dataid // 2)
@@ -76,7 +76,7 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
     axes = flat * np.cos(angle), flat * np.sin(angle), np.sin(0.5 * math.pi * up)
     points = np.stack(axes, axis=-1).reshape(-1, 3)
     uv = np.column_stack((around.ravel(), (high - up.ravel()) / (high - low)))
-    # A cell at a pole is a single triangle. In the image, its corner at the pole is midway between the other two.
+    # Cells at a pole are single triangles. The u coordinate of the pole is midway between the other corners.
     is_pole = np.abs(points[:, 2]) > 1.0 - 1e-9
     uv[is_pole, 0] -= 0.5 / slices * np.sign(points[is_pole, 2])
     triangles = _grid(len(up) - 1, slices)
@@ -84,7 +84,6 @@ def _sphere(slices: int, stacks: int, low: int = -1, high: int = 1) -> Shape:
 
 
 def _circle(slices: int) -> Floats:
-    """Return points of the unit circle, shape (slices + 1, 2). The last point repeats the first."""
     angles = np.arange(slices + 1) * (2.0 * math.pi / slices)
     return np.column_stack((np.cos(angles), np.sin(angles)))
 
@@ -114,17 +113,17 @@ def _quad() -> Shape:
 
 
 def _plane(size: Floats, far: float) -> Shape:
-    """Return a plane with half-sizes in metres. A half-size of 0 means infinite, and is drawn up to `far`."""
+    """Return a plane with the given half sizes. A half size of 0 means infinite and is drawn up to `far`."""
     shape = _quad()
     endless = size[:2] <= 0.0
     half = np.where(endless, far, size[:2])
-    # The image of an infinite plane starts in its middle and is 2 m wide.
+    # On an infinite plane, the image is 2 m wide and starts at the centre of the plane.
     uv = shape.positions[:, :2] * [0.5, -0.5] * np.where(endless, half, 1.0) + np.where(endless, 0.0, 0.5)
     return shape._replace(positions=shape.positions * [*half, 1.0], uv=uv)
 
 
 def _box() -> Shape:
-    """Return six quads. The image is upright on the vertical quads, and mirrored on three of the six."""
+    """Return the six sides of a box. The image is upright on vertical sides and mirrored on three sides."""
     quad, sides = _quad(), []
     for normal, right, up in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for sign in (-1.0, 1.0):
@@ -138,13 +137,13 @@ def _box() -> Shape:
 
 
 def _capsule(size: Floats, slices: int, stacks: int) -> Shape:
-    """Return a tube between two hemispheres. Each of the three shows the whole image."""
+    """Return a capsule, which consists of a tube and two hemispheres. Each part shows the whole image."""
     radius, half = (size[0] + size[1]) / 2.0, size[2]
     parts = [_scaled(_tube(slices), size)]
     for low, high in ((0, 1), (-1, 0)):
         cap = _scaled(_sphere(slices, stacks, low, high), np.array([size[0], size[1], radius]))
         up = np.array([0.0, 0.0, low + high])
-        # MuJoCo's hemispheres are on the ends of the unit cylinder.
+        # In MuJoCo, the hemispheres are centred at the ends of the unit cylinder.
         parts.append(cap._replace(positions=cap.positions + half * up, unscaled=cap.unscaled + up))
     return _joined(*parts)
 
@@ -162,7 +161,7 @@ def _mesh(model: Any, mesh: int) -> Shape:
 
 
 def _flattened(corners: Floats, normals: Floats) -> Floats:
-    """Replace the normals (t, 3, 3) of corners by the face's normal if the two differ too much."""
+    """Replace vertex normals (t, 3, 3) by the face normal if the angle between them is large."""
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-15)
     along = np.einsum("tck,tk->tc", normals, flat)

@@ -1,13 +1,13 @@
-"""Paths of scene files on disk. They are separate from the writers so that servers import them quickly."""
+"""Paths of scene files on disk. This module is separate from the writers because it is fast to import."""
 
 from pathlib import Path
 
 from mjsim.support.kernels import cache_base
 
 GZIP = ".gz"
-SCENE = "scene.json"  # file that lists the others
+SCENE = "scene.json"  # JSON file that describes the other files
 
 
 def scenes_folder() -> Path:
-    """Return the folder of all scenes. It is in `NUMBA_CACHE_DIR` if set, otherwise in the user's cache folder."""
+    """Return the folder of all scenes, which is in `NUMBA_CACHE_DIR` or in the user's cache folder."""
     return cache_base() / "scenes"

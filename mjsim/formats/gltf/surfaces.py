@@ -1,4 +1,4 @@
-"""Surfaces and lights of a scene in the `fast` profile."""
+"""Extract the surfaces and lights of a scene, as drawn in the `fast` render profile."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -14,29 +14,30 @@ from mjsim.render.rasteriser import FIRST_PERSON_GROUPS, TOP_DOWN_GROUPS
 from mjsim.render.scene_settings import visual_option
 from mjsim.values.errors import AssetError
 
-_OPAQUE_FROM = 0.995  # minimum alpha of geoms that MuJoCo draws without blending
+_OPAQUE_FROM = 0.995  # minimum alpha of geoms that MuJoCo draws as opaque
 _RGB = mujoco.mjtTextureRole.mjTEXROLE_RGB
 _MAX_LIGHTS = 8  # OpenGL's maximum number of lights, including the headlight
-_AMBIENT_ALONE = 0.3  # ambient light of a scene without lights
+_AMBIENT_ALONE = 0.3  # intensity of ambient light in a scene without lights
 _COLOURS = ("ambient", "diffuse", "specular")
 _LIGHTS = {mujoco.mjtLightType.mjLIGHT_SPOT: "spot", mujoco.mjtLightType.mjLIGHT_DIRECTIONAL: "directional"}
 
 
 @dataclass(frozen=True, eq=False)
 class GeomSurface:
-    """Visible surface of one geom, in the frame of the house.
+    """The visible surface of one geom, in the frame of the house.
 
     Attributes:
-        geom: Id of the geom.
+        geom: MuJoCo id of the geom.
         positions: Vertices in metres, shape (n, 3).
         normals: Unit normals, shape (n, 3).
-        triangles: Vertex indices, counter-clockwise seen from outside, shape (t, 3).
-        uv: Texture coordinates with v downwards, shape (n, 2), or None without a texture.
-        texture: Texture id, or -1 for none.
-        rgba: Displayed colour from 0 to 1, shape (4,).
-        shine: Specular, shininess and emission from 0 to 1, shape (3,).
-        is_decal: True for a translucent plane (a drawn shadow). MuJoCo draws decals before other translucent geoms.
-        is_ceiling: True if top-down views omit the geom.
+        triangles: Vertex indices in counter-clockwise order seen from outside, shape (t, 3).
+        uv: Texture coordinates with v pointing down, shape (n, 2), or None without a texture.
+        texture: MuJoCo id of the texture, or -1 without a texture.
+        rgba: RGBA colour from 0 to 1, shape (4,).
+        shine: Specular, shininess and emission values from 0 to 1, shape (3,).
+        is_decal: True for a translucent plane, such as a contact shadow. MuJoCo draws decals before other
+            translucent geoms.
+        is_ceiling: True if the geom is omitted in top-down views.
     """
 
     geom: int
@@ -52,13 +53,13 @@ class GeomSurface:
     is_ceiling: bool
 
     def within(self, position: Floats, rotation: Floats) -> "GeomSurface":
-        """Return the surface in the frame of a body at `position` in metres, with the axes in columns of `rotation`."""
+        """Transform the surface to the frame of a body with the given position and rotation matrix."""
         positions = (self.positions - position) @ rotation
         return replace(self, positions=positions, normals=self.normals @ rotation)
 
 
 def drawn_scene(model: Any, data: Any) -> Any:
-    """Return MuJoCo's abstract scene of everything that a first-person view can show."""
+    """Return a MuJoCo scene (`MjvScene`) with everything that a first-person view can show."""
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 100)
     option = visual_option(FIRST_PERSON_GROUPS, FAST)
     mujoco.mjv_updateScene(model, data, option, None, mujoco.MjvCamera(), mujoco.mjtCatBit.mjCAT_ALL, scene)
@@ -66,10 +67,10 @@ def drawn_scene(model: Any, data: Any) -> Any:
 
 
 def surfaces(model: Any, data: Any, scene: Any) -> Iterator[GeomSurface]:
-    """Yield the visible geoms of an abstract scene, in the order of the scene.
+    """Yield the surfaces of the visible geoms in a MuJoCo scene, in scene order.
 
     Raises:
-        AssetError: A geom is of a type that cannot be exported.
+        AssetError: A geom has a type that cannot be exported.
     """
     for geom in scene.geoms[: scene.ngeom]:
         if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.rgba[3] > 0.0:
@@ -86,7 +87,7 @@ def _surface(model: Any, data: Any, geom: Any) -> GeomSurface:
             f"geom {name!r} is of the type {kind}, which cannot be exported; make it a mesh"
         ) from None
     is_translucent = bool(geom.rgba[3] < _OPAQUE_FROM)
-    # Poses are read from the data, because the abstract scene moves infinite planes along with its camera.
+    # Take poses from the data, because the MuJoCo scene moves infinite planes along with its camera.
     position, rotation = data.geom_xpos[geom.objid], data.geom_xmat[geom.objid].reshape(3, 3)
     shape, texture = _textured(model, geom, shape)
     return GeomSurface(
@@ -116,19 +117,19 @@ def _textured(model: Any, geom: Any, shape: Shape) -> tuple[Shape, int]:
         if shape.uv is not None:
             is_endless = geom.type == mujoco.mjtGeom.mjGEOM_PLANE and size[:2].min() <= 0.0
             return shape._replace(uv=shape.uv * repeat - 0.5 * is_endless), texture
-        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # texture coordinates from the mesh's x and y
+        over = shape.unscaled[:, :2] / size[:2] * [0.5, -0.5]  # projects the texture along the mesh's z axis
         return shape._replace(uv=over * repeat + 0.5), texture
     if shape.uv is not None and geom.type in MESHES:
-        return shape, -1  # MuJoCo does not draw cube textures on meshes that have texture coordinates
+        return shape, -1  # MuJoCo ignores cube textures on meshes with texture coordinates
     width = int(model.tex_width[texture])
     return laid_out(shape, scale, width, int(model.tex_height[texture]) // width), texture
 
 
 def lights_of(scene: Any) -> dict[str, Any]:
-    """Describe the lights of an `MjvScene` in the house's frame, and the headlight, which shines along the view.
+    """Describe the headlight and the other lights of a MuJoCo scene as JSON values.
 
-    Positions are in metres and cutoffs in degrees. Lights of type `point` and `image` are left out, because MuJoCo does
-    not draw them.
+    Positions are in metres in the frame of the house, and cutoffs are in degrees. Lights of type `point` and
+    `image` are omitted, because MuJoCo does not draw them.
     """
     drawn = scene.lights[: min(scene.nlight, _MAX_LIGHTS)]
     headlight = next((_colours(light) for light in drawn if light.headlight), None)

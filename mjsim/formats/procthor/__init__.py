@@ -1,1 +1,1 @@
-"""Reader and writer for ProcTHOR's house JSON."""
+"""A reader and a writer for ProcTHOR houses, which are JSON files."""

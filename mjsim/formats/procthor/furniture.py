@@ -1,4 +1,4 @@
-"""Furniture for imported ProcTHOR houses. Each object is replaced by mjsim furniture stretched to its size."""
+"""Furniture for imported ProcTHOR houses, which is stretched to the size of the original objects."""
 
 import math
 import re
@@ -24,16 +24,16 @@ from mjsim.house.catalogue.house_ref import models_root
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-DATABASE = "asset-database.json"  # ProcTHOR's file with the types and sizes of its assets
-_DRAWN = 4  # number of pieces drawn of each type, of which the most similar one is used
-_STRETCH = math.log(2.2)  # logarithm of the largest factor by which a side is stretched
+DATABASE = "asset-database.json"  # ProcTHOR's file of asset types and sizes
+_DRAWN = 4  # number of random pieces per furniture type, from which the most similar one is chosen
+_STRETCH = math.log(2.2)  # logarithm of the maximum factor by which a side is stretched
 _GREY, _BLACK = np.array([0.62, 0.6, 0.57]), np.array([0.08, 0.08, 0.09])
 _SCREENS = ("desktop", "microwave", "television")
 _Entry = tuple[tuple[str, ...], tuple[float, float, float]]
 _CAN: _Entry = ((), (0.45, 0.35, 0.55))
 _SHELVES: _Entry = (("bookcase", "low_bookcase", "cube_shelf"), (0.9, 0.35, 1.45))
 _PICTURE: _Entry = ((), (0.8, 0.16, 0.6))
-# Word in a name -> similar mjsim furniture (if empty, a box is used), and typical width, depth and height in metres.
+# For each type of object, the similar mjsim furniture (none means a box) and the typical size in metres.
 _TYPES: Mapping[str, _Entry] = {
     "armchair": (("armchair",), (0.95, 0.9, 0.9)),
     "bathtub": (("bathtub",), (1.7, 0.8, 0.6)),
@@ -83,15 +83,15 @@ _TYPES: Mapping[str, _Entry] = {
 
 @dataclass(frozen=True)
 class AssetDatabase:
-    """Types and sizes of ProcTHOR's assets, from its database if available, otherwise guessed from their names."""
+    """Types and sizes of ProcTHOR assets, which are guessed from names if there is no database."""
 
-    types: Mapping[str, str]  # asset name -> object type
-    sizes: Mapping[str, Floats]  # asset -> width, depth and height in metres
-    source: str  # origin of the sizes, for the report
+    types: Mapping[str, str]  # object types by asset name
+    sizes: Mapping[str, Floats]  # width, depth and height in metres, by asset name
+    source: str  # origin of the sizes, for the import report
 
     @classmethod
     def read(cls, folders: Iterable[Path]) -> "AssetDatabase":
-        """Read the first database found in some folders. Raise `AssetError` if it is not valid."""
+        """Read the first database found in the given folders. Raise `AssetError` if it is not valid."""
         file = next((folder / DATABASE for folder in folders if (folder / DATABASE).is_file()), None)
         if file is None:
             return cls(
@@ -112,7 +112,7 @@ class AssetDatabase:
         return cls(types, sizes, f"of {DATABASE}")
 
     def type_of(self, thing: Thing) -> str:
-        """Return the longest key of `_TYPES` in a thing's type, asset or id, in this order, or "" if there is none."""
+        """Guess the furniture type of an object from its type, asset or id. Return "" if it is unknown."""
         for text in (self.types.get(thing.asset_id, ""), thing.asset_id, thing.id):
             plain = re.sub(r"[^a-z]", "", text.lower())
             if found := [key for key in _TYPES if key in plain]:
@@ -120,9 +120,10 @@ class AssetDatabase:
         return ""
 
     def size_of(self, thing: Thing, kind: str) -> Floats | None:
-        """Return the width, depth and height of a thing in metres, or None if they are unknown.
+        """Return the width, depth and height of an object in metres, or None if they are unknown.
 
-        Without a database, it is the type's typical size, with twice the height of the thing's centre if plausible.
+        Without a database, the typical size of the type is used. If plausible, the height is taken to be
+        twice the height of the object's centre above the floor.
         """
         size = self.sizes.get(thing.asset_id)
         if size is None and kind:
@@ -130,12 +131,12 @@ class AssetDatabase:
             if 0.5 < 2 * thing.position.y / size[2] < 1.6:
                 size[2] = 2 * thing.position.y
         if size is not None and _TYPES.get(kind) is _PICTURE:
-            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # deep enough to protrude from the wall
+            size = np.maximum(size, (0.0, _PICTURE[1][1], 0.0))  # deep enough to stand out from the wall
         return size
 
 
 def in_our_style(world: str, assets: Iterable[str]) -> str:
-    """Return MJCF of a world with the default classes of the apartment."""
+    """Return the MJCF of a world, with the default classes of the apartment model."""
     style = (models_root() / STYLE / "defaults.xml").read_text(encoding="utf-8")
     default = style[style.index("<default>") : style.rindex("</mujocoinclude>")]
     return (
@@ -145,7 +146,7 @@ def in_our_style(world: str, assets: Iterable[str]) -> str:
 
 
 class FurnitureLibrary:
-    """Furniture that replaces objects of some types. Pieces are written to one MJCF file and read back as surfaces."""
+    """A collection of mjsim furniture that can replace ProcTHOR objects of the given types."""
 
     def __init__(self, types: Iterable[str], folder: Path) -> None:
         self.file = folder / "furniture.xml"
@@ -169,7 +170,7 @@ class FurnitureLibrary:
         self.file.write_text(text, encoding="utf-8")
 
     def take(self, pieces: Iterable[ScenePiece]) -> None:
-        """Store the pieces that were read from `file`."""
+        """Store the surfaces of the furniture, which the caller has read from `file`."""
         bodies: dict[str, list[ScenePiece]] = {}
         for piece in pieces:
             bodies.setdefault(piece.name, []).append(piece)
@@ -177,19 +178,19 @@ class FurnitureLibrary:
             self._pieces.setdefault(name.partition(":")[0], []).append(found)
 
     def placed(self, thing: Thing, name: str, size: Floats, frame: Floats) -> tuple[list[ScenePiece], str]:
-        """Replace a thing by the most similar piece or a box. Return also the piece's type, which is empty for a box.
+        """Replace an object by similar furniture or by a box. Return the pieces and the furniture type.
 
         Args:
-            thing: Object to replace.
-            name: Its type, a key of `_TYPES` or "".
-            size: Its width, depth and height in metres, shape (3,).
-            frame: Transform (4, 4) from its centre to the house.
+            thing: The object to replace.
+            name: Type of the object, as returned by `AssetDatabase.type_of`.
+            size: Width, depth and height of the object in metres, shape (3,).
+            frame: Transform (4, 4) from the object's centre to the frame of the house.
         """
         choices: list[tuple[float, str, list[ScenePiece], Floats, Floats]] = []
         for kind in _TYPES[name][0] if name else ():
             for pieces in self._pieces.get(kind, []):
                 corners = np.concatenate([p.surface.corners.reshape(-1, 3) for p in pieces if p.solid])
-                # Heights are measured from z = 0, because legs may not be solid.
+                # Heights start at z = 0, because the legs of a piece may not be solid.
                 low, high = corners.min(axis=0) * (1, 1, 0), corners.max(axis=0)
                 stretch = float(np.abs(np.log(size / (high - low))).max())
                 choices.append((stretch, kind, pieces, low, high))

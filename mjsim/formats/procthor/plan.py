@@ -1,7 +1,8 @@
-"""Rooms, walls, openings and objects of ProcTHOR's house JSON.
+"""Read the rooms, walls, openings and objects of a ProcTHOR house from its JSON file.
 
-The JSON is left-handed with y up. Seen from above, its (x, z) are (x, y) in mjsim. Its walls have no thickness and are
-the centre lines of mjsim's walls. An object's position is the centre of its box, and its front faces z at rotation 0.
+The JSON file uses a left-handed coordinate system with y up. Seen from above, its (x, z) are (x, y) in mjsim.
+Its walls have no thickness and are the centre lines of walls in mjsim. The position of an object is the
+centre of its bounding box, and its front faces along z at rotation 0.
 """
 
 import math
@@ -20,8 +21,8 @@ from mjsim.generator.values import WALL
 from mjsim.support.files import read_json, read_text
 from mjsim.values.errors import AssetError, brief
 
-NAMES = "mjsim_rooms"  # key in the metadata of houses exported by mjsim, with room id -> [key, label]
-# Names of room types that differ; other names are split into words at their capitals.
+NAMES = "mjsim_rooms"  # metadata key of houses exported by mjsim; maps room ids to [key, label]
+# Names of room types that are not written in camel case.
 _TYPES = {"livingroom": "living_room"}
 
 
@@ -29,7 +30,7 @@ _Number = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
 
 
 class Vector(msgspec.Struct):
-    """A point in metres, or angles in degrees."""
+    """A position in metres or a rotation in degrees."""
 
     x: _Number = 0.0
     y: _Number = 0.0
@@ -60,11 +61,11 @@ class _Opening(msgspec.Struct, rename="camel"):
     room0: str | None = None
     room1: str | None = None
     hole_polygon: list[Vector] = []
-    bounding_box: _Span | None = None  # present in older files
+    bounding_box: _Span | None = None  # used by older files
 
 
 class Thing(msgspec.Struct, rename="camel"):
-    """An object, with the objects on top of it."""
+    """An object in the house, together with the objects on top of it."""
 
     id: str
     position: Vector
@@ -85,28 +86,28 @@ class _House(msgspec.Struct):
 
 @dataclass(frozen=True)
 class PlanWall:
-    """A wall, given by its centre line on the floor."""
+    """A wall, which is defined by its centre line on the floor."""
 
-    start: tuple[float, float]  # start of the wall in metres, shape (2,)
+    start: tuple[float, float]  # start point (x, y) in metres
     end: tuple[float, float]
     height: float
 
 
 @dataclass(frozen=True)
 class PlanOpening:
-    """A door or window, from `start` to `end` on the floor, in metres."""
+    """A door or window, which spans the wall from `start` to `end`, in metres."""
 
     start: tuple[float, float]
     end: tuple[float, float]
     bottom: float
     top: float
     is_door: bool
-    rooms: tuple[str, ...]  # keys of the rooms it connects; a front door has one
+    rooms: tuple[str, ...]  # keys of the rooms on both sides, or of one room for a front door
 
 
 @dataclass(frozen=True)
 class ProcthorPlan:
-    """Plan of a house in metres, with z up."""
+    """The floor plan of a ProcTHOR house, converted to metres with z up."""
 
     rooms: tuple[NamedRoom, ...]
     walls: tuple[PlanWall, ...]
@@ -114,7 +115,7 @@ class ProcthorPlan:
 
 
 def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
-    """Read the plan of a house and its objects. Raise `AssetError` if the file is not a valid house."""
+    """Read the floor plan and the objects of a house. Raise `AssetError` if the file is not a valid house."""
     try:
         house = msgspec.convert(_without_nulls(read_json(read_text(path))), _House)
     except (OSError, ValueError, RecursionError) as error:
@@ -141,7 +142,7 @@ def read_plan(path: Path) -> tuple[ProcthorPlan, tuple[Thing, ...]]:
 
 
 def _without_nulls(value: Any) -> Any:
-    """Remove nulls from JSON, such as the missing second room of a front door."""
+    """Remove null values from JSON objects. A front door, for example, has null as its second room."""
     if isinstance(value, dict):
         return {key: _without_nulls(one) for key, one in value.items() if one is not None}
     return [_without_nulls(one) for one in value] if isinstance(value, list) else value
@@ -168,7 +169,7 @@ def _rooms(house: _House, path: Path) -> Iterator[NamedRoom]:
 
 
 def _ends(wall: _Wall, path: Path) -> tuple[tuple[float, float], tuple[float, float], float]:
-    """Return the start and end of a wall on the floor, in the file's order, and its height, in metres."""
+    """Return the start point, the end point and the height of a wall, in metres."""
     heights = [point.y for point in wall.polygon] or [0.0]
     low = [point for point in wall.polygon if point.y < min(heights) + 0.01]
     if len(low) < 2:

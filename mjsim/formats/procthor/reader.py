@@ -1,4 +1,4 @@
-"""Reader for ProcTHOR houses. Floors and walls come from the plan. Objects become mjsim furniture of the same size."""
+"""Import ProcTHOR houses. Objects are replaced by mjsim furniture of the same size."""
 
 import math
 import tempfile
@@ -24,11 +24,11 @@ from mjsim.house.validation.object_rules import SIZE
 
 SUFFIXES = (".json",)
 _ON = 0.05  # maximum distance between an opening and its wall, in metres
-_THICK = {"door": 0.04, "window": 0.02}  # thickness of the panels in openings, in metres
+_THICK = {"door": 0.04, "window": 0.02}  # thickness of door and window panels, in metres
 
 
 def read_procthor(path: Path, options: HouseOptions) -> SourceScene:
-    """Read a house. Raise `AssetError` if it is not valid or its plan cannot be used."""
+    """Read a ProcTHOR house. Raise `AssetError` if the file is not valid or its floor plan cannot be used."""
     plan, things = read_plan(path)
     assets = AssetDatabase.read(options.models)
     types = [(thing, assets.type_of(thing)) for thing in _flat(things)]
@@ -79,7 +79,7 @@ def _flat(things: Iterable[Thing]) -> Iterator[Thing]:
 
 
 def _frame(thing: Thing) -> Floats:
-    """Return the transform (4, 4) from a thing's frame to the house. The frame has its origin at the thing's centre."""
+    """Return the transform (4, 4) from the frame at an object's centre to the frame of the house."""
     frame: Floats = np.asarray(rotation_matrix(-math.radians(thing.rotation.y), [0, 0, 1]))
     frame[:3, 3] = thing.position.x, thing.position.z, thing.position.y
     return frame
@@ -130,10 +130,10 @@ def _beside(plan: ProcthorPlan, wall: PlanWall) -> str:
 
 
 def _parts(wall: PlanWall, openings: Iterable[PlanOpening]) -> Iterator[tuple[float, float, float, float]]:
-    """Yield the parts of a wall around its openings: start, end, bottom and top in metres, along the wall."""
+    """Yield the solid parts of a wall around its openings as (start, end, bottom, top) in metres."""
     start, length = np.array(wall.start), math.dist(wall.start, wall.end)
     along = np.subtract(wall.end, start) / length
-    at = -WALL / 2  # the wall extends into the corner
+    at = -WALL / 2  # walls extend by half their thickness, to close the corners
     holes = []
     for one in openings:
         ends = np.array([one.start, one.end]) - start

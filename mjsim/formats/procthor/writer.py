@@ -1,7 +1,7 @@
-"""Export of a plan as ProcTHOR's house JSON: rooms, walls, doors and windows, without furniture.
+"""Export a floor plan with doors and windows, but without furniture, as a ProcTHOR house.
 
-ProcTHOR's walls have no thickness and are the centre lines of mjsim's walls. Doors and windows become the
-ProcTHOR assets of the nearest size.
+Walls in ProcTHOR have no thickness and are the centre lines of walls in mjsim. Doors and windows are replaced
+by the ProcTHOR assets with the closest size.
 """
 
 from collections.abc import Iterator
@@ -10,12 +10,12 @@ from typing import Any
 from mjsim.generator.openings import wall_stretches
 from mjsim.generator.values import CEILING_HEIGHT, SIDES, WALL, Door, HomePlan, Room, Side, Window, opposite
 
-# Key in the metadata, with room id -> [key, label], because ProcTHOR has only four room types.
+# Metadata key for a mapping from room ids to [key, label], because ProcTHOR has only four room types.
 NAMES = "mjsim_rooms"
 _TYPES = {"kitchen": "Kitchen", "bathroom": "Bathroom", "shower_room": "Bathroom", "bedroom": "Bedroom"}
-# Doors wider than _WIDE metres become passages.
+# ProcTHOR assets for doors and for passages. Doors wider than _WIDE metres become passages.
 _DOOR, _PASSAGE, _WIDE = "Doorway_2", "Doorframe_Double_2", 1.2
-_WINDOWS = {  # ProcTHOR windows, by width in metres
+_WINDOWS = {  # ProcTHOR's window assets by width in metres
     0.92: "Window_Fixed_36x48",
     1.22: "Window_Slider_48x48",
     1.53: "Window_Slider_60x48",
@@ -24,7 +24,7 @@ _WINDOWS = {  # ProcTHOR windows, by width in metres
 
 
 def procthor_house(plan: HomePlan) -> dict[str, Any]:
-    """Convert a plan to a ProcTHOR house, ready for JSON."""
+    """Convert a floor plan to a ProcTHOR house that can be serialized as JSON."""
     ids = {room.key: f"room|{number}" for number, room in enumerate(plan.rooms, 2)}
     walls = [wall for room in plan.rooms for wall in _walls(plan, room, ids)]
     return {

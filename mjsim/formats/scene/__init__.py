@@ -1,1 +1,1 @@
-"""Scenes as returned by readers, and readers for mesh files."""
+"""Types for imported scenes, and readers for mesh files."""

@@ -1,6 +1,6 @@
-"""Readers for mesh files, based on trimesh. Every node of the scene graph is read in its pose and with its colours.
+"""Read mesh files with trimesh, including the poses and colours of all scene-graph nodes.
 
-Parts of a scene are in metres with z up if the file format defines unit and axis.
+If the file format defines a unit and a vertical axis, the result is in metres with z up.
 """
 
 import io
@@ -27,17 +27,17 @@ from mjsim.values.errors import AssetError
 OBJECT_SUFFIXES = (".glb", ".obj", ".stl", ".ply")
 MAX_FILE = 500_000_000  # maximum file size in bytes
 MAX_TRIANGLES = 5_000_000
-PLAIN = (0.74, 0.72, 0.68)  # RGB colour of meshes that have none
+PLAIN = (0.74, 0.72, 0.68)  # RGB colour of meshes without a colour
 SCENE_SUFFIXES = (".glb", ".gltf", ".dae", ".obj", ".stl", ".ply")
 GLTF = (".glb", ".gltf")
 Y_TO_Z = rotation_matrix(np.pi / 2, [1, 0, 0])
 
 
 class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
-    """Resolver for files that a mesh names, such as its materials."""
+    """A resolver for files that a mesh file refers to, such as materials."""
 
     def absolute(self, name: str) -> Path:
-        """Return the path of a named file. Raise `OSError` for special files, because reading them may never end."""
+        """Return the path of a referenced file. Raise `OSError` for pipes, devices and oversized files."""
         path = Path(super().absolute(name))
         if path.exists():
             check_input(path)
@@ -45,7 +45,7 @@ class Beside(FilePathResolver):  # type: ignore[misc]  # trimesh has no types
 
 
 def read_surface(path: Path) -> Surface:
-    """Read all triangles of a mesh file, in the file's unit and axes. Raise `AssetError` if there are none."""
+    """Read all triangles of a mesh file in its own unit and axes. Raise `AssetError` if there are none."""
     check_mesh_file(path)
     with parsing(path):
         geometries = trimesh.load_scene(path, process=False, resolver=Beside(path)).dump()
@@ -59,7 +59,7 @@ def read_surface(path: Path) -> Surface:
 
 
 def missing_colours(path: Path) -> tuple[str, ...]:
-    """Return the material and image files that an OBJ file refers to and that are missing."""
+    """Return the names of missing material and image files to which an OBJ file refers."""
     if path.suffix.lower() != ".obj":
         return ()
     named = _named(path, "mtllib")
@@ -68,7 +68,7 @@ def missing_colours(path: Path) -> tuple[str, ...]:
 
 
 def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> None:
-    """Raise `AssetError` unless the file exists, has one of the suffixes, and is neither empty nor too large."""
+    """Raise `AssetError` if a mesh file is missing, empty, too large, compressed, or of another format."""
     if path.suffix.lower() not in suffixes:
         raise AssetError(f"{path} is not a {', '.join(suffixes[:-1])} or {suffixes[-1]} file; convert it")
     if not path.is_file():
@@ -87,7 +87,7 @@ def check_mesh_file(path: Path, suffixes: tuple[str, ...] = OBJECT_SUFFIXES) -> 
 
 @contextmanager
 def parsing(path: Path) -> Iterator[None]:
-    """Turn any error of a parser into an `AssetError`, and hide the parser's warnings."""
+    """Convert all errors of a mesh parser to `AssetError`, and suppress its warnings."""
     log = logging.getLogger("trimesh")
     before = log.level
     log.setLevel(logging.CRITICAL)
@@ -95,7 +95,7 @@ def parsing(path: Path) -> Iterator[None]:
         yield
     except MemoryError as error:
         raise AssetError(f"{path} claims to be larger than the memory; export it again") from error
-    except Exception as error:  # trimesh's parsers raise errors of any type
+    except Exception as error:  # trimesh's parsers raise exceptions of many types
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         kind = path.suffix.lower()
         raise AssetError(
@@ -119,12 +119,13 @@ def _named(path: Path, keyword: str) -> list[str]:
 
 
 def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) -> Surface:
-    """Return the surface of one mesh of a file.
+    """Convert a trimesh mesh to a surface.
 
     Args:
-        mesh: A mesh of the file.
-        linear: True if plain colours are linear, which glTF requires.
-        side: Maximum side, in pixels, to which its image is reduced, or None to keep the image unchanged.
+        mesh: The mesh to convert.
+        linear: True if plain colours are linear, as in glTF.
+        side: Maximum side length of the image in pixels. Larger images are reduced. None keeps the image
+            unchanged.
     """
     count = len(mesh.faces)
     corners = np.asarray(mesh.triangles, np.float64)
@@ -150,7 +151,7 @@ def surface_of(mesh: trimesh.Trimesh, *, linear: bool, side: int | None = None) 
 
 
 def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float64] | None]:
-    """Return the plain colour (3,) and the image (height, width, 3) of a material, RGB from 0 to 1."""
+    """Return a material's plain colour (3,) and its image (height, width, 3), as RGB values from 0 to 1."""
     if isinstance(material, trimesh.visual.material.PBRMaterial):
         factor, picture = material.baseColorFactor, material.baseColorTexture
     else:
@@ -165,13 +166,13 @@ def _material(material: Any, side: int | None) -> tuple[Floats, NDArray[np.float
 
 
 def _srgb(linear: Floats) -> Floats:
-    """Convert linear colours to displayed ones, of the same shape (IEC 61966-2-1)."""
+    """Convert linear colours to sRGB (IEC 61966-2-1)."""
     low, high = 12.92 * linear, 1.055 * np.clip(linear, 0.0, 1.0) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, low, high)
 
 
 class _Nearby(Beside):
-    """Resolver for files in or next to the mesh's folder, such as `../materials/textures/wood.png`."""
+    """A resolver for files in the mesh's folder or a sibling folder, such as `../textures/wood.png`."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(file)
@@ -188,9 +189,9 @@ class _Nearby(Beside):
 
 
 def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, Surface]]:
-    """Return the parts of a mesh file, moved by a transform (4, 4), with the names of their nodes.
+    """Read the parts of a mesh file with their node names, and apply a transform (4, 4) to them.
 
-    Parts of glTF and COLLADA files are in metres with z up. Other formats are returned unchanged.
+    Parts of glTF and COLLADA files are converted to metres with z up. Other formats keep their unit and axes.
 
     Raises:
         AssetError: The file is missing or damaged, or has no triangles.
@@ -223,19 +224,19 @@ def read_parts(path: Path, transform: Floats | None = None) -> list[tuple[str, S
 
 
 def primitive(mesh: trimesh.Trimesh, colour: Floats) -> Surface:
-    """Return a surface of one colour (3,), RGB from 0 to 1."""
+    """Convert a mesh to a surface with a single colour (3,), given as RGB from 0 to 1."""
     corners = np.asarray(mesh.triangles, np.float64)
     count = len(corners)
     return Surface(corners, np.tile(colour, (count, 3, 1)), np.zeros((count, 3, 2)), np.full(count, -1))
 
 
 def _without_comments(path: Path) -> io.BytesIO:
-    """Return a COLLADA file without comments, because pycollada drops geometries that contain one."""
+    """Remove comments from a COLLADA file, because pycollada drops geometries that contain a comment."""
     return io.BytesIO(re.sub(rb"<!--.*?-->", b"", read_bytes(path), flags=re.DOTALL))
 
 
 def _collada_frame(path: Path) -> Floats:
-    """Return the transform (4, 4) to metres and z up, from the <asset> of a COLLADA file, which trimesh ignores."""
+    """Return the transform (4, 4) of a COLLADA file to metres with z up, which trimesh does not apply."""
     unit, up = 1.0, "Y_UP"
     with parsing(path):
         for tag, element in _elements(path):

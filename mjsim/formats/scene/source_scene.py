@@ -1,4 +1,4 @@
-"""Types for scenes, options and decisions of an import, with helper functions for readers."""
+"""Types for imported scenes, import options and report lines, with helper functions for readers."""
 
 import re
 from collections.abc import Iterator
@@ -13,23 +13,23 @@ from numpy.typing import NDArray
 from mjsim.formats.scene.surface import Floats, Surface
 from mjsim.values.errors import AssetError
 
-# Length of each unit in metres; units are guessed in this order.
+# Length of each unit in metres. Units are tried in this order if the unit has to be guessed.
 UNITS = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254}
 AXES = ("y", "z")
-TEXTURE_SIDE = 512  # maximum side of an image, in pixels
-MIN_SIDE, MAX_SIDE = 3.0, 60.0  # minimum and maximum of a house's longest side, in metres
-_STEP = 0.1  # width of the rectangles that approximate slanted outlines, in metres
+TEXTURE_SIDE = 512  # maximum side length of imported textures, in pixels
+MIN_SIDE, MAX_SIDE = 3.0, 60.0  # limits for the longest side of a house, in metres
+_STEP = 0.1  # width of the strips that approximate slanted outlines, in metres
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """Options of an object import. Values of None are determined automatically."""
+    """Options for importing an object. Options that are None are determined automatically."""
 
     units: str | None = None  # unit of length, a key of `UNITS`
     up: str | None = None  # vertical axis, one of `AXES`
     scale: float = 1.0  # factor applied in addition to the unit
     mass: float | None = None  # mass in kg
-    density: float | None = None  # density in kg/m^3; must be None if `mass` is given
+    density: float | None = None  # density in kg/m^3, which cannot be combined with `mass`
 
 
 @dataclass(frozen=True)
@@ -38,23 +38,23 @@ class ImportDecision:
 
     what: str  # subject of the decision
     choice: str
-    reason: str = ""  # reason for the decision, or how to change it
+    reason: str = ""  # reason for the decision, or a hint on how to change it
 
 
 @dataclass(frozen=True, eq=False)
 class ScenePiece:
-    """An object or part of a scene, in the frame of the scene: z up, in metres."""
+    """A piece of an imported scene, with coordinates in metres and z up."""
 
     name: str  # name of the piece in the source
     surface: Surface
-    seen: bool = True  # True if the piece is drawn
-    solid: bool = True  # True if the piece collides
-    loose: bool = False  # True if the piece is movable in the source
+    seen: bool = True  # True if the piece is visible
+    solid: bool = True  # True if the piece takes part in collisions
+    loose: bool = False  # True if the piece can move in the source
 
 
 @dataclass(frozen=True)
 class NamedRoom:
-    """A room named by the user or the source."""
+    """A room with a name from the user or the source file."""
 
     key: str
     label: str
@@ -67,56 +67,56 @@ class Bin:
 
     key: str
     room: str
-    x: float  # x coordinate of the middle of the base, in metres
+    x: float  # x coordinate of the centre of the base, in metres
     y: float
-    yaw: float  # yaw in radians
+    yaw: float  # yaw angle in radians
     z: float = 0.0
-    place: str = "against the wall"  # description of the location, shown to participants
+    place: str = "against the wall"  # description of the location that participants see
 
 
 @dataclass(frozen=True, eq=False)
 class SourceScene:
-    """A scene as returned by a reader."""
+    """An imported scene, as returned by a reader."""
 
     pieces: tuple[ScenePiece, ...]
     kind: str  # type of the source, such as `SDF world`
-    notes: tuple[ImportDecision, ...] = ()  # decisions of the reader
-    rooms: tuple[NamedRoom, ...] = ()  # rooms named by the source
-    bins: tuple[Bin, ...] = ()  # bins of a source that is an exported mjsim house
+    notes: tuple[ImportDecision, ...] = ()  # report lines about decisions of the reader
+    rooms: tuple[NamedRoom, ...] = ()  # rooms with names from the source file
+    bins: tuple[Bin, ...] = ()  # bins, if the source is an exported mjsim house
 
 
 @dataclass(frozen=True)
 class HouseOptions:
-    """Options of a house import. Values of None are determined automatically."""
+    """Options for importing a house. Options that are None are determined automatically."""
 
     units: str | None = None  # unit of length, a key of `UNITS`
     up: str | None = None  # vertical axis, one of `AXES`
     scale: float = 1.0  # factor applied in addition to the unit
-    floor: float | None = None  # height of the floor in the source, in metres
-    rooms: Path | None = None  # TOML file that names the rooms
-    models: tuple[Path, ...] = ()  # folders with models that the source refers to
-    skip_missing: bool = False  # True to leave out missing files instead of raising an error
+    floor: float | None = None  # height of the floor in the source scene, in metres
+    rooms: Path | None = None  # TOML file with room names
+    models: tuple[Path, ...] = ()  # folders that contain the models to which the source refers
+    skip_missing: bool = False  # True to skip missing files instead of raising an error
 
 
 @dataclass
 class MissingFiles:
-    """Missing files that a source refers to. They are an error, unless `skip` is True."""
+    """The missing files to which a source refers. They cause an error unless `skip` is True."""
 
     skip: bool
     files: list[str] = field(default_factory=list)
 
     def notes(self) -> tuple[ImportDecision, ...]:
-        """Return report lines about the files that were left out."""
+        """Return the lines of the import report about skipped files."""
         return (left_out(f"{len(self.files)} missing", ", ".join(self.files[:6])),) if self.files else ()
 
 
 def left_out(what: str, why: str) -> ImportDecision:
-    """Return a report line about something that was left out."""
+    """Return a line of the import report about parts that were not imported."""
     return ImportDecision("left out", what, why)
 
 
 def numbers(values: Any, count: int, path: Path) -> Floats:
-    """Convert `count` numbers of a file to an array (count,). Raise `AssetError` if they are not finite numbers."""
+    """Convert values to an array of shape (count,). Raise `AssetError` if they are not finite numbers."""
     try:
         found = np.array(values, np.float64)
     except (TypeError, ValueError):
@@ -127,19 +127,19 @@ def numbers(values: Any, count: int, path: Path) -> Floats:
 
 
 def moved(pieces: list[ScenePiece], transform: Floats) -> list[ScenePiece]:
-    """Return pieces moved by a homogeneous transform (4, 4)."""
+    """Apply a homogeneous transform (4, 4) to pieces."""
     return [ScenePiece(p.name, p.surface.moved(transform), p.seen, p.solid, p.loose) for p in pieces]
 
 
 def unit_of(longest: float) -> str | None:
-    """Return the unit in which a house could have this longest side, or None if there is none."""
+    """Guess the unit of a house from the length of its longest side. Return None if no unit is plausible."""
     return next((unit for unit, metres in UNITS.items() if MIN_SIDE <= longest * metres <= MAX_SIDE), None)
 
 
 def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
-    """Return rectangles in metres that cover a polygon (k, 2). Raise `ValueError` if its area is 0.
+    """Return rectangles in metres that cover a polygon (k, 2). Raise `ValueError` if the polygon is invalid.
 
-    Slanted sides are approximated in steps of 0.1 m.
+    Slanted sides are approximated by strips that are 0.1 m wide.
     """
     polygon = shapely.Polygon(outline) if len(outline) > 2 else shapely.Polygon()
     if not polygon.is_valid or polygon.area < _STEP**2:
@@ -158,8 +158,9 @@ def boxes_of(outline: Floats) -> tuple[tuple[float, float, float, float], ...]:
 
 
 def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
-    """Yield rectangles (first row, end row, first column, end column) that cover each cell of a mask (nx, ny) once.
-    Ends are exclusive.
+    """Yield disjoint rectangles that cover the True cells of a mask of shape (nx, ny).
+
+    Each rectangle is (first row, end row, first column, end column), with exclusive ends.
     """
     left = mask.copy()
     for row in range(len(left)):
@@ -176,5 +177,5 @@ def merged_rectangles(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, 
 
 
 def words_of(name: str) -> list[str]:
-    """Split a name into words. For example, `KitchenCabinet_01_001` gives kitchen and cabinet."""
+    """Split a name into lower-case words. `KitchenCabinet_01_001` gives `["kitchen", "cabinet"]`."""
     return [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)]

@@ -1,4 +1,4 @@
-"""Arrays of a mesh's triangles and their colours."""
+"""Coloured triangle meshes as NumPy arrays."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -10,40 +10,40 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-WELD_DIGITS = 6  # corners count as equal if they agree to 1e-6 m
-_MIN_AREA = 1e-13  # area in square metres below which a triangle has no normal
+WELD_DIGITS = 6  # number of decimals to which corners must agree to be merged
+_MIN_AREA = 1e-13  # minimum area of a triangle with a valid normal, in square metres
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Triangles with colours. The colour of a point is interpolated from the corners and multiplied by the image."""
+    """Triangles with a colour at each corner, which is multiplied by the texture image if there is one."""
 
     corners: Floats  # corners of the triangles in metres, shape (n, 3, 3)
-    colours: Floats  # colour at each corner, RGB from 0 to 1, shape (n, 3, 3)
-    # Repeating texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (n, 3, 2).
+    colours: Floats  # RGB colour at each corner, from 0 to 1, shape (n, 3, 3)
+    # Texture coordinates of the corners, with the origin at the lower left of the image, shape (n, 3, 2).
     uv: Floats
-    image: Ints  # index of each triangle's image, or -1 for none, shape (n,)
-    images: tuple[Floats, ...] = ()  # RGB from 0 to 1, rows from the top, shape (height, width, 3) each
+    image: Ints  # index of each triangle's image, or -1 without an image, shape (n,)
+    images: tuple[Floats, ...] = ()  # RGB images from 0 to 1, each (height, width, 3)
 
     def __len__(self) -> int:
         return len(self.corners)
 
     def select(self, rows: NDArray[Any]) -> Self:
-        """Return the triangles selected by a mask (n,) or by row numbers (k,)."""
+        """Return the triangles that are selected by a mask (n,) or by indices (k,)."""
         arrays = {name: getattr(self, name)[rows] for name in ("corners", "colours", "uv", "image")}
         return replace(self, **arrays)
 
     def moved(self, transform: Floats) -> Self:
-        """Return the surface moved by a homogeneous transform (4, 4)."""
+        """Apply a homogeneous transform (4, 4) to the surface."""
         return replace(self, corners=self.corners @ transform[:3, :3].T + transform[:3, 3])
 
     def mesh(self) -> trimesh.Trimesh:
-        """Return a mesh whose triangles are joined where corners coincide. Face k is triangle k."""
+        """Convert the surface to a mesh with shared vertices. Face k of the mesh is triangle k."""
         vertices, faces = _welded(self.corners)
         return trimesh.Trimesh(vertices, faces, process=False)
 
     def colours_at(self, triangles: Ints, weights: Floats) -> Floats:
-        """Return colours (k, 3), RGB from 0 to 1, of points given by triangles (k,) and barycentric weights (k, 3)."""
+        """Return the RGB colours (k, 3) of points given by triangles (k,) and barycentric weights (k, 3)."""
         colours: Floats = np.einsum("kc,kcd->kd", weights, self.colours[triangles])
         places = np.einsum("kc,kcd->kd", weights, self.uv[triangles])
         for number, image in enumerate(self.images):
@@ -66,7 +66,7 @@ def joined(surfaces: list[Surface]) -> Surface:
 
 
 def cleaned(surface: Surface) -> tuple[Surface, dict[str, int]]:
-    """Remove triangles that are not finite, have no area, or are duplicates. Return also the number of each."""
+    """Remove invalid, empty and duplicate triangles. Return the new surface and the number of each kind."""
     finite = np.asarray(np.isfinite(surface.corners).all(axis=(1, 2)))
     kept = surface.select(finite)
     edges = np.diff(kept.corners, axis=1)

@@ -1,1 +1,1 @@
-"""Parametric furniture: functions that draw a random piece of each type."""
+"""Parametric furniture, with one function per furniture type that creates a random piece."""

@@ -1,4 +1,4 @@
-"""Materials of a home's furniture by role, chosen so that its pieces match."""
+"""Choose matching materials for all furniture of a home."""
 
 import colorsys
 import re
@@ -23,10 +23,10 @@ _MATERIAL = re.compile(r'material="([^"]+)"')
 
 @dataclass(frozen=True)
 class Appearance:
-    """Materials of a home's furniture by role. Pieces draw from these tuples. Common materials occur repeatedly."""
+    """The materials of a home's furniture by role. Materials that occur repeatedly are chosen more often."""
 
-    assets: dict[str, Asset]  # material name -> asset
-    colours: tuple[Rgb, ...]  # colours of rugs and pictures
+    assets: dict[str, Asset]  # assets by material name
+    colours: tuple[Rgb, ...]  # colours for rugs and pictures
     woods: tuple[str, ...] = ("wood_a", "wood_a", "wood_a", "wood_b", "wood_b", "wood_c")
     fronts: tuple[str, ...] = ("front_a", "front_a", "front_b", "white")
     cloths: tuple[str, ...] = ("cloth_a", "cloth_a", "cloth_b", "cloth_c", "cloth_d")
@@ -35,7 +35,7 @@ class Appearance:
     metals: tuple[str, ...] = ("metal_a", "metal_a", "chrome", "black")
 
     def assets_of(self, geoms: str) -> tuple[Asset, ...]:
-        """Return the assets of the materials that MJCF geoms use, except for materials of the apartment."""
+        """Return the assets of the materials that geoms use. Materials of the apartment have no assets."""
         names = sorted(set(_MATERIAL.findall(geoms)))
         return tuple(self.assets[name] for name in names if name in self.assets)
 
@@ -82,7 +82,7 @@ def draw_appearance(palette: Palette, rng: np.random.Generator) -> Appearance:
 
 
 def _muted(rgb: Rgb) -> Rgb:
-    """Desaturate a colour, most of all greens and purples, because they are rarely vivid in homes."""
+    """Desaturate a colour. Greens and purples are desaturated most, as they are rarely vivid in homes."""
     hue, saturation, value = colorsys.rgb_to_hsv(*rgb)
     loud = 0.19 < hue < 0.48 or 0.7 < hue < 0.9
     return colorsys.hsv_to_rgb(hue, saturation * (0.55 if loud else 0.9), value * (0.85 if loud else 1.0))

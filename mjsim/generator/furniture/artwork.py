@@ -1,4 +1,4 @@
-"""Pictures and rugs, painted in the colours of a home."""
+"""Draw pictures and rug patterns in the colours of a home."""
 
 import hashlib
 import math
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from mjsim.generator.furniture.appearance import Appearance
 from mjsim.generator.furniture.piece import DrawnTexture
 
-Image = NDArray[np.float64]  # RGB from 0 to 1, shape (height, width, 3)
-Plane = NDArray[np.float64]  # shape (height, width)
+Image = NDArray[np.float64]  # RGB image from 0 to 1, shape (height, width, 3)
+Plane = NDArray[np.float64]  # array of pixel values, shape (height, width)
 Style = Callable[[np.random.Generator, Image, Plane, Plane, Image], None]
 
 
 def painting(rng: np.random.Generator, look: Appearance, wide: int = 128, high: int = 96) -> DrawnTexture:
-    """Draw a picture of `wide` x `high` pixels in one of seven styles."""
+    """Draw a random picture with a width of `wide` pixels and a height of `high` pixels."""
     y, x = np.mgrid[0:high, 0:wide] / np.array([high, wide]).reshape(2, 1, 1)
     colours = _palette(rng, look, 6)
     image = (0.75 + 0.25 * colours[0]) * (1 - 0.25 * y[..., None])
@@ -26,7 +26,7 @@ def painting(rng: np.random.Generator, look: Appearance, wide: int = 128, high: 
 
 
 def carpet(rng: np.random.Generator, look: Appearance, round_one: bool = False) -> DrawnTexture:
-    """Draw the pattern of a rug in one of six styles, or in rings if the rug is round."""
+    """Draw a random pattern for a rug. Round rugs have a pattern of rings."""
     n = 128
     y, x = (np.mgrid[0:n, 0:n] + 0.5) / n
     ground, one, two, three = _palette(rng, look, 4)
@@ -117,7 +117,7 @@ _STYLES: tuple[Style, ...] = (_hills, _hills, _discs, _fields, _branch, _town, _
 
 
 def _palette(rng: np.random.Generator, look: Appearance, count: int) -> Image:
-    """Draw the colours of a picture, shape (count, 3), from lighter or darker versions of the home's colours."""
+    """Draw random shades of the home's colours, shape (count, 3)."""
     chosen = np.array(look.colours)[rng.permutation(len(look.colours))[: min(count, 5)]]
     while len(chosen) < count:
         chosen = np.vstack([chosen, chosen[int(rng.integers(len(chosen)))] * rng.uniform(0.5, 0.9)])

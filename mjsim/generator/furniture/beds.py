@@ -3,7 +3,7 @@
 from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Piece, Spot, group
 
-SIDE = 0.62  # width of the free floor beside a bed, in metres
+SIDE = 0.62  # width of the free floor next to a bed, in metres
 
 
 def _headboard(b: Builder, w: float) -> float:
@@ -31,7 +31,7 @@ def _mattress(b: Builder, w: float, y: tuple[float, float], z: float, pillows: i
     quilt = b.pick(*b.look.quilts)
     b.box("linen", w - 0.04, (y[0] + 0.02, y[1] - 0.02), (z, z + 0.18))
     start = y[0] + b.pick(0.45, 0.55, 0.62)
-    # The texture of quilt_c would look stretched on the narrow sides.
+    # Avoid quilt_c, whose texture would look stretched on the narrow sides of the bed.
     side = "quilt_a" if quilt == "quilt_c" else quilt
     b.box(side, w + 0.01, (start, y[1] - 0.005), (z + 0.05, z + 0.205), seen=True)
     b.box(quilt, w + 0.01, (start, y[1] - 0.005), (z + 0.205, z + 0.215), seen=True)

@@ -1,4 +1,4 @@
-"""`Builder`, a class that writes the MJCF geoms of a piece of furniture."""
+"""A builder for the MJCF geoms of a piece of furniture."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from mjsim.generator.furniture.piece import DrawnTexture, Obstacle, Piece, Spot
 Span = tuple[float, float]
 Point = tuple[float, float, float]
 T = TypeVar("T")
-PANEL = 0.016  # thickness of doors and drawers, in metres
-GAP = 0.008  # gap between doors or drawers, in metres
+PANEL = 0.016  # thickness of cabinet doors and drawer fronts, in metres
+GAP = 0.008  # gap between cabinet doors or drawer fronts, in metres
 _THINGS = ("vase", "plant", "books", "bowl", "box", "candles")
-FACING = 'xyaxes="-1 0 0 0 0 1"'  # makes an image face +y
+FACING = 'xyaxes="-1 0 0 0 0 1"'  # MJCF attribute that makes an image face +y
 
 
 def numbers(*values: float) -> str:
-    """Format numbers for MJCF with at most four decimals."""
+    """Format numbers for MJCF, rounded to four decimals."""
     return " ".join(f"{round(float(v), 4) + 0.0:g}" for v in values)
 
 
@@ -29,10 +29,10 @@ def _extent(w: float, y: Span, z: Span, x: float) -> str:
 
 
 class Builder:
-    """Collects the geoms of a piece in its own frame.
+    """A builder that collects the geoms of a piece of furniture, in the frame of the piece.
 
-    In all methods, `w` is a full width along x, `x` is its middle, and `y` and `z` are intervals, all in metres.
-    Geoms with `seen` are drawn but do not collide. Those of `guard` collide but are not drawn.
+    In all methods, `w` is the width along x, `x` is the centre, and `y` and `z` are intervals, all in metres.
+    Geoms with `seen` are drawn but do not collide. Geoms from `guard` collide but are not drawn.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Builder:
         return options[int(self.rng.integers(len(options)))]
 
     def size(self, low: float, high: float, step: float = 0.05) -> float:
-        """Draw a length from `low` to `high` in steps, in metres. Smaller versions of a piece have a lower maximum."""
+        """Draw a random length from `low` to `high`, in metres. Smaller versions have a lower maximum."""
         count = round((high - low) / step)
         drawn = int(self.rng.integers(count + 1))
         return round(low + step * max(0, min(drawn, round(count * (1 - 0.5 * self.smaller)))), 4)
@@ -86,18 +86,18 @@ class Builder:
         self.add("ellipsoid", material, True, f'pos="{numbers(*at)}" size="{numbers(*half)}"{euler}')
 
     def disc(self, material: str, x: float, y: float, z: float, radius: float, thick: float = 0.012) -> None:
-        """Add a disc that faces the room, with its centre at depth `y`."""
+        """Add a disc that faces the room and has its centre at depth `y`."""
         size = numbers(radius, thick / 2)
         self.add("cylinder", material, True, f'pos="{numbers(x, y, z)}" size="{size}" euler="1.5708 0 0"')
 
     def image(self, material: str, w: float, z: Span, y: float, x: float = 0.0, thick: float = 0.008) -> None:
-        """Add a panel with an image that faces the room, with its front at depth `y`."""
+        """Add a panel with an image that faces the room and has its front at depth `y`."""
         middle = numbers(x, y - thick / 2, sum(z) / 2)
         half = numbers(w / 2, (z[1] - z[0]) / 2, thick / 2)
         self.add("box", material, True, f'pos="{middle}" size="{half}" {FACING}')
 
     def shadow(self, w: float, y: Span, x: float = 0.0, *, round_one: bool = False) -> None:
-        """Add a contact shadow around a footprint, at a varying height so that overlapping shadows do not flicker."""
+        """Add a contact shadow. Its height varies slightly, so that overlapping shadows do not flicker."""
         height = 0.0038 + 0.0001 * int(self.rng.integers(12))
         material = ' material="shadow_round"' if round_one else ""
         half = numbers(w / 2 + 0.1, (y[1] - y[0]) / 2 + 0.09, 0.1)
@@ -135,7 +135,7 @@ class Builder:
         x: float = 0.0,
         doors: bool = False,
     ) -> None:
-        """Add rows and columns of drawers or doors with handles, in front of depth `y`."""
+        """Add a grid of drawer fronts or doors with handles, whose backs are at depth `y`."""
         wide, high = (w - GAP) / columns, (z[1] - z[0] - GAP) / rows
         for i in range(columns):
             for j in range(rows):
@@ -162,7 +162,7 @@ class Builder:
     def clutter(
         self, w: float, y: Span, z: float, most: int = 3, x: float = 0.0, *, low: bool = False
     ) -> None:
-        """Add small objects on a surface of height `z`. If `low`, all are at most 0.13 m tall."""
+        """Add small objects on a surface of height `z`. If `low` is True, they are at most 0.13 m tall."""
         things = ("books", "bowl", "box", "candles") if low else _THINGS
         places = int(np.clip(w // 0.35, 1, most))
         for i in range(int(self.rng.integers(1, places + 1))):
@@ -208,19 +208,19 @@ class Builder:
         self.post("shade", x, y, (z + 0.2, z + 0.37), self.pick(0.1, 0.12))
 
     def pillow(self, material: str, at: Point, half: Point, tilt: float = 0.0) -> None:
-        """Add a cushion. It is an ellipsoid around a box, so that it looks square."""
+        """Add a cushion, which is an ellipsoid around a box so that it looks square."""
         self.soft(material, at, half, (tilt, 0.0, 0.0))
         euler = f' euler="{numbers(tilt, 0, 0)}"' if tilt else ""
         core = numbers(0.9 * half[0], 0.62 * half[1], 0.9 * half[2])
         self.add("box", material, True, f'pos="{numbers(*at)}" size="{core}"{euler}')
 
     def own(self, picture: DrawnTexture) -> str:
-        """Register a texture drawn for this piece, and return the name of its material."""
+        """Register a texture for this piece, and return the name of its material."""
         self.pictures.append(picture)
         return picture.name
 
     def on_ceiling(self) -> None:
-        """Mark the geoms added so far as hanging from the ceiling. Top-down views omit such geoms."""
+        """Mark all geoms added so far as parts of the ceiling, which top-down views omit."""
         self.geoms = [geom.replace('class="decor"', 'class="lamp"') for geom in self.geoms]
 
     def piece(
@@ -232,14 +232,15 @@ class Builder:
         stem: float = 0.0,
         **more: Any,
     ) -> Piece:
-        """Return the piece with all geoms added so far.
+        """Create a piece of furniture from all geoms added so far.
 
         Args:
-            size: Width along the wall, depth into the room, and height, in metres.
-            use: Depth, in metres, of the free floor needed in front of it, or that floor's rectangles (x0, y0, x1, y1).
-            parts: Obstacles (x0, y0, x1, y1, height), in metres; one of the whole size by default.
-            stem: Half width, in metres, of the pot or stand below wider parts. Only the pot or stand is an obstacle.
-            more: Other fields of `Piece`.
+            size: Width along the wall, depth into the room and height, in metres.
+            use: Depth of the free floor in front of the piece, or rectangles (x0, y0, x1, y1) of free floor,
+                in metres.
+            parts: Obstacles (x0, y0, x1, y1, height) in metres. By default, one of the whole size.
+            stem: Half width of the pot or stand below wider parts, in metres. Only this is an obstacle.
+            more: Values for other fields of `Piece`.
         """
         w, d, h = (float(v) for v in size)
         if parts is None:
@@ -260,7 +261,7 @@ class Builder:
 
 @dataclass(frozen=True)
 class Kind:
-    """A type of furniture. Each random generator gives a different piece."""
+    """A type of furniture, which can create random pieces."""
 
     name: str
     draw: Callable[[Builder], Piece]
@@ -268,12 +269,12 @@ class Kind:
     def make(
         self, rng: np.random.Generator, look: Appearance, *, smaller: int = 0, fit: Point | None = None
     ) -> Piece:
-        """Make a piece.
+        """Create a random piece of this type.
 
         Args:
-            rng: Draws size, materials and form.
-            look: Materials of the home.
-            smaller: 0 for the full size, or 1, 2, ... for smaller and smaller versions.
-            fit: Width, lower end and upper end, in metres, of a window or gap that the piece has to fit, if any.
+            rng: Random generator for the size, materials and shape.
+            look: Materials of the home's furniture.
+            smaller: 0 for the full size, and larger numbers for smaller versions.
+            fit: Width, lower end and upper end of the window or gap that the piece has to fit, in metres.
         """
         return self.draw(Builder(self.name, rng, look, smaller, fit))

@@ -1,4 +1,4 @@
-"""Registry of all furniture types. Each public function of the imported modules draws one type."""
+"""A registry of all furniture types. Each public function of the imported modules creates one type."""
 
 from inspect import isfunction
 

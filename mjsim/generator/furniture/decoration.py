@@ -75,7 +75,7 @@ def wall_lamp(b: Builder) -> Piece:
 
 
 def _on_floor(b: Builder, w: float, d: float, material: str, round_one: bool = False) -> Piece:
-    """Make a flat piece on the floor. It is 3.5 mm high, which is lower than the underside of a plate."""
+    """Create a flat piece on the floor. Its height of 3.5 mm keeps it below the underside of a plate."""
     if round_one:
         b.post(material, 0, d / 2, (0.0005, 0.0035), d / 2)
     else:
@@ -113,7 +113,7 @@ def _window(b: Builder) -> tuple[float, float, float]:
 
 
 def curtains(b: Builder) -> Piece:
-    """Draw curtains on both sides of a window. They end at the floor, or just below the sill in the smaller version."""
+    """Create curtains on both sides of a window. The smaller version ends just below the sill."""
     w, low, high = _window(b)
     long = b.smaller == 0
     side, top = b.pick(0.24, 0.3), min(high + 0.14, CEILING_HEIGHT - 0.05)
@@ -168,7 +168,7 @@ def radiator(b: Builder) -> Piece:
 
 
 def ceiling_lamp(b: Builder) -> Piece:
-    """Draw a flat ceiling lamp. It is above the light source, so that it casts no shadow on the room."""
+    """Create a flat ceiling lamp. It is above the light source, so that it casts no shadow into the room."""
     form, z = b.pick("disc", "bowl", "square", "bar", "star"), CEILING_HEIGHT
     if form == "disc":
         b.post("bulb", 0, 0, (z - 0.05, z), b.pick(0.18, 0.24))

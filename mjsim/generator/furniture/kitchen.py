@@ -1,4 +1,4 @@
-"""Kitchens made of modules 0.6 m wide, along one wall or around a corner, and single pieces of kitchen furniture."""
+"""Kitchens that are composed of modules with a width of 0.6 m, and single pieces of kitchen furniture."""
 
 import math
 
@@ -6,20 +6,20 @@ from mjsim.generator.furniture.builder import Builder
 from mjsim.generator.furniture.piece import Mount, Piece, group
 
 # Lengths are in metres. Heights are measured from the floor, and depths from the wall.
-WIDE = 0.6  # width of a module
-SIZES = 4  # number of kitchen sizes
+WIDE = 0.6  # width of a kitchen module
+SIZES = 4  # number of available kitchen sizes
 DEEP = 0.62
 TOP = 0.9
-ON_TOP = 1.09  # maximum height of objects on the worktop, a little below the sills of kitchen windows
+ON_TOP = 1.09  # maximum height of objects on the worktop, just below the sill of a kitchen window
 TALL = 2.05  # height of fridges and tall ovens
-LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets, with 0.3 m of space above the bin in the dish rack
-HOOD = 2.5  # top of a cooker hood's duct
+LOW, HIGH = 1.5, 2.15  # bottom and top of wall cabinets, with space below for a bin in the dish rack
+HOOD = 2.5  # top of the duct above a cooker hood
 FRONT = 0.57  # distance from the wall to the cabinet fronts
 GAP = 0.012  # gap between the doors of a fridge
 
 
 class KitchenRun:
-    """Kitchen modules side by side along a wall. Each method `_NAME(x)` adds the module NAME and returns its height."""
+    """A row of kitchen modules along a wall. The method `_NAME(x)` adds the module NAME at x."""
 
     def __init__(self, b: Builder, modules: tuple[str, ...], hanging: bool) -> None:
         self.b, self.modules, self.hanging = b, modules, hanging
@@ -34,7 +34,7 @@ class KitchenRun:
             top = getattr(self, f"_{name}")(x)
             if self.hanging and name in ("drawers", "doors", "dishwasher", "sink") and self.b.chance(0.85):
                 top = self._hang(x)
-            if name not in ("fridge", "tall_oven"):  # tiles stay low enough to fit below a window
+            if name not in ("fridge", "tall_oven"):  # tiles that end below the window sill
                 self.b.box("tile", WIDE, (0.0, 0.008), (TOP, LOW if top > LOW else TOP + 0.05), x, seen=True)
             self.parts.append((x - WIDE / 2, 0.0, x + WIDE / 2, DEEP, top))
         use = ((-self.w / 2, DEEP, self.w / 2, DEEP + 0.9),)
@@ -67,7 +67,7 @@ class KitchenRun:
         self._base(x)
         if not self.b.chance(0.5):
             return TOP
-        paint = self.b.pick("steel", "white", "accent_a", "black")  # colour of a kettle or toaster
+        paint = self.b.pick("steel", "white", "accent_a", "black")  # material of a kettle or toaster
         if self.b.chance(0.5):
             self.b.post(paint, x, 0.3, (TOP, ON_TOP), 0.075)
             self.b.box("black", 0.03, (0.38, 0.42), (TOP + 0.04, ON_TOP - 0.02), x, seen=True)
@@ -147,7 +147,7 @@ class KitchenRun:
         b = self.b
         b.box("front_dark", WIDE, (0, FRONT), (0, TALL), x)
         b.fronts(b.front, WIDE, (0.1, 0.75), FRONT, 1, 2, x)
-        for low, high in ((0.76, 1.3), (1.31, 1.66)):  # oven and microwave
+        for low, high in ((0.76, 1.3), (1.31, 1.66)):  # heights of the oven and the microwave
             b.box("steel", WIDE - 0.01, (FRONT, FRONT + 0.018), (low, high), x, seen=True)
             pane, handle = (low + 0.06, high - 0.12), (high - 0.08, high - 0.06)
             b.box("black", 0.44, (FRONT + 0.018, FRONT + 0.022), pane, x - 0.03, seen=True)
@@ -156,7 +156,7 @@ class KitchenRun:
         return TALL
 
 
-_STRAIGHT = (  # alternative rows of modules for each kitchen size, from the largest size to the smallest
+_STRAIGHT = (  # alternative module rows for each kitchen size, starting with the largest size
     (
         "fridge drawers sink rack cooker doors dishwasher",
         "tall_oven doors cooker drawers rack sink fridge",
@@ -180,10 +180,7 @@ def straight_kitchen(b: Builder) -> Piece:
 
 
 def _size(b: Builder) -> int:
-    """Return the size number of a kitchen, 0 for the largest.
-
-    If no size fits with wall cabinets, the two smallest sizes are tried without them, the larger one first.
-    """
+    """Return a size index. The two smallest sizes are tried again without wall cabinets if nothing fits."""
     return b.smaller if b.smaller < SIZES else b.smaller - 2
 
 
@@ -202,7 +199,7 @@ def corner_kitchen(b: Builder) -> Piece:
     other = b.pick(("cooker", "drawers"), ("drawers", "cooker", "doors")) if size < 2 else ("cooker",)
     if size == 3:
         other = ("rack", "cooker")
-    # Both runs end at a closed module in the corner.
+    # The module in the corner of a kitchen has no appliance.
     modules = ("doors", *longer) if side < 0 else (*longer[::-1], "doors")
     run = KitchenRun(Builder("straight_kitchen", b.rng, b.look), modules, b.smaller < SIZES)
     leg = KitchenRun(Builder("straight_kitchen", b.rng, b.look), other if side > 0 else other[::-1], False)

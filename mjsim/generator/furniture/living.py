@@ -1,4 +1,4 @@
-"""Furniture of living rooms and halls: TV area, piano, stove, aquarium, coat rack and umbrella stand."""
+"""Furniture for living rooms and halls."""
 
 import math
 
@@ -38,7 +38,7 @@ def lounge(b: Builder) -> Piece:
         x = 0.0
         if corner:
             long = sofa.parts[1].spot
-            # The sofa's shape is rotated, which swaps left and right.
+            # The sofa is rotated by half a turn, which swaps left and right.
             side = 1 if long[0] + long[2] < 0 else -1
             x = -side * 0.46
         if y - deep > 0.7:

@@ -1,7 +1,7 @@
-"""Pieces of furniture, and groups of pieces.
+"""Data types for pieces of furniture and for groups of pieces.
 
-The origin of a piece is on the floor in the middle of its back edge. +y points into the room and
-+z up. Lengths are in metres.
+The origin of a piece is on the floor in the middle of its back edge. The +y axis points into the
+room, and the +z axis points up. Lengths are in metres.
 """
 
 import math
@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 from mjsim.generator.values import Asset
 
-Spot = tuple[float, float, float, float]  # rectangle on the floor: x0, y0, x1 and y1 in metres
+Spot = tuple[float, float, float, float]  # rectangle on the floor (x0, y0, x1, y1), in metres
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A rectangle of floor that a piece covers or overhangs, with the height of the piece there."""
+    """A rectangle of the floor that a piece of furniture covers or overhangs."""
 
     spot: Spot
-    top: float  # height in metres
-    # Half width, in metres, of the pot or stand below leaves or a lampshade. 0 if the whole rectangle is an obstacle.
+    top: float  # height of the piece above the rectangle, in metres
+    # Half width of the pot or stand below wider parts, in metres. 0 if the whole rectangle is an obstacle.
     stem: float = 0.0
 
     @property
@@ -31,16 +31,16 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Mount:
-    """A position on a piece of furniture where a bin is placed."""
+    """A place for a bin on a piece of furniture."""
 
     receptacle: str  # catalogue key of the bin, such as "dish_bin"
-    position: tuple[float, float, float]  # middle of the bin's base, in metres
-    yaw: float = math.pi  # yaw of the bin in radians; the bin's front is its local -y side
+    position: tuple[float, float, float]  # centre of the bin's base, in metres
+    yaw: float = math.pi  # yaw of the bin in radians; the bin faces its local -y direction
 
 
 @dataclass(frozen=True)
 class DrawnTexture:
-    """A texture drawn for one piece. Its material has the same name."""
+    """A texture that is drawn for a single piece. Its material has the same name."""
 
     name: str
     png: bytes
@@ -55,27 +55,28 @@ class DrawnTexture:
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of furniture, or a group of pieces that belong together."""
+    """A piece of furniture, or a group of pieces such as a table with chairs."""
 
     kind: str
     size: tuple[float, float, float]  # width along the wall, depth into the room and height, in metres
-    geoms: str  # MJCF elements in the piece's frame
+    geoms: str  # MJCF elements in the frame of the piece
     parts: tuple[Obstacle, ...]
-    use: tuple[Spot, ...] = ()  # floor where people stand to use the piece, which stays free and reachable
-    # "wall", "left" or "right" (at a wall, with that end in a corner), "free", "hangs", "flat", "recess" or "ceiling"
+    use: tuple[Spot, ...] = ()  # free floor that people need to use the piece
+    # Position of the piece: "wall", "left", "right", "free", "hangs", "flat", "recess" or "ceiling".
+    # Pieces with "left" or "right" stand at a wall, with that end in a corner of the room.
     stands: str = "wall"
     seats: int = 0
     mounts: tuple[Mount, ...] = ()
     pictures: tuple[DrawnTexture, ...] = ()
-    members: tuple["Member", ...] = ()  # members of a group, which has no geoms of its own
+    members: tuple["Member", ...] = ()  # members of a group; a group has no geoms
 
 
-# A piece with its pose in the group: x and y in metres, and yaw in radians.
+# A piece and its pose in a group, with x and y in metres and yaw in radians.
 Member = tuple[Piece, float, float, float]
 
 
 def moved(spot: Spot, x: float, y: float, yaw: float) -> Spot:
-    """Rotate a rectangle by `yaw`, move it, and return its bounding rectangle in metres."""
+    """Rotate and translate a rectangle. Return the bounding rectangle of the result, in metres."""
     cos, sin = math.cos(yaw), math.sin(yaw)
     corners = [(u, v) for u in (spot[0], spot[2]) for v in (spot[1], spot[3])]
     xs = [round(x + cos * u - sin * v, 4) for u, v in corners]
@@ -91,9 +92,10 @@ def group(
     stands: str = "wall",
     seats: int | None = None,
 ) -> Piece:
-    """Combine pieces into one whose back edge is at y = 0 and whose middle is at x = 0.
+    """Combine pieces into a group whose back edge is at y = 0 and whose centre is at x = 0.
 
-    `use` is in the frame of the group. `use` and `seats` default to those of the members.
+    `use` is in the same frame as the poses of the members. By default, `use` and `seats` are taken from the
+    members.
     """
     members = list(members)
     parts = [
@@ -126,7 +128,7 @@ def group(
 
 
 def flattened(piece: Piece, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Iterator[Member]:
-    """Yield a piece and all members of groups, each with its pose."""
+    """Yield a piece and the members of its nested groups, together with their poses."""
     if piece.geoms:
         yield piece, x, y, yaw
     cos, sin = math.cos(yaw), math.sin(yaw)

@@ -23,8 +23,8 @@ def _pot(b: Builder, r: float, h: float, y: float) -> str:
 
 
 def _potted(b: Builder, r: float, wide: float, tall: float) -> Piece:
-    """Draw a plant with its pot at depth `wide`, the radius of its leaves. Only the pot is an obstacle."""
-    reach = max(r, 0.8 * wide)  # keeps neighbouring furniture out of the leaves
+    """Create a plant with a pot of radius `r` and leaves of radius `wide`. Only the pot is an obstacle."""
+    reach = max(r, 0.8 * wide)  # keeps other furniture out of the leaves
     return b.piece(
         (2 * wide, 2 * wide, tall), parts=((-reach, wide - reach, reach, wide + reach, tall),), stem=r
     )

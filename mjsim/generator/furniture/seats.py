@@ -1,4 +1,4 @@
-"""Sofas, armchairs, chairs, stools and benches. The back of each seat is at y = 0."""
+"""Sofas, armchairs, chairs, stools and benches. The back edge of each seat is at y = 0."""
 
 import math
 
@@ -85,7 +85,7 @@ def armchair(b: Builder) -> Piece:
     form = b.pick("box", "round", "thin", "shell", "none")
     back = b.pick(0.78, 0.88, 1.0)
     b.shadow(w, (0, d), round_one=form == "shell")
-    if form == "shell":  # a round seat with a back of upright rolls
+    if form == "shell":  # a round seat whose back consists of upright rolls
         r = min(w, d) / 2 - 0.02
         b.post(b.cloth, 0, d / 2, (0.14, 0.3), r, seen=False)
         for i in range(11):

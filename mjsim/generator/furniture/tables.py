@@ -1,4 +1,4 @@
-"""Tables and desks, some with seats."""
+"""Tables and desks, some of which have seats."""
 
 import math
 
@@ -79,7 +79,7 @@ def dining(b: Builder) -> Piece:
     made = Builder(name, b.rng, b.look, b.smaller)
     base = table(made) if name == "table" else round_table(made)
     w, d, _ = base.size
-    state = int(b.rng.integers(2**31))  # shared by all chairs, so that they look alike
+    state = int(b.rng.integers(2**31))  # random state for all chairs, so that they look alike
 
     def chair() -> Piece:
         return seats.dining_chair(

@@ -1,1 +1,1 @@
-"""Catalogue files, house names and MJCF model files."""
+"""Load the catalogues of houses, parse house names and read MJCF files."""

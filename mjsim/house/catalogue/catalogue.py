@@ -1,4 +1,4 @@
-"""Catalogues, which define the rooms, categories, receptacles and object models of a house."""
+"""Load catalogues, which define the rooms, categories, receptacles and object models of houses."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,21 +19,21 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ObjectModel:
-    """An object model that can be misplaced in an episode."""
+    """A model of an object that can be misplaced in an episode."""
 
-    key: str  # key in the catalogue, such as `mug`
-    label: str  # name shown to participants, such as `Blue mug`
+    key: str  # key of the object model in the catalogue, such as `mug`
+    label: str  # object name shown to participants, such as `Blue mug`
     category: str
     path: Path
 
 
 @dataclass(frozen=True)
 class Receptacle:
-    """A receptacle, such as a bin or shelf, for the objects of one category."""
+    """A container, such as a bin or a shelf, for the objects of one category."""
 
-    key: str  # key in the catalogue, such as `dish_bin`; the house's MJCF file has a site `mount:<key>`
-    label: str  # name shown to participants, such as `Dish bin`
-    place: str  # location within the room, such as `on the counter, beside the sink`
+    key: str  # key in the catalogue, such as `dish_bin`; the house has a site `mount:<key>` for it
+    label: str  # receptacle name shown to participants, such as `Dish bin`
+    place: str  # location in the room, such as `on the counter, beside the sink`
     room: str
     category: str
     path: Path
@@ -41,23 +41,23 @@ class Receptacle:
 
 @dataclass(frozen=True)
 class Category:
-    """A category of objects that belong in the same receptacle (PAPER section 4)."""
+    """A category of objects, all of which belong in the same receptacle (PAPER section 4)."""
 
-    key: str  # key in the catalogue, such as `dishes`
-    label: str  # name shown to participants, such as `Dishes`
+    key: str  # key of the category in the catalogue, such as `dishes`
+    label: str  # category name shown to participants, such as `Dishes`
     receptacle: str
-    objects: tuple[str, ...]  # keys of object models, in the catalogue's order
+    objects: tuple[str, ...]  # keys of the category's object models, in the order of the catalogue
 
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """The contents of a house's catalogue. Mappings preserve the order of the file.
+    """The contents of the catalogue of a house.
 
-    Two catalogues are equal if all their files have equal contents.
+    Mappings keep the order of the file. Two catalogues are equal if all their files have equal contents.
 
     Attributes:
-        ref: Reference by which the house was loaded.
-        label: Name of the house, as shown to participants.
+        ref: Reference with which the house was loaded.
+        label: Name of the house that is shown to participants.
         house_path: MJCF file of the house.
         rooms: Room key -> label.
         categories: Category key -> category.
@@ -90,7 +90,7 @@ class Catalogue:
         return self.ref.name
 
     def in_language(self, language: str) -> "Catalogue":
-        """Return a copy with translated labels and locations. Text without a translation stays in English.
+        """Return a copy with labels and locations in another language. Texts without a translation are kept.
 
         Raises:
             AssetError: A label file cannot be read.
@@ -114,11 +114,11 @@ class Catalogue:
 
     @classmethod
     def load(cls, house: str = "apartment") -> "Catalogue":
-        """Read and check the catalogue of a house on disk.
+        """Load the catalogue of a house from disk, and check it.
 
         Args:
-            house: Name of a folder under `models/houses`, or path of a `catalogue.toml` or its folder. For generated
-                houses, use `mjsim.load_catalogue`.
+            house: Name of a folder under `models/houses`, or path of a `catalogue.toml` or its folder. Use
+                `mjsim.load_catalogue` for generated houses.
 
         Raises:
             AssetError: The catalogue is missing or invalid.
@@ -132,11 +132,11 @@ class Catalogue:
 
     @classmethod
     def read(cls, house: HouseRef) -> "Catalogue":
-        """Read and check a catalogue. Unlike `mjsim.load_catalogue`, this never generates a home.
+        """Load a catalogue and check it. Unlike `mjsim.load_catalogue`, this never generates a home.
 
         Raises:
-            AssetError: The catalogue or a file it names is missing, or an entry is malformed, unknown, unused or
-                used twice. The message names the entry.
+            AssetError: The catalogue or a file that it refers to is missing, or an entry is malformed,
+                unknown, unused or used twice. The message names the entry.
         """
         tables, text = read_tables(house)
         return _CatalogueReader(catalogue_file(house), tables).catalogue(house, text)
@@ -164,7 +164,7 @@ class _HouseEntry(_ModelEntry):
 
 
 class _ObjectEntry(_ModelEntry):
-    category: _Text | None = None  # may be omitted if the category lists the object
+    category: _Text | None = None  # can be omitted if a category lists the object
 
 
 class _ReceptacleEntry(_ModelEntry):

@@ -1,4 +1,4 @@
-"""Readers of catalogue and label files."""
+"""Read catalogue files and translations of labels."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -11,24 +11,24 @@ from mjsim.house.catalogue.house_ref import CATALOGUE, HouseRef, models_root, pa
 from mjsim.support.files import is_file, read_text
 from mjsim.values.errors import AssetError, brief
 
-MAX_EXTENDS = 20  # maximum length of a chain of catalogues in which each extends the next
+MAX_EXTENDS = 20  # maximum number of catalogues in a chain in which each extends the next
 _SHOWN = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029]*"
 Label = Annotated[str, msgspec.Meta(pattern=rf"^{_SHOWN}\S{_SHOWN}\Z", max_length=80)]
 
 
 def base_of(house: HouseRef) -> HouseRef | None:
-    """Return the house that a catalogue extends, or None if it extends none or cannot be read."""
+    """Return the house that a catalogue extends. Return None if it extends no house or cannot be read."""
     if house.file is None:
         return None
     try:
         name = tomllib.loads(read_text(house.file)).get("extends")
         return parse_house(name, house.file.parent) if isinstance(name, str) else None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError):
-        return None  # the error is reported when the catalogue itself is read
+        return None  # The error is reported when the catalogue is loaded.
 
 
 def catalogue_file(house: HouseRef) -> Path:
-    """Return the absolute path of a house's catalogue file.
+    """Return the absolute path of the catalogue file of a house.
 
     Raises:
         AssetError: The catalogue does not exist, or the home has not been generated yet.
@@ -47,7 +47,7 @@ def catalogue_file(house: HouseRef) -> Path:
 
 
 def read_tables(house: HouseRef, extended: tuple[Path, ...] = ()) -> tuple[dict[str, Any], str]:
-    """Return a catalogue's tables and text, merged with those of the catalogues that it extends.
+    """Read the tables and the text of a catalogue, including those of the catalogues that it extends.
 
     An entry replaces the entry with the same key in an extended catalogue.
     """
@@ -84,9 +84,9 @@ def _name_models(tables: dict[str, Any], folder: Path) -> None:
 
 
 def read_labels(language: str, folders: Iterable[Path]) -> Mapping[str, str]:
-    """Read translations of English labels from the files `labels.LANGUAGE.toml` in several folders.
+    """Read translations of English labels from the `labels.LANGUAGE.toml` files in several folders.
 
-    Later folders take precedence. A folder may have no such file.
+    Later folders take precedence. Folders without such a file are skipped.
 
     Raises:
         AssetError: A label file cannot be read, or contains invalid labels.

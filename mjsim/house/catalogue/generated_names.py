@@ -1,4 +1,4 @@
-"""Names of generated homes (`generated:SEED?rooms=N&version=V`), and random generators derived from their seeds."""
+"""Parse names of generated homes, such as `generated:7?rooms=5`, and create random generators for them."""
 
 import hashlib
 import re
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 
 PREFIX = "generated:"
-VERSION = 3  # version of the generator, to be increased with every change that alters the home of a seed
-ROOMS = (1, 10)  # minimum and maximum number of rooms
+VERSION = 3  # version of the home generator; any change that alters a generated home must increase it
+ROOMS = (1, 10)  # minimum and maximum number of rooms in a generated home
 MAX_SEED = 2**63 - 1
 MAX_HOUSES = 100_000
-# Probabilities of 1 to 10 rooms if the name does not specify a number. Bathrooms and halls count as rooms.
+# Default probabilities of 1 to 10 rooms in a home. Bathrooms and halls count as rooms.
 _SHARES = (0.04, 0.06, 0.09, 0.13, 0.16, 0.16, 0.14, 0.11, 0.07, 0.04)
 _SPLITS: Mapping[str, float] = {"train": 0.8, "validation": 0.9, "test": 1.0}
 
 
 @dataclass(frozen=True)
 class GeneratedName:
-    """Parsed name of a generated home. `str()` returns the full name."""
+    """The parsed name of a generated home. `str()` returns the full name."""
 
     seed: int
     rooms: int
@@ -39,7 +39,7 @@ def is_generated(house: str) -> bool:
 
 
 def parse_name(house: str) -> GeneratedName:
-    """Parse the name of a generated home: `generated:SEED`, `generated:SEED?rooms=N`, or a full name from a record.
+    """Parse the name of a generated home, such as `generated:7`, `generated:7?rooms=5` or its full name.
 
     Raises:
         HouseError: The name is malformed, or belongs to another version of the generator.
@@ -58,9 +58,9 @@ def parse_name(house: str) -> GeneratedName:
 
 
 def generated_names(houses: str) -> list[str]:
-    """Return the names of a generated home (`generated:7`) or of a half-open range of seeds (`generated:0:200`).
+    """Return the names of the homes for one seed (`generated:7`) or for a range of seeds (`generated:0:200`).
 
-    Both forms accept `?rooms=5`, and `?split=train` to keep only the seeds of one dataset split.
+    The end is excluded. `?rooms=5` sets the number of rooms. `?split=train` keeps only one dataset split.
 
     Raises:
         HouseError: The range is malformed or empty.
@@ -85,13 +85,13 @@ def generated_names(houses: str) -> list[str]:
 
 
 def split_of(seed: int) -> str:
-    """Return the dataset split of a seed, chosen by a hash: `train` (80 %), `validation` (10 %) or `test` (10 %)."""
+    """Return the dataset split of a seed: `train` (80 % of seeds), `validation` (10 %) or `test` (10 %)."""
     share = stream(seed, "split").random()
     return next(name for name, end in _SPLITS.items() if share < end)
 
 
 def check_version(version: int, subject: str) -> None:
-    """Raise a HouseError about `subject` if `version` differs from this generator's version."""
+    """Raise a HouseError about `subject` if `version` is not the version of this home generator."""
     if version != VERSION:
         raise HouseError(
             f"{subject} has version {version} of the house generator, but this mjsim has version {VERSION}; "
@@ -104,11 +104,11 @@ def _default_rooms(seed: int) -> int:
 
 
 def stream(seed: int, *purpose: str) -> "np.random.Generator":
-    """Create a random generator from a seed and a purpose, for example `stream(7, "furniture", "bedroom")`.
+    """Create the random generator for a seed and a purpose, such as `stream(7, "furniture", "bedroom")`.
 
-    Purposes have independent generators, so drawing more for one does not change the others.
+    The generators of different purposes are independent, so drawing from one does not change the others.
     """
-    import numpy as np  # imported here because it is slow and every command parses house names, even for --help
+    import numpy as np  # imported here because importing NumPy would slow down every command, even --help
 
     digest = hashlib.sha256("/".join(purpose).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]

@@ -1,4 +1,4 @@
-"""References to houses, and the folder of the packaged models."""
+"""Parse references to houses, and find the folder of packaged models."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +13,12 @@ CATALOGUE = "catalogue.toml"
 
 @dataclass(frozen=True)
 class HouseRef:
-    """A parsed reference to a house."""
+    """A reference to a house, parsed from its name or path."""
 
     kind: Literal["shipped", "folder", "generated", "recipe"]
-    name: str  # the house's name in records, or a path for folders and recipes
-    file: Path | None  # path of `catalogue.toml`, or None for a home that `home_cache.ensured` must generate
-    base: "HouseRef | None" = None  # the generated house that this house's catalogue extends, if any
+    name: str  # name of the house in records, or the path of a folder or recipe
+    file: Path | None  # path of `catalogue.toml`, or None if `home_cache.ensured` must generate the home
+    base: "HouseRef | None" = None  # generated house that the catalogue of this house extends, if any
 
     @property
     def is_path(self) -> bool:
@@ -26,12 +26,12 @@ class HouseRef:
 
 
 def parse_house(house: str, folder: Path = Path()) -> HouseRef:
-    """Parse a reference to a house. The files need not exist.
+    """Parse a reference to a house. The files of the house need not exist.
 
     Args:
         house: Name of a folder under `models/houses`, seed of a generated home (`generated:7`), or path of a
             `catalogue.toml`, of a folder that contains one, or of a recipe.
-        folder: Folder to which relative paths refer.
+        folder: Folder relative to which paths are resolved.
 
     Raises:
         HouseError: The name of a generated home is malformed, or belongs to another version of the generator.
@@ -50,9 +50,9 @@ def parse_house(house: str, folder: Path = Path()) -> HouseRef:
 
 
 def models_root() -> Path:
-    """Return the folder that contains `houses/`, `receptacles/` and `objects/`. Raise an AssetError if it is missing.
+    """Return the folder of the packaged models. Raise an AssetError if it does not exist.
 
-    The folder is inside an installed package, or next to the package in a checkout.
+    It is inside an installed package, but next to the package in a source checkout.
     """
     package = Path(__file__).resolve().parents[2]
     candidates = (package / "models", package.parent / "models")

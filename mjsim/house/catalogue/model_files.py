@@ -1,4 +1,4 @@
-"""MJCF file reader, and content hashes of houses."""
+"""Read MJCF files, and compute content hashes of houses."""
 
 import hashlib
 import shutil
@@ -16,19 +16,19 @@ from mjsim.values.errors import AssetError
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """The contents of an MJCF file and of all files that it includes or refers to."""
+    """An MJCF file and the XML elements of all files that it includes."""
 
     path: Path
-    elements: tuple[ET.Element, ...]  # XML elements of this file and of all included files
+    elements: tuple[ET.Element, ...]  # XML elements of the file and of all included files
 
     @classmethod
     def read(cls, path: Path) -> "ModelFile":
-        """Read an MJCF file, and check that every file that it refers to can be read.
+        """Read an MJCF file, and check that all files to which it refers can be read.
 
         Raises:
             OSError: The file cannot be read.
             UnicodeDecodeError: The file is not UTF-8.
-            AssetError: A file that it refers to cannot be read. Missing files are reported by `spec` instead.
+            AssetError: A file to which it refers cannot be read. Only `spec` reports missing files.
         """
         content = read_bytes(path)
         content.decode("utf-8-sig")
@@ -38,14 +38,14 @@ class ModelFile:
         return cls(path, elements)
 
     def spec(self) -> mujoco.MjSpec:
-        """Return an editable model with absolute asset paths, or raise MuJoCo's ValueError for an invalid file."""
+        """Return an editable model with absolute asset paths. Raise a ValueError if the file is invalid."""
         spec = mujoco.MjSpec.from_file(str(self.path))
         _name_files(spec, self.path.parent)
         return spec
 
 
 def read_model(path: Path, *, body: str | None = None) -> mujoco.MjSpec:
-    """Read an MJCF file as an editable model that can be attached to another, with absolute paths of asset files.
+    """Read an editable model with absolute asset paths, which can be attached to another, from an MJCF file.
 
     Raises:
         AssetError: The file is invalid, or has no top-level body named `body`.
@@ -70,7 +70,7 @@ def _name_files(spec: mujoco.MjSpec, folder: Path) -> None:
 
 
 def copy_house(path: Path, folder: Path) -> None:
-    """Copy a house's folder and the packaged textures that it uses, so that MuJoCo can load it without this package."""
+    """Copy a house's folder and its packaged textures, so that MuJoCo can load it without this package."""
     shutil.copytree(path.parent, folder, dirs_exist_ok=True)
     found = list(elements(path))
     directory = next((e.get("texturedir", "") for e in found if e.tag == "compiler"), "")
@@ -82,19 +82,19 @@ def copy_house(path: Path, folder: Path) -> None:
 
 
 def elements(path: Path) -> Iterator[ET.Element]:
-    """Yield all XML elements of an MJCF file and of the files that it includes. Skip files that are not XML."""
+    """Yield all XML elements of an MJCF file and its included files. Files that are not XML are skipped."""
     yield from _elements(str(path), str(path.parent), {})
 
 
 def content_hash(text: str, models: Iterable[Path]) -> str:
-    """Return a hash, 64 hex digits, of a text and of MJCF files with all files that they include or refer to.
+    """Return a hexadecimal SHA-256 hash of a text and of MJCF files with all files to which they refer.
 
-    Missing or malformed files raise no error here, because reading the model reports them.
+    Missing or malformed files raise no error here. They are reported when the model is read.
     """
     files: dict[str, bytes] = {}
     for model in models:
         _read_assets(model.parent, list(_elements(str(model), str(model.parent), files)), files)
-    # Hash the files in the order of references, so that swapping the contents of two files changes the hash.
+    # Files are hashed in the order of references, so that swapping two files changes the hash.
     digests = [hashlib.sha256(content).digest() for content in files.values()]
     return hashlib.sha256(b"".join([text.encode(), *digests])).hexdigest()
 

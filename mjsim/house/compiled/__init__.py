@@ -1,1 +1,1 @@
-"""Compiled houses without objects or a person: rooms, receptacles, walkable floor and ray casts."""
+"""Compile houses, and query their rooms, receptacles and walkable floor."""

@@ -1,8 +1,8 @@
-"""Tighter bounding volume hierarchies, which halve the box tests of collision detection and ray casts in houses.
+"""Optimize the bounding volume hierarchy of a compiled house for faster collision detection and ray casts.
 
-MuJoCo's compiler splits the sorted geoms of a body in half, level by level. In a house, this groups table legs with
-walls and floors, so boxes overlap. This module rebuilds the tree over the same leaves with the surface area heuristic
-(MacDonald and Booth, 1990). Contacts and ray hits stay the same.
+MuJoCo's compiler recursively splits the sorted geoms of a body in half. In a house, this groups table legs
+with walls and floors, so boxes overlap. This module rebuilds the tree over the same leaves with the surface
+area heuristic (MacDonald and Booth, 1990). This halves the box tests, and contacts stay the same.
 """
 
 import math
@@ -28,7 +28,7 @@ def tighten(model: mujoco.MjModel) -> None:
         made, children, leaf, depth = surface_area_tree(
             boxes[:, :3] - boxes[:, 3:], boxes[:, :3] + boxes[:, 3:]
         )
-        if len(made) != count:  # skip trees that are not binary with one geom per leaf
+        if len(made) != count:  # Skip hierarchies that are not binary trees with one geom per leaf.
             continue
         inner = leaf < 0
         model.bvh_aabb[nodes] = made
@@ -42,10 +42,10 @@ def tighten(model: mujoco.MjModel) -> None:
 def surface_area_tree(
     low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Build a binary tree over boxes with corners (n, 3), using the surface area heuristic.
+    """Build a binary tree of bounding boxes over n boxes with corners (n, 3), by the surface area heuristic.
 
-    Returns arrays over the 2n - 1 nodes, of which node 0 is the root: the box as centre and half size, the two children
-    or -1, the index of a leaf's box or -1, and the depth.
+    Returns arrays for the 2n - 1 nodes, of which node 0 is the root: the box as centre and half size, the two
+    children or -1, the index of a leaf's box or -1, and the depth.
     """
     count = len(low)
     total = 2 * count - 1

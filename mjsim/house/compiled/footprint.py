@@ -1,4 +1,4 @@
-"""Outlines of static geoms seen from above, an obstacle grid for the person's trunk, and a distance field."""
+"""Project the static geoms of a house onto the floor, and look up nearby obstacles and their distances."""
 
 import math
 from dataclasses import dataclass
@@ -15,32 +15,32 @@ from mjsim.house.compiled.sites import RoomMap
 from mjsim.support.kernels import kernel
 from mjsim.values.errors import AssetError
 
-CIRCLE_SIDES = 32  # The polygon is drawn around the circle: up to 0.5 % wider, never narrower.
+CIRCLE_SIDES = 32  # number of sides of a polygon around a circle; it is up to 0.5 % wider than the circle
 _GEOM = mujoco.mjtGeom
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _ANGLES = 2 * np.pi * (np.arange(CIRCLE_SIDES) + 0.5) / CIRCLE_SIDES
-# Polygon around the unit circle, shape (CIRCLE_SIDES, 2).
+# Vertices of a polygon around the unit circle, shape (CIRCLE_SIDES, 2).
 _CIRCLE = 1.0 / np.cos(np.pi / CIRCLE_SIDES) * np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-_TRUNK_BAND = (0.04, 1.72)  # heights of the lower and upper end of the trunk, in metres
-CELL = 0.25  # cell size of a `Floor` grid, in metres
-MARGIN = 0.12  # A cell lists the obstacles that come this close to a trunk in it, in metres.
-BORDER = 0.4  # default width of the border around the rooms, in metres
+_TRUNK_BAND = (0.04, 1.72)  # heights of the lower and upper end of a person's trunk, in metres
+CELL = 0.25  # side length of the cells of a `Floor` grid, in metres
+MARGIN = 0.12  # maximum gap between the trunk and an obstacle that counts as nearby, in metres
+BORDER = 0.4  # default margin of a grid around the rooms, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Obstacles and rooms of a floor, seen from above."""
+    """The obstacles in a house, and the extent of its rooms, seen from above."""
 
-    # Convex counter-clockwise polygons in metres, each of shape (k, 2).
+    # Outlines of the obstacles as convex, counter-clockwise polygons in metres, each of shape (k, 2).
     obstacles: tuple[NDArray[np.float64], ...]
     bounds: tuple[float, float, float, float]  # extent of the rooms in metres: (xmin, ymin, xmax, ymax)
 
 
 def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) -> Footprint:
-    """Project onto the floor the static colliding geoms that overlap the heights from `low` to `high`, in metres.
+    """Project all static, colliding geoms between the heights `low` and `high`, in metres, onto the floor.
 
-    Floors and rugs end below the default range, while lintels, lamps and wall cupboards begin above it. A geom that
-    overlaps the range counts with its whole outline. Objects and the person are left out because they move.
+    Floors and rugs end below the default range, while lintels, lamps and wall cupboards begin above it. A
+    geom that is only partly in the range is projected as a whole. Objects and the person are left out.
 
     Raises:
         AssetError: The house has no rooms, or a static geom is a height field or has no area.
@@ -62,7 +62,7 @@ def footprint(model: mujoco.MjModel, *, low: float = 0.05, high: float = 1.8) ->
 def outline_points(
     model: mujoco.MjModel, geom: int, centre: NDArray[np.float64], rotation: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points (k, 3) in metres that enclose a geom seen from above and have the same z range as the geom.
+    """Return points (k, 3), in metres, that enclose a geom seen from above and have the same height range.
 
     Raises:
         AssetError: The geom is a plane or a height field.
@@ -92,7 +92,7 @@ def outline_points(
 
 
 def _ellipsoid(centre: NDArray[np.float64], axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    # A linear map onto the plane turns a ball into an ellipse. The SVD of the map gives the axes of the ellipse.
+    # A linear map onto the plane turns a ball into an ellipse. The SVD of the map gives its axes.
     directions, lengths, _ = np.linalg.svd(axes[:2])
     outline = np.zeros((CIRCLE_SIDES, 3))
     outline[:, :2] = _CIRCLE @ (directions * lengths).T
@@ -115,29 +115,29 @@ def _name(model: mujoco.MjModel, geom: int) -> str:
 
 
 class Floor(NamedTuple):
-    """Obstacles to the person's trunk, in arrays for kernels, with a grid to look up nearby obstacles."""
+    """The obstacles on a floor, with a grid to look up those near a person. All arrays are for kernels."""
 
-    # Edges of all convex polygons, counter-clockwise. Each row is start x, start y, direction x, direction y, length.
+    # Edges of the obstacles, counter-clockwise. Columns: start x, start y, direction x, direction y, length.
     edges: NDArray[np.float64]
-    first: NDArray[np.int64]  # start of each polygon in `edges`, shape (p + 1,)
-    boxes: NDArray[np.float64]  # bounding box of each polygon: xmin, xmax, ymin, ymax, shape (p, 4)
-    near: NDArray[np.int64]  # polygons that the trunk may touch, cell by cell
-    # Start of each cell in `near`, row by row, shape (cells + 1,).
+    first: NDArray[np.int64]  # first row of each obstacle in `edges`, shape (p + 1,)
+    boxes: NDArray[np.float64]  # bounding box of each obstacle: xmin, xmax, ymin, ymax, shape (p, 4)
+    near: NDArray[np.int64]  # indices of the obstacles near each cell, one cell after the other
+    # Index in `near` of the first obstacle of each cell, row by row, shape (cells + 1,).
     near_first: NDArray[np.int64]
-    origin_x: float  # position of the corner of cell (0, 0), in metres
-    origin_y: float
+    origin_x: float  # x coordinate of the corner of cell (0, 0), in metres
+    origin_y: float  # y coordinate of the corner of cell (0, 0), in metres
     rows: int  # number of cells along x
     columns: int  # number of cells along y
 
     @classmethod
     def of(cls, model: mujoco.MjModel, radius: float) -> "Floor":
-        """Build the grid for a compiled house and a trunk with the given radius in metres."""
+        """Build the obstacle grid of a compiled house for a person with this trunk radius, in metres."""
         low, high = _TRUNK_BAND
         return cls.of_polygons(footprint(model, low=low, high=high).obstacles, radius)
 
     @classmethod
     def of_polygons(cls, polygons: tuple[NDArray[np.float64], ...], radius: float) -> "Floor":
-        """Build the grid for convex counter-clockwise polygons (k, 2) and a trunk with the given radius, in metres."""
+        """Build the grid from convex, counter-clockwise polygons (k, 2) for a trunk radius, in metres."""
         reach = radius + MARGIN
         boxes = np.array([[*p.min(axis=0), *p.max(axis=0)] for p in polygons]).reshape(-1, 4)
         low = boxes[:, :2].min(axis=0, initial=np.inf) - reach if len(polygons) else np.zeros(2)
@@ -172,14 +172,14 @@ def _edges(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class ClearanceField(NamedTuple):
-    """Grid of signed distances to the static geoms within a range of heights, in arrays for kernels."""
+    """A grid of signed distances to the nearest static geom. All arrays are for kernels."""
 
-    # Distance from each cell's centre in metres, positive outside geoms, shape (nx, ny).
+    # Distance from each cell's centre to the nearest geom in metres, negative inside geoms, shape (nx, ny).
     distance: NDArray[np.float64]
-    gradient: NDArray[np.float64]  # unit vector of steepest increase, shape (nx, ny, 2)
-    origin_x: float  # position of the centre of cell (0, 0), in metres
-    origin_y: float
-    resolution: float  # cell size in metres
+    gradient: NDArray[np.float64]  # direction of the steepest increase as a unit vector, shape (nx, ny, 2)
+    origin_x: float  # x coordinate of the centre of cell (0, 0), in metres
+    origin_y: float  # y coordinate of the centre of cell (0, 0), in metres
+    resolution: float  # side length of a cell in metres
 
     @classmethod
     def from_model(
@@ -191,7 +191,7 @@ class ClearanceField(NamedTuple):
         resolution: float = 0.04,
         border: float = BORDER,
     ) -> "ClearanceField":
-        """Rasterize the static colliding geoms between two heights in metres, with a border around the rooms."""
+        """Compute the grid for all static, colliding geoms between two heights, in metres."""
         plan = footprint(model, low=low, high=high)
         xmin, ymin, xmax, ymax = plan.bounds
         origin = np.array([xmin - border, ymin - border])
@@ -209,7 +209,7 @@ class ClearanceField(NamedTuple):
 
 @kernel
 def clearance_at(x: float, y: float, field: ClearanceField) -> tuple[float, float, float]:
-    """Return the interpolated distance at a point in metres, and the direction (x, y) away from the nearest geom."""
+    """Return the distance from a point to the nearest geom, in metres, and the direction away from it."""
     distance, gradient = field.distance, field.gradient
     u = (x - field.origin_x) / field.resolution
     v = (y - field.origin_y) / field.resolution
@@ -234,7 +234,7 @@ def _fill(grid: NDArray[np.bool_], polygon: NDArray[np.float64]) -> None:
     for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = end - start
         length = float(np.hypot(*edge))
-        if length > 1e-9:  # The polygon is counter-clockwise, so its inside is to the left of every edge.
+        if length > 1e-9:  # The polygon is counter-clockwise, so its interior is to the left of each edge.
             offset = cells - start
             left_by = (edge[0] * offset[..., 1] - edge[1] * offset[..., 0]) / length
             inside &= left_by >= -0.5

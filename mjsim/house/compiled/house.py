@@ -1,7 +1,7 @@
-"""Compiled houses, cached by content, and object models prepared for scenes.
+"""Compile houses and prepare their object models for scenes.
 
-The walkable floor is computed by an installed package, because navigation meshes belong to the planner, which `mjsim`
-must not import. This module defines the protocol and loads the entry point `mjsim.navigable`.
+The walkable floor is computed by another installed package, because navigation meshes belong to the planner,
+which `mjsim` must not import. This module defines the protocol and loads the entry point `mjsim.navigable`.
 """
 
 import functools
@@ -22,45 +22,45 @@ from mjsim.house.compiled.footprint import Footprint, footprint
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap, receptacle_geometries
 from mjsim.values.errors import AssetError, SamplingError
 
-VISUAL_BODY = "looks"  # name of the body that carries an object's visual geoms
+VISUAL_BODY = "looks"  # name of the body that contains an object's visual geoms
 TIMESTEP = 0.004
 SLEEP_TOLERANCE = 0.05
-MAX_HOUSES = 4  # number of cached houses, of about 30 MB each
+MAX_HOUSES = 4  # maximum number of cached houses; each needs about 30 MB
 T = TypeVar("T")
-GROUP = "mjsim.navigable"  # entry point group of walkable-floor builders
+GROUP = "mjsim.navigable"  # entry point group of packages that compute walkable floors
 
 
 class NavigablePoints(Protocol):
-    """The part of a walkable floor that sampling needs. Points are (x, y) in metres."""
+    """Protocol of a walkable floor from which points can be sampled. Points are (x, y) in metres."""
 
     def sample(self, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Draw a point (2,) uniformly from the reachable part of the floor."""
+        """Draw a random point (2,) from a uniform distribution over the reachable floor."""
 
     def is_navigable(self, point: ArrayLike) -> bool:
-        """Return True if a person can stand at the given point (2,)."""
+        """Return True if a person can stand at this point (2,)."""
 
     def snap(self, point: ArrayLike, max_distance: float) -> NDArray[np.float64]:
-        """Return the point (2,) nearest to `point` that `sample` could draw."""
+        """Return the point (2,) of the reachable floor that is nearest to `point` (2,)."""
 
 
 class NavigableFloor(NavigablePoints, Protocol):
-    """The walkable floor of a house."""
+    """Protocol of a walkable floor that also provides a map of its regions."""
 
     @property
     def topdown_map(self) -> NDArray[np.int32]:
-        """Region of each cell, shape (rows, columns): 0 for the largest, 1, 2, ... for others, -1 for obstacles."""
+        """The region of each cell, shape (rows, columns). The largest region is 0, and obstacles are -1."""
 
 
 class NavigableBuilder(Protocol):
-    """A function that computes the walkable floor of a house."""
+    """Protocol of a function that computes the walkable floor of a house."""
 
     def __call__(self, obstacles: Sequence[ArrayLike], bounds: Sequence[float], /) -> NavigableFloor:
-        """Compute the floor among convex polygons (k, 2) within (x_min, y_min, x_max, y_max), all in metres."""
+        """Compute the floor within (x_min, y_min, x_max, y_max) around convex obstacles (k, 2), in metres."""
         ...
 
 
 def installed_builder() -> NavigableBuilder:
-    """Load the floor builder of the first installed package that has one. Raise a SamplingError if there is none."""
+    """Load the floor builder of an installed package. Raise a SamplingError if no package has one."""
     offers = sorted(entry_points(group=GROUP), key=lambda e: e.name)
     if not offers:
         raise SamplingError(
@@ -77,7 +77,7 @@ def installed_builder() -> NavigableBuilder:
 def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Remove visual geoms, materials, textures and unused meshes from a model in place.
 
-    Bodies are kept, so that models with and without visual geoms accept the same states.
+    The bodies are kept, so that models with and without visual geoms have the same state layout.
     """
     spec.compiler.discardvisual = True
     spec.compile()
@@ -87,8 +87,8 @@ def remove_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 def separate_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Move an object's visual geoms to a separate body that is fixed to the object, in place.
 
-    This makes steps faster: the broad phase visits every geom of a body that can collide, even while the body sleeps.
-    Geoms in nested frames are not moved.
+    This makes physics steps faster, because the broad phase visits every geom of a body that can collide,
+    even while the body sleeps. Geoms in nested frames are not moved.
     """
     body = spec.body("object")
     groups: list[tuple[Any, list[Any]]] = []
@@ -122,7 +122,7 @@ def _move(spec: mujoco.MjSpec, geoms: list[Any], frame: Any, body: Any) -> None:
     names = [geom.name for geom in geoms]
     before = len(body.geoms)
     for geom in geoms:
-        geom.name = ""  # names must be unique, and attaching a frame copies its geoms first
+        geom.name = ""  # Attaching a frame first copies its geoms, whose names must be unique.
         geom.set_frame(frame)
     body.attach_frame(frame, "", "")
     spec.delete(frame)
@@ -135,7 +135,7 @@ def _is_visual(geom: Any) -> bool:
 
 
 class CompiledHouse:
-    """A compiled house with its receptacles, without objects and without a person.
+    """A compiled house with its receptacles, but without objects or a person.
 
     Instances from `compiled_house` are shared and must not be changed.
     """
@@ -146,7 +146,7 @@ class CompiledHouse:
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """The compiled model. Raises an AssetError if a model is malformed or a receptacle's mount is missing."""
+        """The compiled model. Raises an AssetError if a file is malformed or a receptacle has no mount."""
         with compile_errors(f"house {self.catalogue.house_path}"):
             return self._spec.copy().compile()
 
@@ -174,7 +174,7 @@ class CompiledHouse:
         return installed_builder()(self.floor.obstacles, self.floor.bounds)
 
     def spec(self, *, visuals: bool = True) -> mujoco.MjSpec:
-        """Return an editable copy in which all static bodies are fused into one. `visuals` includes visual geoms."""
+        """Return an editable copy with merged static bodies, and with visual geoms if `visuals` is True."""
         return (self._fused if visuals else self._collision).copy()
 
     def object_spec(self, path: Path, *, visuals: bool = True) -> mujoco.MjSpec:
@@ -184,7 +184,7 @@ class CompiledHouse:
         return self.cached((path, False), lambda: remove_visuals(whole.copy()))
 
     def cached(self, key: Any, compute: Callable[[], T]) -> T:
-        """Return the value cached under `key`. The first call computes it."""
+        """Return the value cached under `key`. If there is none, compute it with `compute`."""
         if key not in self._derived:
             self._derived[key] = compute()
         return cast(T, self._derived[key])
@@ -208,9 +208,9 @@ class CompiledHouse:
     @cached_property
     def _fused(self) -> mujoco.MjSpec:
         spec = self._spec.copy()
-        # The broad phase visits every body of the house in every step. With a single body, a step takes a quarter of
-        # the time. Compiling also fuses the bodies of the spec itself, so scenes made from this spec start with a
-        # single body.
+        # The broad phase visits every body of the house in every step. If all static bodies are merged into
+        # one, a step takes a quarter of the time. Compiling merges the bodies of the spec too, and thus those
+        # of scenes that are made from it.
         spec.compiler.fusestatic = True
         with compile_errors(f"house {self.catalogue.house_path}"):
             spec.compile()
@@ -223,7 +223,7 @@ class CompiledHouse:
 
 @functools.lru_cache(maxsize=MAX_HOUSES)
 def compiled_house(catalogue: Catalogue) -> CompiledHouse:
-    """Return the compiled house of a catalogue. Catalogues with the same content share one instance.
+    """Return the compiled house of a catalogue. Catalogues with equal contents share a compiled house.
 
     Models are read and compiled on first use.
     """
@@ -231,18 +231,18 @@ def compiled_house(catalogue: Catalogue) -> CompiledHouse:
 
 
 def navigable_floor(catalogue: Catalogue) -> NavigableFloor:
-    """Return the walkable floor of a house. It is computed once per process.
+    """Return the walkable floor of a house, which is computed on first use.
 
     Raises:
         SamplingError: No builder is installed, or it cannot be loaded.
-        AssetError: The house does not compile.
+        AssetError: The house cannot be compiled.
     """
     return compiled_house(catalogue).navigable
 
 
 @contextmanager
 def compile_errors(what: str) -> Iterator[None]:
-    """Turn MuJoCo's compile errors into an AssetError that names `what` and suggests a remedy."""
+    """Convert MuJoCo's compile errors into an AssetError about `what`."""
     try:
         yield
     except (ValueError, mujoco.FatalError) as error:
@@ -262,5 +262,5 @@ def _set_options(spec: mujoco.MjSpec) -> None:
     option.impratio = 10.0
     option.sleep_tolerance = SLEEP_TOLERANCE
     option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    # Disable the automatic reset, which would hide that the simulation diverged. `World` raises an error instead.
+    # Disable the automatic reset, which would hide a diverged simulation. `World` raises an error instead.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

@@ -1,4 +1,4 @@
-"""Ray casts into a compiled model: nearest geoms and lines of sight."""
+"""Cast rays into a compiled model to find the nearest geom or to check a line of sight."""
 
 import math
 
@@ -11,12 +11,12 @@ from mjsim.house.compiled.sites import ReceptacleGeometry
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Groups of colliding geoms: structure and furniture (0) and collision guards (3), without ceilings (1), decoration (2)
-# and the person (4).
+# Mask of the geom groups that block rays: structure and furniture (0) and invisible collision geoms (3), but
+# not ceilings (1), decoration (2) or the person (4).
 SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)
-DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # geom groups that the first-person view shows
-RIM = 0.06  # Geoms up to this far outside a receptacle's volume count as its own walls, in metres.
-_SKIP = 1e-6  # step past a surface that the ray passes through, as a fraction of the ray's length
+DRAWN = np.array([1, 1, 1, 0, 0, 0], np.uint8)  # mask of the geom groups that the first-person view shows
+RIM = 0.06  # maximum distance between the walls of a receptacle and its volume, in metres
+_SKIP = 1e-6  # length by which a ray continues behind an ignored surface, relative to the length of the ray
 _MAX_SKIPS = 32
 
 
@@ -31,14 +31,14 @@ def first_hit(
     without: int = -1,
     reach: float = math.inf,
 ) -> tuple[float, int]:
-    """Return the distance to the nearest geom along a ray and the geom's id, or infinity and -1 if the ray hits none.
+    """Return the distance along a ray to the first geom, and the id of the geom, or (inf, -1) for a miss.
 
     Args:
-        start, ray: Start in metres, and direction, each (3,). Distances are in units of the direction's length.
-        groups: Mask of the geom groups to hit, (6,).
-        through: Mask of the geoms that the ray passes through, (ngeom,).
-        without: Id of a body to ignore, so that geoms touching its surface are found too. -1 for none.
-        reach: End of the ray. Hits beyond it may be reported or not.
+        start, ray: Start in metres, and direction, each (3,). Distances are multiples of its length.
+        groups: Mask of the geom groups that the ray can hit, shape (6,).
+        through: Mask of the geoms that the ray passes through, shape (ngeom,).
+        without: Id of a body to ignore, or -1. Unlike with `through`, geoms that touch its surface are found.
+        reach: Distance at which the ray ends. Hits beyond this distance may or may not be reported.
     """
     origin, along = np.asarray(start, np.float64), np.asarray(ray, np.float64)
     geom, travelled = np.zeros(1, np.int32), 0.0
@@ -58,16 +58,16 @@ def moving_geoms(model: mujoco.MjModel) -> Mask:
 
 
 def sees(model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, point: Floats) -> bool:
-    """Return True if no static solid geom is on the line between two points (3,), in metres."""
+    """Return True if no static solid geom blocks the line between two points (3,), in metres."""
     return first_hit(model, data, eye, point - eye, through=moving_geoms(model), reach=1.0)[0] >= 1.0
 
 
 def receptacle_in_sight(
     model: mujoco.MjModel, data: mujoco.MjData, eye: Floats, receptacle: ReceptacleGeometry
 ) -> bool:
-    """Return True if an eye (3,) sees the centre or the nearest point of the top of a receptacle's volume.
+    """Return True if the centre or the nearest point of the top of a receptacle is visible from an eye (3,).
 
-    Geoms within the receptacle's outline count as its own rim, which does not hide it.
+    Geoms within the receptacle's outline count as its own rim and do not hide it.
     """
     half, through = receptacle.half_size, moving_geoms(model)
     nearest = np.clip(

@@ -1,4 +1,4 @@
-"""Rooms and receptacles, read from the sites of a compiled house."""
+"""Read the rooms and receptacles of a compiled house from its sites."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -16,21 +16,21 @@ PREFIX = "room:"
 
 @dataclass(frozen=True, eq=False)
 class RoomMap:
-    """Rooms as rectangles on the floor. A room has one or more rectangles (PAPER section 5)."""
+    """The rooms of a house. Each room consists of one or more rectangles on the floor (PAPER section 5)."""
 
-    # Labels shown to participants ("Kitchen") by room key, in the catalogue's order.
+    # Room key -> label shown to participants, such as "Kitchen", in the order of the catalogue.
     labels: Mapping[str, str]
-    keys: tuple[str, ...]  # room key of each of the k rectangles
-    centers: NDArray[np.float64]  # centres in metres, shape (k, 2)
-    half_sizes: NDArray[np.float64]  # half extents in metres along the rectangle's own axes, shape (k, 2)
-    axes: NDArray[np.float64]  # rectangle axes as columns, shape (k, 2, 2)
+    keys: tuple[str, ...]  # key of the room to which each rectangle belongs, length k
+    centers: NDArray[np.float64]  # centres of the rectangles in metres, shape (k, 2)
+    half_sizes: NDArray[np.float64]  # half extents of the rectangles in metres, shape (k, 2)
+    axes: NDArray[np.float64]  # axes of the rectangles as columns, shape (k, 2, 2)
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, labels: Mapping[str, str] | None = None) -> "RoomMap":
         """Read the rooms from the box sites `room:<key>` and `room:<key>:<n>`. Labels default to the keys.
 
         Raises:
-            AssetError: A room has no site, a site has no room, or a site is not an upright box.
+            AssetError: A room has no site, a site belongs to no room, or a site is not an upright box.
         """
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
@@ -58,24 +58,24 @@ class RoomMap:
         )
 
     def distances(self, xy: ArrayLike) -> NDArray[np.float64]:
-        """Return the distances in metres from points (..., 2) to each rectangle, shape (..., k). Inside they are 0."""
+        """Return the distance from each point (..., 2) to each rectangle, in metres, shape (..., k)."""
         offsets = np.asarray(xy, dtype=np.float64)[..., None, :2] - self.centers
         local = np.einsum("kji,...kj->...ki", self.axes, offsets)
         outside = np.maximum(np.abs(local) - self.half_sizes, 0.0)
         return np.asarray(np.hypot(outside[..., 0], outside[..., 1]))
 
     def room_at(self, xy: ArrayLike) -> str:
-        """Return the key of the room that contains a point (2,), or of the nearest room."""
+        """Return the key of the room at a point (2,), or of the nearest room if the point is in none."""
         return self.keys[int(np.argmin(self.distances(xy)))]
 
     def contains(self, xy: ArrayLike, margin: float = 0.0) -> bool:
-        """Return True if a point (2,) is in a room or at most `margin` metres outside one."""
+        """Return True if a point (2,) is inside a room, or at most `margin` metres away from one."""
         x, y = np.asarray(xy, dtype=np.float64)[:2].tolist()
         return bool(nearest_rectangle(x, y, *self.rectangles) <= margin)
 
     @property
     def rectangles(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Centres and half sizes (k, 2) in metres and axes (k, 2, 2), for kernels."""
+        """The centres (k, 2), half sizes (k, 2) and axes (k, 2, 2) of all rectangles, in metres."""
         return self.centers, self.half_sizes, self.axes
 
     def label(self, key: str) -> str:
@@ -86,12 +86,12 @@ class RoomMap:
 
     @property
     def area(self) -> float:
-        """Sum of the areas of all rectangles in square metres. Overlaps count twice."""
+        """The total area of all rectangles in square metres. Overlapping areas count twice."""
         return float(4 * self.half_sizes.prod(axis=1).sum())
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Axis-aligned extent of all rooms in metres: (xmin, ymin, xmax, ymax)."""
+        """The axis-aligned bounding box of all rooms in metres: (xmin, ymin, xmax, ymax)."""
         reach = np.einsum("kij,kj->ki", np.abs(self.axes), self.half_sizes)
         low, high = (self.centers - reach).min(axis=0), (self.centers + reach).max(axis=0)
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
@@ -105,7 +105,7 @@ def nearest_rectangle(
     half_sizes: NDArray[np.float64],
     axes: NDArray[np.float64],
 ) -> float:
-    """Return the distance in metres from a point to the nearest rectangle of a `RoomMap`, or 0 inside one."""
+    """Return the distance from a point to the nearest rectangle, in metres, or 0 inside a rectangle."""
     nearest = math.inf
     for k in range(len(centers)):
         dx, dy = x - centers[k, 0], y - centers[k, 1]
@@ -123,29 +123,29 @@ def _check_box(model: mujoco.MjModel, data: mujoco.MjData, site: int, name: str)
 
 @dataclass(frozen=True, eq=False)
 class ReceptacleGeometry:
-    """Geometry of a receptacle in the house frame."""
+    """The position and size of a receptacle in a house."""
 
     key: str
-    # Centre of the volume in which objects count as delivered, in metres, shape (3,).
+    # Centre, in metres, of the volume in which objects count as delivered, shape (3,).
     center: NDArray[np.float64]
-    half_size: NDArray[np.float64]  # half extents in metres along the volume's own axes, shape (3,)
+    half_size: NDArray[np.float64]  # half extents of the volume along its own axes, in metres, shape (3,)
     rotation: NDArray[np.float64]  # axes of the volume as columns, shape (3, 3)
-    approach: NDArray[np.float64]  # floor point at which a person stands to use it, in metres, shape (2,)
+    approach: NDArray[np.float64]  # position of a person who uses the receptacle, in metres, shape (2,)
 
     def contains(self, point: ArrayLike, margin: float = 0.005) -> bool:
-        """Return True if a point (3,) is inside the volume, enlarged by `margin` metres on each side."""
+        """Return True if a point (3,) is inside the volume or at most `margin` metres away from its sides."""
         local = self.rotation.T @ (np.asarray(point, dtype=np.float64) - self.center)
         return bool(np.all(np.abs(local) <= self.half_size + margin))
 
     def distance(self, xy: NDArray[np.float64]) -> float:
-        """Return the horizontal distance in metres from a floor point (2,) to the nearest point of the volume."""
+        """Return the horizontal distance from a point (2,) on the floor to the volume, in metres."""
         local = self.rotation.T @ np.array([*(xy - self.center[:2]), 0.0])
         outside = np.maximum(np.abs(local) - self.half_size, 0.0)
         return float(np.hypot(outside[0], outside[1]))
 
 
 def receptacle_geometries(model: mujoco.MjModel, keys: Iterable[str]) -> dict[str, ReceptacleGeometry]:
-    """Read the geometry of receptacles from the sites `<key>/volume` and `<key>/approach` of a compiled model."""
+    """Read the geometry of receptacles from the sites `<key>/volume` and `<key>/approach` of a model."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     found = {}

@@ -1,1 +1,1 @@
-"""Episode scenes: sampling, settling of dropped objects, the person's body, and compilation."""
+"""Sample episodes, and compile them into MuJoCo scenes."""

@@ -1,6 +1,6 @@
-"""The person's body in MuJoCo: joints for walking, turning and looking, and two hands that hold objects by welds.
+"""A MuJoCo model of the person, with joints for walking, turning and looking, and with two hands.
 
-All contact bits are set here. Two geoms collide if contype of one shares a bit with conaffinity of the other:
+Two geoms collide if the contype of one shares a bit with the conaffinity of the other:
 
     geoms                     contype   conaffinity   collides with
     static (MuJoCo default)   1         1             objects, trunk
@@ -9,8 +9,8 @@ All contact bits are set here. Two geoms collide if contype of one shares a bit 
     avatar foot               0         4             objects
     hands                     0         0             nothing
 
-The `ref` of each joint is the start position of its body, so joint coordinates are positions: `qpos` of `avatar/x` is
-the person's x in the house, and `qpos` of `avatar/left/z` is the height of the left hand, both in metres.
+The `ref` of each joint is the start position of its body, so joint coordinates are positions: `qpos` of
+`avatar/x` is the person's x in the house, and `qpos` of `avatar/left/z` is the height of the left hand.
 """
 
 import itertools
@@ -27,50 +27,50 @@ from mjsim.values.person_parameters import PersonParameters
 STATIC_BIT = 1
 OBJECT_BIT = 4
 PREFIX = "avatar/"
-BASE = "avatar/base"  # body that slides along x and y
-SOLE = "avatar/sole"  # body of the foot, fixed to the base; collides with objects
-BODY = "avatar/body"  # body that turns on the base; parent of the head and the hands
+BASE = "avatar/base"  # body that moves along the x and y axes
+SOLE = "avatar/sole"  # body of the foot, which is fixed to the base and collides with objects
+BODY = "avatar/body"  # body that rotates on the base and carries the head and the hands
 HEAD = "avatar/head"
 EYE = "avatar/eye"
 TRUNK = "avatar/trunk"
 FOOT = "avatar/foot"
 HANDS = ("left", "right")
 GRIPS = (0, 1)
-GENTLE, FIRM = "gentle", "firm"  # types of welds between a hand and an object
-SIDES = 64  # number of sides of the prisms for trunk and foot
-# Contact of the foot: time constant in seconds, damping ratio and impedance. The low impedance limits the force to a
-# multiple of the object's weight, so that a person steps over an object that is stuck at a wall. The high damping makes
-# the force depend on speed, so that such an object neither pushes the person away nor flies off.
+GENTLE, FIRM = "gentle", "firm"  # types of weld constraints between a hand and an object
+SIDES = 64  # number of sides of the prisms that represent the trunk and the foot
+# Contact parameters of the foot: time constant in seconds, damping ratio and impedance. The low impedance
+# limits the contact force, so that a person can step over an object that is stuck against a wall. Because of
+# the high damping, such an object neither pushes the person away nor flies off.
 _FOOT_CONTACT = (0.1, 3.0, 0.2)
 EYE_FORWARD = 0.06
 START_PITCH = math.radians(-12.0)
 PITCH_RANGE = (math.radians(-75.0), math.radians(60.0))
-# Hand postures relative to the body, for a person of default eye height: forward, outward and up, in metres.
+# Hand positions in each posture: forward, sideways and up, in metres, for a person of default eye height.
 REST = (0.34, 0.27, 1.00)
 CARRY = (0.50, 0.24, 1.25)
 TUCKED = (0.27, 0.19, 1.22)
 ASIDE = (0.30, 0.42, 1.26)
 HAND_KP, HAND_KV = 2000.0, 130.0
 HAND_FORCE = 80.0
-# Welds by type: time constant in seconds, torque scale, minimum and maximum impedance. A gentle weld turns a fallen
-# object upright during the lift without kicking its neighbours. A firm weld stretches by less than 2 mm and twists by
-# less than 2 degrees even if the object brushes a door frame at walking speed.
+# Parameters of each weld type: time constant in seconds, torque scale, minimum and maximum impedance. A
+# gentle weld turns a fallen object upright while it is lifted, without pushing nearby objects away. A firm
+# weld yields by less than 2 mm and 2 degrees, even if the object hits a door frame at walking speed.
 WELDS = {GENTLE: (0.08, 1.0, 0.95, 0.99), FIRM: (0.008, 2.0, 0.98, 0.998)}
-_TORQUESCALE = 10  # index of the torque scale in a weld's data
+_TORQUESCALE = 10  # index of the torque scale in the data of a weld constraint
 _VISUAL: dict[str, Any] = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
 _GLOVE = (0.93, 0.74, 0.22, 1.0)
 _SLEEVE = (0.24, 0.34, 0.47, 1.0)
 
 
 def grip_name(hand: str, instance: str, grip: int, kind: str = FIRM) -> str:
-    """Return the name of the weld between a hand and grip site 0 or 1 of an object. `kind` is `GENTLE` or `FIRM`."""
+    """Return the name of the `GENTLE` or `FIRM` weld between a hand and grip site 0 or 1 of an object."""
     return f"{PREFIX}{hand}/{kind}/{instance}/{grip}"
 
 
 def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> tuple[float, float, float]:
-    """Return the position (x, y, z) of hand 0 (left) or 1 (right) in a posture such as `CARRY`, in the body frame.
+    """Return the position (x, y, z) of the left (0) or right (1) hand in a posture, relative to the body.
 
-    Heights scale with the person's eye height. Lengths are in metres.
+    `place` is a posture such as `CARRY`. Heights scale with the eye height. Lengths are in metres.
     """
     forward, side, up = place
     return forward, side if hand == 0 else -side, up * (eye_height / PersonParameters.eye_height)
@@ -79,7 +79,7 @@ def posture(hand: int, place: tuple[float, float, float], eye_height: float) -> 
 def eye_position(
     x: float, y: float, heading: float, pitch: float, eye_height: float
 ) -> tuple[float, float, float]:
-    """Return the eye position of a person at (x, y), in metres. Heading and pitch are in radians."""
+    """Return the position of the eyes of a person at (x, y). Lengths are in metres and angles in radians."""
     out = EYE_FORWARD * math.cos(pitch)
     height = eye_height + EYE_FORWARD * math.sin(pitch)
     return x + out * math.cos(heading), y + out * math.sin(heading), height
@@ -92,10 +92,10 @@ def attach_avatar(
     start: tuple[float, float, float],
     person: PersonParameters,
 ) -> None:
-    """Add the person at `start` (x, y, heading), and an inactive weld between each hand and each grip, in place.
+    """Add the person's body, at `start` (x, y, heading), and inactive welds for the hands to a scene.
 
     Raises:
-        AssetError: The scene has no body `<instance>/object`, or an object lacks a grip site.
+        AssetError: The scene has no body `<instance>/object`, or an object has no grip sites.
     """
     _set_object_bits(spec, object_names)
     body = _add_body(spec, start, person.body_radius)
@@ -137,7 +137,7 @@ def _set_inertia(
 
 def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: float) -> Any:
     x, y, heading = start
-    # The base does not turn: contacts off its axis would spin it.
+    # The base cannot rotate, because contacts would make it spin.
     base = spec.worldbody.add_body(name=BASE, pos=[x, y, 0.0])
     _set_inertia(base, 60.0, (8.0, 8.0, 1.5), (0.0, 0.0, 0.9))
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -152,15 +152,15 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
         name=TRUNK,
         pos=[0, 0, 0.88],
         conaffinity=STATIC_BIT,
-        condim=1,  # without friction, so that the person slides along walls
+        condim=1,  # contacts without friction, so that the person slides along walls
         priority=2,
         solref=[0.008, 1],
         solimp=[0.98, 0.995, 0.001, 0.5, 2],
         **_prism(spec, TRUNK, radius, 0.84),
     )
-    # The foot is soft, and lower than any carried object, so that it pushes light objects along the floor without
-    # launching them. It extends below the floor, so that it touches flat objects with its side and never stands on
-    # them. It has its own body because the broad phase filters by body, and the foot never collides with the house.
+    # The foot is soft and lower than any carried object, so it pushes light objects along the floor gently.
+    # It reaches below the floor, so that it touches flat objects with its side and never stands on them. It
+    # has a separate body because the broad phase filters by body, and the foot never collides with the house.
     sole = base.add_body(name=SOLE)
     sole.fuse = 0
     _set_inertia(sole, 0.0, (0.0, 0.0, 0.0))
@@ -179,10 +179,10 @@ def _add_body(spec: mujoco.MjSpec, start: tuple[float, float, float], radius: fl
 
 
 def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) -> dict[str, Any]:
-    """Return the geom arguments for an upright prism of `SIDES` sides, nearly a cylinder.
+    """Add the mesh of a prism that approximates an upright cylinder, and return the arguments of its geom.
 
-    MuJoCo 3.17 (`multiccd`) computes wrong contact normals where the round side of a cylinder touches the edge of a
-    box, but not for meshes.
+    MuJoCo 3.17 (`multiccd`) computes wrong contact normals if the curved side of a cylinder touches the edge
+    of a box. Meshes do not have this problem.
     """
     angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
     ring = radius * np.column_stack((np.cos(angles), np.sin(angles)))
@@ -192,17 +192,17 @@ def _prism(spec: mujoco.MjSpec, name: str, radius: float, half_height: float) ->
 
 
 def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, force: float) -> None:
-    """Add a velocity servo if kp is 0, otherwise a position servo with damping.
+    """Add a velocity servo if `kp` is 0, or a damped position servo otherwise.
 
-    The activation is the target and the control is its rate of change, so the target ramps over the physics steps of a
-    control step.
+    The activation is the target of the servo, and the control input is the target's rate of change. The
+    target thus changes linearly during a control step.
     """
     spec.add_actuator(
         name=PREFIX + joint,
         target=PREFIX + joint,
         trntype=mujoco.mjtTrn.mjTRN_JOINT,
         dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
-        actearly=True,  # start the ramp with the first physics step
+        actearly=True,  # let the control input take effect in the first physics step
         gaintype=mujoco.mjtGain.mjGAIN_FIXED,
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[kp or kv] + [0.0] * 9,
@@ -213,7 +213,7 @@ def _add_actuator(spec: mujoco.MjSpec, joint: str, *, kp: float, kv: float, forc
 
 
 def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
-    # The hinge axis is -y, so that a positive pitch looks up.
+    # The hinge axis is -y because a positive pitch means looking up.
     half = -START_PITCH / 2
     head = body.add_body(
         name=HEAD, pos=[0, 0, person.eye_height], quat=[math.cos(half), 0, math.sin(half), 0]
@@ -227,7 +227,7 @@ def _add_head(spec: mujoco.MjSpec, body: Any, person: PersonParameters) -> None:
         ref=_angle(spec, START_PITCH),
     )
     _add_actuator(spec, "pitch", kp=60.0, kv=3.0, force=30.0)
-    # Camera axes: x to the right, y up. The camera looks along -z.
+    # A MuJoCo camera looks along its -z axis. Its x axis points right and its y axis points up.
     fovy = round(math.degrees(person.vertical_field), 9)
     head.add_camera(name=EYE, pos=[EYE_FORWARD, 0, 0], quat=[0.5, 0.5, -0.5, -0.5], fovy=fovy)
 
@@ -269,7 +269,7 @@ def _declare_welds(spec: mujoco.MjSpec, object_names: Sequence[str]) -> None:
 
 
 def draw_hand(node: Any, name: str, side: float) -> None:
-    """Add a cleaning glove and a sleeve to a hand. `side` is 1 for the left and -1 for the right hand."""
+    """Add the visible glove and sleeve of a hand. `side` is 1 for the left hand and -1 for the right hand."""
 
     def capsule(part: str, rgba: Sequence[float], radius: float, *ends: float) -> None:
         node.add_geom(

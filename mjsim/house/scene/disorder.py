@@ -1,4 +1,4 @@
-"""Observed disorder, from which episodes are drawn: how many objects are misplaced, and how far from home they are."""
+"""Statistics of misplaced objects in observed episodes, from which new episodes can be sampled."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -28,11 +28,11 @@ class _DisorderFile(msgspec.Struct):
 
 @dataclass(frozen=True)
 class Disorder:
-    """Disorder of observed episodes.
+    """Statistics of the misplaced objects in a set of observed episodes.
 
     Attributes:
-        misplaced: Number of misplaced objects of each episode.
-        distances: Walking distances from misplaced objects to where they belong, in metres.
+        misplaced: Number of misplaced objects in each episode.
+        distances: Horizontal distances between misplaced objects and the places where they belong, in metres.
     """
 
     misplaced: tuple[int, ...]
@@ -40,7 +40,7 @@ class Disorder:
 
     @classmethod
     def load(cls, path: Path) -> "Disorder":
-        """Read a `disorder.json` written by `mjsim import episodes`. Raise an EpisodeError if it cannot be read."""
+        """Load a `disorder.json` file of `mjsim import episodes`. Raise an EpisodeError if this fails."""
         try:
             found = msgspec.json.decode(read_text(path), type=_DisorderFile)
         except (OSError, UnicodeDecodeError, msgspec.MsgspecError) as error:
@@ -58,22 +58,22 @@ class Disorder:
         }
 
     def count(self, seed: int, most: int) -> int:
-        """Draw a number of objects, at most `most`, from the observed numbers."""
+        """Draw a random number of misplaced objects, from 1 to `most`, from the observed episodes."""
         fitting = [n for n in self.misplaced if 1 <= n <= most]
         if not fitting:
             raise EpisodeError(f"no episode has 1 to {most} misplaced objects; allow more")
         return int(np.random.default_rng([seed, _COUNTS]).choice(fitting))
 
     def assign(self, points: NDArray[np.float64], homes: NDArray[np.float64], seed: int) -> NDArray[np.intp]:
-        """Assign points to objects so that their distances from home match distances drawn from the observed ones.
+        """Choose a point for each object so that the distances to the homes resemble observed distances.
 
         Args:
-            points: Free points (p, 2), in metres.
-            homes: Positions where the objects belong (k, 2), in metres, k <= p.
-            seed: Seed of the drawn distances.
+            points: Points to choose from, in metres, shape (p, 2).
+            homes: Positions where the objects belong, in metres, shape (k, 2) with k <= p.
+            seed: Seed with which the distances are drawn.
 
         Returns:
-            A different row of `points` for each object, shape (k,).
+            The row of `points` that was chosen for each object, shape (k,). No row is chosen twice.
         """
         wanted = np.random.default_rng([seed, _DISTANCES]).choice(self.distances, len(homes))
         reached = np.linalg.norm(points - homes[:, None], axis=2)

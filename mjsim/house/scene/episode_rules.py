@@ -1,4 +1,4 @@
-"""Rules for episodes: objects and start fit the house, do not overlap, and are within a person's reach."""
+"""Rules that check whether the objects and the start position of an episode are valid in its house."""
 
 import re
 from collections import Counter
@@ -17,17 +17,17 @@ from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.person_parameters import PersonParameters
 
 MAX_OBJECTS = 200
-FULL = 8  # number of objects that any receptacle can hold
-HEIGHTS = (-0.02, 1.5)  # lowest and highest origin of an object, in metres
-UNIT = 0.01  # maximum deviation of a quaternion's norm from 1
-OVERLAP = 0.005  # maximum overlap of objects at the start, in metres
+FULL = 8  # number of objects that every receptacle can hold
+HEIGHTS = (-0.02, 1.5)  # minimum and maximum height of an object's origin, in metres
+UNIT = 0.01  # tolerance for the norm of a quaternion, which should be 1
+OVERLAP = 0.005  # maximum depth by which objects may overlap at the start of an episode, in metres
 REACH = PersonParameters().reach  # maximum distance from an object to the walkable floor, in metres
-OUTSIDE = 0.05  # maximum distance of an object outside the rooms, in metres
+OUTSIDE = 0.05  # maximum distance of an object from the nearest room, in metres
 NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
 def check_fit(episode: Episode, catalogue: Catalogue) -> Iterator[Finding]:
-    """Find contradictions between an episode and its house's catalogue."""
+    """Check that an episode is consistent with the catalogue of its house."""
     if len(episode.objects) > MAX_OBJECTS:
         yield _episode("objects", f"has {len(episode.objects)} objects", f"use at most {MAX_OBJECTS}")
     unknown = sorted(set(episode.receptacles) - set(catalogue.receptacles))
@@ -86,7 +86,7 @@ def _check_object(placed: PlacedObject, target: str, catalogue: Catalogue) -> It
 
 
 def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
-    """Find objects with invalid orientations, and objects or a start outside the house."""
+    """Check that all objects have valid poses, and that the start position is inside the house."""
     start = episode.start
     if not rooms.contains((start.x, start.y), margin=OUTSIDE):
         yield Finding(
@@ -125,7 +125,7 @@ def check_poses(episode: Episode, rooms: RoomMap) -> Iterator[Finding]:
 
 
 def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.int32]) -> Iterator[Finding]:
-    """Find overlaps at the start of an episode. `owner` maps each geom to an object index or -1, shape (ngeom,)."""
+    """Find overlaps at the start of an episode. `owner` (ngeom,) is the object index of each geom, or -1."""
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     trunk = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, TRUNK)
@@ -133,7 +133,7 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
     reported = set()
     for contact in deep:
         first, second = sorted(data.contact.geom[contact].tolist(), key=lambda g: (owner[g] < 0, g))
-        # Only the house can block the trunk. The person pushes objects away.
+        # The trunk of the person collides only with the house, not with objects.
         if trunk in (first, second):
             what, subject = "a wall or a piece of furniture", "start"
         elif owner[first] < 0:
@@ -156,7 +156,7 @@ def check_overlaps(episode: Episode, model: mujoco.MjModel, owner: NDArray[np.in
 
 
 def check_reach(episode: Episode, navigable: NavigablePoints) -> Iterator[Finding]:
-    """Find objects that a person cannot reach from the start of the episode."""
+    """Check that a person can stand at the start position and can reach every object."""
     places = [("start", (episode.start.x, episode.start.y), 0.25)]
     places += [(o.name, o.position[:2], REACH) for o in episode.objects]
     for subject, xy, limit in places:

@@ -1,7 +1,7 @@
-"""Sampling of episodes in disorganized houses (PAPER section 4).
+"""Sample episodes in which objects of a house are misplaced (PAPER section 4).
 
-Each random choice has its own generator, made from the seed and the purpose of the choice. Thus a seed has the same
-points at every level, and changing one choice does not affect the others.
+Each random choice has its own generator, which is derived from the seed and the purpose of the choice. A seed
+therefore has the same points at every level, and changing one choice does not affect the others.
 """
 
 import enum
@@ -20,17 +20,17 @@ from mjsim.house.validation.validate import require_usable
 from mjsim.values.episode import POINTS, Episode, PlacedObject, StartPose
 from mjsim.values.errors import SamplingError, brief
 
-MIN_DISTANCE = 1.0  # minimum distance between points, and from points to receptacles, in metres
-START_CLEARANCE = 0.5  # minimum distance from the start to every object, in metres
+MIN_DISTANCE = 1.0  # minimum distance between two points, or a point and a receptacle, in metres
+START_CLEARANCE = 0.5  # minimum distance from the person's start position to any object, in metres
 DROP = (0.01, 0.02)  # range of heights from which objects are dropped, in metres
-PACKINGS, DRAWS = 20, 4000  # An incomplete packing is discarded as a whole, so that points stay uniform.
+PACKINGS, DRAWS = 20, 4000  # Incomplete sets of points are discarded to keep the distribution uniform.
 DROPS = 8
 MAX_POINTS = 1000
 RADIUS_STEP, RADII, DRAWS_PER_RADIUS = 0.25, 80, 32
 
 
 class _Purpose(enum.IntEnum):
-    """Keys of random generators. Changing a number changes the episodes of all seeds."""
+    """Keys of the random generators. Changing a key changes the episodes of all seeds."""
 
     POINTS = 0
     CATEGORIES = 1
@@ -49,26 +49,26 @@ def sample_episode(
     points: int = POINTS,
     disorder: Disorder | None = None,
 ) -> Episode:
-    """Sample a disorganized house.
+    """Sample an episode, with misplaced objects and a start position, for a house.
 
-    The seed alone determines points and their categories, so each level contains the easier ones. Object models are
-    drawn again for each level. No model repeats before all models of its category are used.
+    Points and their categories depend only on the seed, so each level includes the points of easier levels.
+    Object models are drawn again for each level, and repeat only after all models of a category are used.
 
     Args:
         catalogue: Catalogue of the house.
-        navigable: Walkable floor of the same house. By default, the installed planner computes it.
-        objects: Number of objects, 1 to `points`, also called the level. Categories are equally frequent if it is a
-            multiple of their number.
-        seed: Seed, 0 or larger.
-        points: Number of points from which all levels are drawn, at most the number that the house is designed for.
-        disorder: Observed disorder. Each object takes a point of the pool whose distance from its receptacle is close
-            to an observed one. By default, objects take the first points.
+        navigable: Walkable floor of the house. By default, the installed planner computes it.
+        objects: Number of objects, from 1 to `points`, which is also called the level. All categories are
+            equally frequent if the level is a multiple of the number of categories.
+        seed: Seed of the random choices, 0 or larger.
+        points: Number of points shared by all levels, limited to the number that the house is designed for.
+        disorder: Statistics of observed disorder. If given, each object is placed at a point whose distance
+            from its receptacle is close to an observed distance. By default, the first points are used.
 
     Returns:
-        The episode, with its objects at rest on the floor.
+        The episode, with all objects at rest on the floor.
 
     Raises:
-        SamplingError: An argument is out of range, or the points, the objects or the start do not fit into the house.
+        SamplingError: An argument is out of range, or the house has no room for the points, objects or start.
         AssetError: A model of the catalogue is invalid.
         PhysicsError: MuJoCo reported a warning while the objects settled.
 
@@ -108,7 +108,7 @@ def sample_episode(
 def house_points(
     catalogue: Catalogue, navigable: NavigablePoints, *, seed: int, points: int = POINTS
 ) -> NDArray[np.float64]:
-    """Return the points that all levels of a seed share, in metres, shape (points, 2). May raise a SamplingError."""
+    """Return the points for all levels of a seed, in metres, shape (points, 2). May raise a SamplingError."""
     points = min(points, catalogue.points or points)
     centers = np.array([r.center[:2] for r in compiled_house(catalogue).receptacles.values()])
     return sample_points(navigable, centers, count=points, rng=_rng(seed, _Purpose.POINTS))
@@ -121,7 +121,7 @@ def sample_points(
     count: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Draw walkable points (count, 2) that are far enough from each other and from `keep_away` (k, 2), in metres."""
+    """Draw walkable points (count, 2) that are far from each other and from `keep_away` (k, 2), in metres."""
     best = 0
     for _ in range(PACKINGS):
         points = _pack(navigable, keep_away, count, rng)
@@ -136,7 +136,7 @@ def sample_points(
 
 
 def points_that_fit(navigable: NavigablePoints, keep_away: NDArray[np.float64], count: int = POINTS) -> int:
-    """Return how many points one packing attempt fits into the house, at most `count`."""
+    """Try once to draw `count` points for objects in a house, and return how many were found."""
     return len(_pack(navigable, keep_away, count, np.random.default_rng(0)))
 
 
@@ -232,14 +232,14 @@ def _start_candidates(
     yield centroid
     for radius in RADIUS_STEP * np.arange(1, RADII + 1):
         for _ in range(DRAWS_PER_RADIUS):
-            # The square root makes the points uniform over the disc.
+            # The square root makes the distribution uniform over the disc.
             reach, angle = radius * math.sqrt(rng.random()), rng.uniform(-math.pi, math.pi)
             yield centroid + reach * np.array([math.cos(angle), math.sin(angle)])
 
 
 def _can_start(point: NDArray[np.float64], objects: NDArray[np.float64], navigable: NavigablePoints) -> bool:
     clear = bool((np.hypot(*(objects - point).T) >= START_CLEARANCE).all())
-    # Snapping moves isolated points, such as inside a table, to the floor on which the objects are.
+    # A point in an isolated area, such as inside a table, is rejected because snapping would move it.
     return (
         clear
         and navigable.is_navigable(point)

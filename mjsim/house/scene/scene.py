@@ -1,4 +1,4 @@
-"""Scenes: a house, its receptacles, an episode's objects and the person in one compiled model."""
+"""Compile an episode into a MuJoCo model with the house, its receptacles, the objects and the person."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -25,14 +25,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class SceneIndex:
-    """Addresses of an episode's objects in the arrays of `MjModel` and `MjData`, in the episode's order."""
+    """The positions of an episode's objects in the arrays of `MjModel` and `MjData`."""
 
-    names: tuple[str, ...]  # names of the objects in the episode
-    bodies: NDArray[np.int32]  # body ids, shape (n,)
-    qpos: NDArray[np.int32]  # address in `qpos` of each free joint (3 position, 4 quaternion), shape (n,)
-    dofs: NDArray[np.int32]  # address in `qvel` of each free joint (3 linear, 3 angular), shape (n,)
-    trees: NDArray[np.int32]  # kinematic tree ids, to look up sleep states, shape (n,)
-    geom_owner: NDArray[np.int32]  # object index of each geom, or -1, shape (ngeom,)
+    names: tuple[str, ...]  # names of the objects, in the order of the episode
+    bodies: NDArray[np.int32]  # body id of each object, shape (n,)
+    qpos: NDArray[np.int32]  # start of each object's position and quaternion in `qpos`, shape (n,)
+    dofs: NDArray[np.int32]  # start of each object's linear and angular velocity in `qvel`, shape (n,)
+    trees: NDArray[np.int32]  # kinematic tree id of each object, to check if it sleeps, shape (n,)
+    geom_owner: NDArray[np.int32]  # index of the object to which each geom belongs, or -1, shape (ngeom,)
     _rows: NDArray[np.intp] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -40,7 +40,7 @@ class SceneIndex:
 
     @classmethod
     def from_model(cls, model: mujoco.MjModel, names: tuple[str, ...]) -> "SceneIndex":
-        """Find the objects in a compiled model. Raise an AssetError if one has no body or free joint."""
+        """Create the index of a compiled model. Raise an AssetError if an object is missing."""
         bodies = np.array([_find(model, mujoco.mjtObj.mjOBJ_BODY, f"{n}/object") for n in names], np.int32)
         joints = np.array([_find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{n}/free") for n in names], np.int32)
         owner_of_body = np.full(model.nbody, -1, np.int32)
@@ -56,35 +56,35 @@ class SceneIndex:
         )
 
     def position_of(self, name: str) -> int:
-        """Return the index of an object by its name. Raise an EpisodeError if the name is unknown."""
+        """Return the index of the object with this name. Raise an EpisodeError if there is none."""
         try:
             return self.names.index(name)
         except ValueError:
             raise EpisodeError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
 
     def body(self, name: str) -> int:
-        """Return the body id of an object by its name. Raise an EpisodeError if the name is unknown."""
+        """Return the body id of the object with this name. Raise an EpisodeError if there is none."""
         return int(self.bodies[self.position_of(name)])
 
     def geoms(self, name: str) -> NDArray[np.intp]:
-        """Return the geom ids of an object by its name. Raise an EpisodeError if the name is unknown."""
+        """Return the geom ids of the object with this name. Raise an EpisodeError if there is none."""
         return np.flatnonzero(self.geom_owner == self.position_of(name))
 
     def poses(self, qpos: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Copy the positions (n, 3), in metres, and quaternions wxyz (n, 4) of all objects from a `qpos` array."""
+        """Return copies of all object positions (n, 3), in metres, and wxyz quaternions (n, 4) in `qpos`."""
         rows = qpos[self._rows]
         return rows[:, :3], rows[:, 3:]
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A compiled episode.
+    """The compiled MuJoCo model of an episode, with the data from which it was built.
 
     Attributes:
         model: The compiled model. Its `qpos0` contains the poses of the episode.
-        index: Addresses of the objects in the state.
-        spec: Editable model, for export.
-        visuals: True if the model has geoms that are only drawn.
+        index: Positions of the objects in the arrays of the model.
+        spec: Editable version of the model, for export.
+        visuals: True if the model contains geoms that are only drawn.
     """
 
     model: mujoco.MjModel
@@ -99,13 +99,13 @@ class Scene:
     _derived: dict[str, object] = field(init=False, repr=False, default_factory=dict)
 
     def cached(self, key: str, make: Callable[[], T]) -> T:
-        """Return the value cached under `key`. The first call computes it."""
+        """Return the value cached under `key`. If there is none, compute it with `make`."""
         if key not in self._derived:
             self._derived[key] = make()
         return cast(T, self._derived[key])
 
     def counterpart(self, *, visuals: bool) -> "Scene":
-        """Return the scene of the same episode with or without visual geoms. Both scenes accept the same states."""
+        """Return the scene of this episode with or without visual geoms. Both have the same state layout."""
         if visuals == self.visuals:
             return self
         return self.cached(
@@ -121,23 +121,23 @@ def compose(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """Compose and compile an episode: the house, its receptacles, the objects in their poses, and the person.
+    """Check an episode and compile its scene with the house, the receptacles, the objects and the person.
 
     Args:
-        episode: Episode to compose.
+        episode: Episode to compile.
         catalogue: Catalogue of the episode's house.
-        person: Parameters of the person. By default, a default person.
+        person: Parameters of the person. By default, a person with default parameters.
         avatar: False to leave out the person's body.
-        visuals: False to leave out geoms that are only drawn. Such a scene moves in the same way, compiles and steps
-            faster, but cannot be rendered.
+        visuals: False to leave out geoms that are only drawn. The scene then has the same physics, and
+            compiles and steps faster, but it cannot be rendered.
 
     Raises:
-        AssetError: The house breaks a convention of docs/models.md, or a model does not compile.
-        EpisodeError: The episode does not fit the catalogue, or at the start something is outside the house or
-            overlaps something else.
+        AssetError: The house violates a convention of docs/models.md, or a model does not compile.
+        EpisodeError: The episode does not match the catalogue, or it starts with an object or the person
+            outside the house or overlapping something else.
     """
     _require(check_fit(episode, catalogue), episode)
-    if avatar:  # scenes for dropping objects have no avatar, and the objects are not in their final poses
+    if avatar:  # Scenes without a person are for dropping objects, whose poses are not final.
         _require(check_poses(episode, compiled_house(catalogue).rooms), episode)
     scene = assemble(episode, catalogue, person=person, avatar=avatar, visuals=visuals)
     if avatar:
@@ -153,7 +153,7 @@ def assemble(
     avatar: bool = True,
     visuals: bool = True,
 ) -> Scene:
-    """Compose an episode without checking it. See `compose` for the arguments."""
+    """Compile the scene of an episode without checking the episode. See `compose` for the arguments."""
     person = person or PersonParameters()
     house = compiled_house(catalogue)
     require_usable(house)
@@ -167,7 +167,7 @@ def assemble(
         if avatar:
             start = episode.start
             attach_avatar(spec, names, start=(start.x, start.y, start.heading), person=person)
-        spec.dedup_assets()  # merge assets, because attaching copies a model's assets for every object
+        spec.dedup_assets()  # merge the assets, which were copied for every attached object
         model = spec.compile()
     tighten(model)
     return Scene(

@@ -1,4 +1,4 @@
-"""Physics simulation that lets dropped objects settle, in a house without a person."""
+"""Simulate dropped objects until they rest on the floor of a house."""
 
 from dataclasses import dataclass, replace
 
@@ -12,24 +12,24 @@ from mjsim.values.episode import Episode, PlacedObject
 from mjsim.values.errors import PhysicsError
 
 REST_SPEED = 0.01  # speed below which an object is at rest, in m/s
-MAX_TIME = 6.0  # time limit in seconds
-MAX_DRIFT = 0.3  # maximum distance from the drop point, in metres
-MAX_SINK = 0.02  # maximum depth below the floor, in metres
+MAX_TIME = 6.0  # maximum simulated time, in seconds
+MAX_DRIFT = 0.3  # maximum distance of a settled object from its drop point, in metres
+MAX_SINK = 0.02  # maximum depth of a settled object below the floor, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """Result of settling."""
+    """The poses of objects that were dropped and simulated until they came to rest."""
 
-    objects: tuple[PlacedObject, ...]  # settled objects, in the episode's order
-    faults: dict[str, str]  # reasons why a pose cannot be used, by object name
+    objects: tuple[PlacedObject, ...]  # objects in their final poses, in the order of the episode
+    faults: dict[str, str]  # object name -> reason why its final pose cannot be used
 
 
 def settle(episode: Episode, catalogue: Catalogue) -> Settled:
-    """Simulate a house without a person until every object sleeps, for at most 6 s.
+    """Simulate the objects of an episode until all of them are at rest, for at most 6 s.
 
-    An object is faulty if it then still moves faster than 1 cm/s, is more than 0.3 m from its drop point, or is outside
-    the house.
+    The result reports a fault for each object that still moves faster than 1 cm/s, is more than 0.3 m from
+    its drop point, or is outside the house.
 
     Raises:
         PhysicsError: MuJoCo reported a warning.

@@ -1,1 +1,1 @@
-"""Visibility of objects and receptacles for a person, and fill heights of receptacles."""
+"""Determine which objects and receptacles a person can see, and how full the receptacles are."""

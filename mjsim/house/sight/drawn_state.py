@@ -1,4 +1,4 @@
-"""Scenes with visual geoms: their state, derived from the scene without them, and large boxes that block sight."""
+"""Compute the poses of the visual geoms of a scene, and find large boxes that block the view."""
 
 from typing import Any
 
@@ -12,11 +12,11 @@ from mjsim.support.kernels import kernel
 
 Floats = NDArray[np.float64]
 
-_MIN_WALL = 0.25  # minimum half extents of a large box along its two longer axes, in metres
+_MIN_WALL = 0.25  # minimum half extents of a large box along its two longest axes, in metres
 
 
 def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData]:
-    """Return the scene with visual geoms, and its state. The next call for the same scene overwrites that state."""
+    """Return the scene with visual geoms and its state. The next call for the scene overwrites this state."""
     if scene.visuals:
         return scene, data
     drawn = scene.cached("drawn state", lambda: _DrawnState(scene.counterpart(visuals=True)))
@@ -25,15 +25,15 @@ def drawn_state(scene: Scene, data: mujoco.MjData) -> tuple[Scene, mujoco.MjData
 
 
 def large_boxes(scene: Scene, alpha: float) -> tuple[Floats, Floats, Floats]:
-    """Find large static boxes whose alpha exceeds `alpha` in a scene with visual geoms, the largest first.
+    """Find large static boxes with an opacity above `alpha` in a scene with visual geoms, largest first.
 
-    Returns centres (w, 3), axes as columns (w, 3, 3) and half extents (w, 3), in metres.
+    Returns their centres (w, 3), axes as columns (w, 3, 3) and half extents (w, 3), in metres.
     """
     model = scene.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     drawn, static = DRAWN[model.geom_group] > 0, ~moving_geoms(model)
-    opacity = model.geom_rgba[:, 3].copy()  # Rays pass through geoms with alpha 0.
+    opacity = model.geom_rgba[:, 3].copy()  # Rays pass through invisible geoms, whose alpha is 0.
     textured = model.geom_matid >= 0
     opacity[textured] *= model.mat_rgba[model.geom_matid[textured], 3]
     extents = np.sort(model.geom_size, axis=1)
@@ -47,7 +47,7 @@ class _DrawnState:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.data = scene, mujoco.MjData(scene.model)
         model, data = scene.model, self.data
-        mujoco.mj_kinematics(model, data)  # compute the poses of static geoms
+        mujoco.mj_kinematics(model, data)  # The poses of static geoms are computed only once.
         geoms = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
         self._geoms = (
             geoms, model.geom_bodyid[geoms], model.geom_pos[geoms], model.geom_quat[geoms],
@@ -63,10 +63,10 @@ class _DrawnState:
 
 @kernel
 def place_geoms(geoms: Any, positions: Floats, quaternions: Floats, rotations: Floats) -> None:
-    """Compute the poses of geoms from those of their bodies, with the same operations as MuJoCo in the same order.
+    """Compute the poses of geoms from the poses of their bodies, with exactly the same arithmetic as MuJoCo.
 
-    `geoms` has ids (g,), body ids (g,), positions (g, 3) and quaternions (g, 4) in the body frame, and the output
-    arrays (ngeom, 3) and (ngeom, 9). The other arrays are poses of bodies, as in `MjData`. Lengths are in metres.
+    `geoms` contains geom ids (g,), body ids (g,), positions (g, 3) and quaternions (g, 4) relative to the
+    bodies, and the output arrays (ngeom, 3) and (ngeom, 9). The other arrays are body poses as in `MjData`.
     """
     ids, bodies, local_positions, local_quaternions, geom_xpos, geom_xmat = geoms
     for k in range(len(ids)):

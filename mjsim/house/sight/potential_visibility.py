@@ -1,8 +1,8 @@
-"""Potential visibility: objects that may come into view soon, for displays that draw from snapshots.
+"""Predict which objects a person may see soon.
 
-The result is conservative: it may include objects that stay hidden. Only walls and large furniture hide objects, each
-object counts as a ball around it, and the person may turn and walk at full speed. The visibility of an object from the
-cells of a grid at eye height is computed once, and again after the object has moved.
+The result may include objects that stay hidden. Only walls and large furniture hide objects, each object is
+replaced by its bounding sphere, and the person may turn and walk at full speed. The visibility of an object
+from each cell of a grid at eye height is cached until the object moves.
 """
 
 import math
@@ -18,36 +18,34 @@ from mjsim.house.sight.drawn_state import large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.observation import Observation
 
-CELL = 0.25  # cell size in metres
-_MOVED = 1e-3  # distance by which an object must move to count as moved, in metres
+CELL = 0.25  # side length of a grid cell, in metres
+_MOVED = 1e-3  # displacement above which an object counts as moved, in metres
 _UNKNOWN, _HIDDEN, _OPEN = -1, 0, 1
-_OPAQUE = 0.99  # minimum alpha of walls that hide objects
+_OPAQUE = 0.99  # opacity above which a wall hides objects
 _MARGIN = 1e-6  # tolerance for rounding errors, in metres
 
 
 class _WallSegments(NamedTuple):
-    """Opaque static boxes, the largest first."""
+    """The opaque static boxes of a scene, sorted from large to small."""
 
-    centers: Floats  # centres in metres, shape (w, 3)
-    axes: Floats  # axes as columns, shape (w, 3, 3)
-    half_sizes: Floats  # half extents in metres, shape (w, 3)
+    centers: Floats  # centres of the boxes in metres, shape (w, 3)
+    axes: Floats  # axes of the boxes as columns, shape (w, 3, 3)
+    half_sizes: Floats  # half extents of the boxes in metres, shape (w, 3)
 
 
 class _VisibilityGrid(NamedTuple):
-    """Cached visibility of objects from cells of the floor."""
-
-    origin: Floats  # corner of the first cell, and eye height, in metres, shape (3,)
-    # `_UNKNOWN`, `_HIDDEN` or `_OPEN` for each cell and object, shape (rows, columns, n).
+    origin: Floats  # x and y of the corner of the first cell, and the eye height, in metres
+    # Visibility (`_UNKNOWN`, `_HIDDEN` or `_OPEN`) of n objects from each cell, shape (rows, columns, n).
     seen: NDArray[np.int8]
 
 
 class PotentialVisibility:
-    """Predictor of the objects that may come into view soon.
+    """A predictor of the objects that a person may see soon.
 
     Args:
-        scene: The composed episode.
-        horizon: How far to look ahead, in seconds.
-        field_of_view: Horizontal field of view in radians. By default, that of the scene's person.
+        scene: Scene of the episode.
+        horizon: Length of the prediction, in seconds.
+        field_of_view: Horizontal field of view in radians. The default is that of the scene's person.
     """
 
     def __init__(self, scene: Scene, horizon: float, field_of_view: float | None = None) -> None:
@@ -66,13 +64,13 @@ class PotentialVisibility:
         self._centers = np.full((len(self._radii), 3), np.inf)
 
     def may_see(self, seen: Observation, aspect: float) -> Mask:
-        """Return a mask (n,) of the objects that may come into a view with the given aspect ratio (width / height)."""
+        """Return a mask (n,) of the objects that may soon be in view. `aspect` is its width / height."""
         centers = _centers(seen.object_positions, seen.object_quaternions, self._offsets)
         moved = (np.abs(centers - self._centers) > _MOVED).any(axis=1)
         if moved.any():
             self._centers[moved] = centers[moved]
             self._grid.seen[:, :, moved] = _UNKNOWN
-        # Angle between the centre and a corner of the view
+        # Angle between the centre of the view and one of its corners
         corner = math.atan(self._width * math.hypot(1.0, 1.0 / aspect))
         c, s, cp, sp = (f(a) for a in (seen.heading, seen.pitch) for f in (math.cos, math.sin))
         gaze = np.array([c * cp, s * cp, sp])
@@ -92,7 +90,7 @@ def _balls(scene: Scene) -> tuple[Floats, Floats]:
     for i in range(count):
         geoms = np.flatnonzero((owner == i) & (model.geom_group <= 2))
         boxes = model.geom_aabb[geoms]
-        corners = boxes[:, None, :3] + signs * boxes[:, None, 3:]  # in the geom frames
+        corners = boxes[:, None, :3] + signs * boxes[:, None, 3:]  # in the frame of each geom
         rotations = data.geom_xmat[geoms].reshape(-1, 3, 3)
         points = data.geom_xpos[geoms, None] + np.einsum("gij,gkj->gki", rotations, corners)
         body = np.zeros(9)
@@ -140,10 +138,10 @@ def _may_see(
     walls: _WallSegments,
     grid: _VisibilityGrid,
 ) -> Mask:
-    """Return a mask of the objects that are visible from a cell near the eye, at most `angle` radians off the gaze.
+    """Return a mask of the objects within `angle` of the gaze that are visible from a cell near the eye.
 
-    `gaze` is a unit vector. `stride` is how far the eye can move. `centers` (n, 3) and `radii` (n,) are balls around
-    the objects. Lengths are in metres. Results for cells are stored in `grid`.
+    `angle` is in radians and `gaze` is a unit vector. The eye can move by `stride`. The bounding spheres of
+    the objects have `centers` (n, 3) and `radii` (n,). Lengths are in metres. `grid` caches the results.
     """
     ahead = np.zeros(len(radii), np.bool_)
     for i in range(len(radii)):
@@ -182,7 +180,7 @@ def _ball_in_sight(eye: Floats, center: Floats, radius: float, walls: _WallSegme
     distance = math.hypot(level, ray[2])
     if distance <= radius or level < radius:
         return _OPEN
-    reach = 1.0 - radius / distance  # fraction of the ray outside the ball
+    reach = 1.0 - radius / distance  # fraction of the ray that is outside the bounding sphere
     if not _is_blocked(eye, center, reach, walls):
         return _OPEN
     side = np.array([-ray[1], ray[0], 0.0]) * (radius / level)

@@ -1,4 +1,4 @@
-"""Heights of receptacle contents, by casting many vertical rays at once into the few geoms nearby."""
+"""Measure how high receptacles are filled, by casting vertical rays into the geoms nearby."""
 
 import math
 from typing import NamedTuple
@@ -22,21 +22,21 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 
 
 class Shapes(NamedTuple):
-    """Shapes of all geoms, in arrays from `MjModel`."""
+    """The arrays of `MjModel` that describe the shapes of all geoms."""
 
-    types: Ints  # `geom_type`, shape (ngeom,)
-    sizes: Floats  # `geom_size` in metres, shape (ngeom, 3)
-    bounds: Floats  # `geom_rbound` in metres, shape (ngeom,)
-    meshes: Ints  # `geom_dataid`, shape (ngeom,)
-    first_vertex: Ints  # `mesh_vertadr`, `mesh_faceadr` and `mesh_facenum`, each of shape (nmesh,)
-    first_face: Ints
-    face_count: Ints
-    vertices: Floats  # `mesh_vert` in metres, shape (nmeshvert, 3)
-    faces: Ints  # `mesh_face`, shape (nmeshface, 3)
+    types: Ints  # `MjModel.geom_type`, shape (ngeom,)
+    sizes: Floats  # `MjModel.geom_size` in metres, shape (ngeom, 3)
+    bounds: Floats  # `MjModel.geom_rbound` in metres, shape (ngeom,)
+    meshes: Ints  # `MjModel.geom_dataid`, shape (ngeom,)
+    first_vertex: Ints  # `MjModel.mesh_vertadr`, shape (nmesh,)
+    first_face: Ints  # `MjModel.mesh_faceadr`, shape (nmesh,)
+    face_count: Ints  # `MjModel.mesh_facenum`, shape (nmesh,)
+    vertices: Floats  # `MjModel.mesh_vert` in metres, shape (nmeshvert, 3)
+    faces: Ints  # `MjModel.mesh_face`, shape (nmeshface, 3)
 
 
 class ReceptacleHeights:
-    """Measures by ray casts how high the receptacles of a scene are filled."""
+    """A sensor that uses ray casts to measure how high the receptacles of a scene are filled."""
 
     def __init__(self, scene: Scene) -> None:
         model = scene.model
@@ -62,9 +62,9 @@ class ReceptacleHeights:
     def heights(
         self, data: mujoco.MjData, receptacle: ReceptacleGeometry, points: Floats, top: float, ignore: Ints
     ) -> Floats:
-        """Return the height of the first solid surface below each point (k, 2), starting at height `top`, or -inf.
+        """Return the height of the first solid surface below each point (k, 2), or -inf if there is none.
 
-        The rays pass through the bodies whose ids are in `ignore`.
+        The rays start at the height `top` and ignore bodies whose ids are in `ignore`. Lengths are in metres.
         """
         moving = self._within_reach(data, receptacle, self._moving)
         bodies = self._model.geom_bodyid[moving]
@@ -88,7 +88,7 @@ class ReceptacleHeights:
 def cast_down(
     points: Floats, top: float, geoms: Ints, positions: Floats, rotations: Floats, shapes: Shapes
 ) -> Floats:
-    """Return the height at which a vertical ray from each point (k, 2) first hits one of the geoms, or -inf."""
+    """Return the height at which a ray straight down from each point (k, 2) first hits a geom, or -inf."""
     heights = np.full(len(points), -math.inf)
     start, along = np.empty(3), np.empty(3)
     for geom in geoms:
@@ -96,7 +96,7 @@ def cast_down(
         bound, axes = (
             shapes.bounds[geom] ** 2,
             rotations[geom],
-        )  # The columns of the rotation are the axes of the geom.
+        )  # The columns of a rotation are the axes of the geom.
         size, is_box = shapes.sizes[geom], shapes.types[geom] == _BOX
         along[0], along[1], along[2] = -axes[6], -axes[7], -axes[8]
         for k in range(len(points)):
@@ -187,7 +187,7 @@ def _sooner(first: float, second: float) -> float:
 
 @kernel
 def _into_mesh(start: Floats, along: Floats, vertices: Floats, faces: Ints, count: int) -> float:
-    """Return how far along a ray it first meets a triangle, or -1 (Moeller and Trumbore, 1997)."""
+    """Return the distance along a ray to the first triangle, or -1 (Moeller and Trumbore, 1997)."""
     best = -1.0
     for face in range(count):
         a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]

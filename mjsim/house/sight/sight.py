@@ -1,7 +1,7 @@
-"""Visibility of objects and receptacles for a person, by ray casts instead of rendering.
+"""Find the objects and receptacles that a person can see. This uses ray casts instead of rendering.
 
-A kernel discards rays that a large wall certainly blocks. MuJoCo casts the remaining ones one by one: for the few
-objects of a room, this takes two thirds of the time of one `mj_multiRay`.
+A kernel discards rays that are certainly blocked by a large wall. MuJoCo casts the remaining rays one by one,
+because this takes only two thirds of the time of `mj_multiRay` for the few objects in a room.
 """
 
 import math
@@ -20,7 +20,7 @@ from mjsim.house.sight.drawn_state import drawn_state, large_boxes
 from mjsim.support.kernels import kernel
 from mjsim.values.person_parameters import PersonParameters
 
-# Rays aim at points at this fraction of the half extents, because the corners of a bounding box are often empty.
+# Rays aim at this fraction of the half extents, because the corners of bounding boxes are often empty.
 INSET = 0.7
 OFFSETS = np.vstack([np.zeros(3), INSET * np.eye(3), -INSET * np.eye(3)])
 _MARGIN = 1e-6  # tolerance for rounding errors, in metres
@@ -28,29 +28,29 @@ _MARGIN = 1e-6  # tolerance for rounding errors, in metres
 
 @dataclass(frozen=True)
 class FieldOfView:
-    """Angles and range of a person's view."""
+    """The angles and the range of a person's field of view."""
 
-    horizontal: float  # full angle in radians
-    vertical: float  # full angle in radians
-    range: float  # maximum distance at which objects are noticed, in metres
+    horizontal: float  # full horizontal angle in radians
+    vertical: float  # full vertical angle in radians
+    range: float  # maximum distance at which a person notices objects, in metres
 
     @classmethod
     def of(cls, person: PersonParameters) -> "FieldOfView":
-        """Return the field of view of a person, for an image with aspect ratio 4:3."""
+        """Return the field of view of a person for an image with an aspect ratio of 4:3."""
         return cls(person.field_of_view, person.vertical_field, person.viewing_distance)
 
 
 def persons_geoms(scene: Scene) -> Mask:
-    """Return a mask (ngeom,) of the geoms of the person's body."""
+    """Return a mask (ngeom,) of the geoms that belong to the person's body."""
     return _sight(scene).person
 
 
 def in_field_of_view(
     points: ArrayLike, eye: ArrayLike, heading: float, pitch: float, field: FieldOfView
 ) -> Mask:
-    """Return a mask (n,) of the points (n, 3) inside the field of view, at any distance and even behind obstacles.
+    """Return a mask (n,) of the points (n, 3) that are inside a person's field of view.
 
-    `points` and `eye` are in metres, `heading` and `pitch` in radians.
+    Distance and obstacles are ignored. `points` and `eye` are in metres, `heading` and `pitch` in radians.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field)
     forward, left, up = gaze.axes @ (np.reshape(points, (-1, 3)) - gaze.eye).T
@@ -68,11 +68,11 @@ def visible_receptacles(
     field: FieldOfView,
     own: Mask | None = None,
 ) -> frozenset[str]:
-    """Return the keys of the receptacles in view.
+    """Return the keys of the receptacles that a person can see.
 
-    A receptacle is in view if one of seven rays, to the centre of its volume and to points around it, is inside the
-    field of view and hits nothing before the receptacle. The model can be any that contains the house. `own` (ngeom,)
-    is a mask of geoms that hide nothing, such as those of the person. See `visible_objects` for other arguments.
+    Seven rays are cast to each receptacle: one to the centre of its volume, and six to points around it. The
+    receptacle is visible if one of them is inside the field of view and not blocked. `model` is any model of
+    the house. `own` (ngeom,) masks geoms that block no rays. See `visible_objects` for other arguments.
     """
     origin = np.array(eye, dtype=np.float64)
 
@@ -100,15 +100,15 @@ def visible_objects(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> tuple[str, ...]:
-    """Return the names of the objects in view, in the episode's order.
+    """Return the names of the objects that a person can see, in the order of the episode.
 
-    An object is in view if one of seven rays, to the centre of its bounding box and to points around it, is inside the
-    field of view and hits the object first. Walls, furniture and other objects block rays. The person's body
-    does not.
+    Seven rays are cast to each object: one to the centre of its bounding box, and six to points around the
+    centre. The object is visible if one of them is inside the field of view and hits the object first. Walls,
+    furniture and other objects block rays, but the person's body does not.
 
-    `data` needs current poses of geoms. `eye` (3,) is in metres. `heading`, counter-clockwise from +x, and `pitch`,
-    positive upwards, are in radians. `field` defaults to that of the scene's person. `among` are the names to
-    look for.
+    `data` must contain the current poses of geoms. `eye` (3,) is in metres. `heading` (counter-clockwise from
+    +x) and `pitch` (positive upwards) are in radians. `field` defaults to the field of view of the scene's
+    person. If `among` is given, only the objects with these names are considered.
     """
     gaze = _gaze(np.array(eye, dtype=np.float64), heading, pitch, field or FieldOfView.of(scene.person))
     return tuple(scene.index.names[i] for i in sorted(set(_object_hits(scene, data, gaze, among, once=True))))
@@ -124,7 +124,7 @@ def visible_shares(
     field: FieldOfView | None = None,
     among: Collection[str] | None = None,
 ) -> dict[str, float]:
-    """Return, for each object in view, the fraction of the seven rays that hit it: above 0, at most 1.
+    """Return the visible fraction of each object in view, estimated as the fraction of rays that hit it.
 
     See `visible_objects` for the arguments.
     """
@@ -134,24 +134,24 @@ def visible_shares(
 
 
 class _SightGeometry(NamedTuple):
-    """Static data of a scene: drawn geoms of objects, large static boxes, and the person's geoms."""
+    """The constant data of a scene: the geoms of objects and of the person, and large static boxes."""
 
     geoms: NDArray[np.int64]  # ids of drawn geoms that belong to objects, shape (g,)
-    owners: NDArray[np.int64]  # object index of each of these geoms, shape (g,)
-    boxes: Floats  # centre and half extents of the bounding box of each of these geoms, in its own frame, shape (g, 6)
-    wall_centers: Floats  # centres of large static boxes, the largest first, in metres, shape (w, 3)
-    wall_axes: Floats  # axes as columns, shape (w, 3, 3)
-    wall_half_sizes: Floats  # half extents in metres, shape (w, 3)
+    owners: NDArray[np.int64]  # index of the object to which each drawn geom belongs, shape (g,)
+    boxes: Floats  # centre and half extents of the bounding box of each drawn geom in its frame, shape (g, 6)
+    wall_centers: Floats  # centres of large static boxes, from large to small, in metres, shape (w, 3)
+    wall_axes: Floats  # axes of the large boxes as columns, shape (w, 3, 3)
+    wall_half_sizes: Floats  # half extents of the large boxes in metres, shape (w, 3)
     person: Mask  # mask of the geoms of the person's body, shape (ngeom,)
 
 
 class _Gaze(NamedTuple):
-    """Eye (3,), axes (forward, left and up as rows), tangents of the half angles of view, and range in metres."""
+    """The position and direction of a person's eye, with the limits of the field of view."""
 
-    eye: Floats
-    axes: Floats
-    slopes: Floats
-    range: float
+    eye: Floats  # position of the eye in metres, shape (3,)
+    axes: Floats  # forward, left and up directions as rows, shape (3, 3)
+    slopes: Floats  # tangents of half the horizontal and half the vertical angle of view, shape (2,)
+    range: float  # maximum viewing distance in metres
 
 
 def _gaze(eye: Floats, heading: float, pitch: float, field: FieldOfView) -> _Gaze:
@@ -204,10 +204,10 @@ def _sight_geometry(scene: Scene) -> _SightGeometry:
 def _open_rays(
     sight: _SightGeometry, positions: Floats, rotations: Floats, wanted: Mask, gaze: _Gaze
 ) -> tuple[NDArray[np.int64], Floats]:
-    """Collect the rays to objects that are inside the field of view and are not certainly blocked by a large wall.
+    """Return the rays to objects that are inside the field of view and not certainly blocked by a large wall.
 
-    Returns the object index of each ray, shape (k,), in ascending order, and the vectors from the eye to points in the
-    object's bounding box, in metres, shape (k, 3). `wanted` (n,) is a mask of objects.
+    The result is the object index of each ray, shape (k,), in ascending order, and the vectors from the eye
+    to points in the object's bounding box, in metres, shape (k, 3). `wanted` (n,) is a mask of objects.
     """
     low, high = _bounding_boxes(sight, positions, rotations, wanted)
     owners, rays = np.empty(7 * len(wanted), np.int64), np.empty((7 * len(wanted), 3))
@@ -253,11 +253,11 @@ def _in_field(ray: Floats, gaze: _Gaze) -> bool:
 
 @kernel
 def _is_blocked(ray: Floats, low: Floats, high: Floats, eye: Floats, sight: _SightGeometry) -> bool:
-    """Return True if a ray from the eye enters a wall before the box with corners `low` and `high`, each (3,).
+    """Return True if a wall blocks a ray from the eye to the box with corners `low` (3,) and `high` (3,).
 
-    Walls are shrunk and the box is enlarged by `_MARGIN`, so that rounding errors never block a ray.
+    Walls are made smaller and the box larger by `_MARGIN`, so that rounding errors never block a ray.
     """
-    reach = 0.0  # fraction of the ray at which it enters the box
+    reach = 0.0  # fraction of the ray that is in front of the box
     for k in range(3):
         if ray[k] > _MARGIN:
             reach = max(reach, (low[k] - _MARGIN - eye[k]) / ray[k])

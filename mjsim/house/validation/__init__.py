@@ -1,1 +1,1 @@
-"""Rules for models and episodes (docs/models.md). Each rule is a generator of findings."""
+"""Rules that check houses, receptacles and objects (docs/models.md). Each rule yields findings."""

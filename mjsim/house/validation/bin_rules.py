@@ -1,4 +1,4 @@
-"""Rules for a house's receptacles: a person can reach, see and fill each of them."""
+"""Rules that check whether a person can reach, see and fill the receptacles of a house."""
 
 import math
 from collections.abc import Iterator
@@ -14,11 +14,11 @@ from mjsim.house.validation.floor import WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
 DEFAULT = PersonParameters()
-SNAP = 1.0  # maximum distance from the site `approach` to a point where a person can stand, in metres
+SNAP = 1.0  # maximum distance from the site `approach` to walkable floor, in metres
 MAX_TOP = 1.4  # maximum height of the top of a receptacle's volume, in metres
-ABOVE = 0.3  # free height above a receptacle that an object needs, in metres
-INSIDE_GAP = 0.006  # how far geoms of the house may extend into the volume, in metres
-SUPPORT_GAP = 0.05  # maximum gap below a receptacle, in metres
+ABOVE = 0.3  # free height that is required above a receptacle, in metres
+INSIDE_GAP = 0.006  # maximum depth to which the house may reach into a receptacle's volume, in metres
+SUPPORT_GAP = 0.05  # maximum gap between a receptacle and the surface below it, in metres
 _WITHIN = ((0.0, 0.0), (0.6, 0.6), (0.6, -0.6), (-0.6, 0.6), (-0.6, -0.6))
 _LIFT = np.array([0.0, 0.0, 0.01])
 _DOWN = np.array([0.0, 0.0, -1.0])

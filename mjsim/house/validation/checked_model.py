@@ -1,4 +1,4 @@
-"""MJCF models compiled on their own for checking, and rules that apply to all MJCF files."""
+"""Compile single MJCF files, and check them with rules that apply to all MJCF files."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from mjsim.house.compiled.footprint import outline_points
 from mjsim.house.validation.findings import Finding
 from mjsim.values.errors import AssetError
 
-MAX_NUMBER = 1e6  # A larger number in an MJCF file is probably a typing mistake.
+MAX_NUMBER = 1e6  # largest number that is plausible in an MJCF file
 LOOK_GROUPS, SOLID_GROUPS = (0, 1, 2), (0, 3)
 _TEXT = ("name", "file", "class", "childclass", "material", "mesh", "texture", "model")
 _KIND = {
@@ -34,12 +34,12 @@ _KIND = {
 
 @dataclass(frozen=True, eq=False)
 class Compiled:
-    """A compiled model in its initial state."""
+    """A compiled model together with its initial state."""
 
     subject: str  # name of the model in findings, such as `object mug`
     path: Path
     model: mujoco.MjModel
-    data: mujoco.MjData  # initial state, with computed poses of bodies, geoms and sites
+    data: mujoco.MjData  # initial state, including the poses of bodies, geoms and sites
 
     @classmethod
     def of(cls, subject: str, path: Path, model: mujoco.MjModel) -> "Compiled":
@@ -50,22 +50,22 @@ class Compiled:
 
     @cached_property
     def solid(self) -> NDArray[np.intp]:
-        """Ids of colliding geoms, shape (k,)."""
+        """The ids of all geoms that collide, shape (k,)."""
         return np.flatnonzero(self.model.geom_contype | self.model.geom_conaffinity)
 
     @cached_property
     def shown(self) -> NDArray[np.intp]:
-        """Ids of visible geoms, shape (k,)."""
+        """The ids of all geoms that are visible, shape (k,)."""
         seen = np.isin(self.model.geom_group, LOOK_GROUPS) & (self.model.geom_rgba[:, 3] > 0)
         return np.flatnonzero(seen)
 
     def points(self, geom: int) -> NDArray[np.float64]:
-        """Return points (k, 3) in metres that enclose a geom seen from above and share its bounding box."""
+        """Return points (k, 3), in metres, that enclose a geom seen from above and have its height range."""
         rotation = self.data.geom_xmat[geom].reshape(3, 3)
         return outline_points(self.model, geom, self.data.geom_xpos[geom], rotation)
 
     def extent(self, geoms: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return the lower and upper corner (2, 3), in metres, of the bounding box of some geoms."""
+        """Return the lower and the upper corner of the bounding box of geoms, in metres, shape (2, 3)."""
         points = np.concatenate([self.points(int(g)) for g in geoms])
         return np.array([points.min(axis=0), points.max(axis=0)])
 
@@ -78,7 +78,7 @@ class Compiled:
         return None if found < 0 else int(found)
 
     def error(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
-        """Create an error about this model. `place` is (x, y, z) in metres."""
+        """Create an error finding about this model. `place` is its position (x, y, z) in metres."""
         return Finding(rule, self.subject, message, remedy, "error", self.path.name, _place(place))
 
     def warning(self, rule: str, message: str, remedy: str, place: object = None) -> Finding:
@@ -86,10 +86,10 @@ class Compiled:
 
 
 def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
-    """Compile an MJCF file on its own. Return the findings instead if it does not compile."""
+    """Compile a single MJCF file. If it does not compile, return findings instead of a model."""
     try:
         file = ModelFile.read(path)
-        # Check numbers before MuJoCo reads the file: it would treat NaN as a missing number and write a log file.
+        # Check numbers first, because MuJoCo would treat NaN as a missing number and write a log file.
         if found := list(check_numbers(subject, file)):
             return found
         return Compiled.of(subject, path, file.spec().compile())
@@ -105,7 +105,7 @@ def compile_model(subject: str, path: Path) -> Compiled | list[Finding]:
 
 
 def check_numbers(subject: str, model: ModelFile) -> Iterator[Finding]:
-    """Find numbers that are not finite or are absurdly large. MuJoCo treats some of them as missing."""
+    """Find numbers in an MJCF file that are not finite or that are implausibly large."""
     for element in model.elements:
         for name, value in element.items():
             if name in _TEXT or element.tag in ("include", "text"):
@@ -122,7 +122,7 @@ def check_numbers(subject: str, model: ModelFile) -> Iterator[Finding]:
 
 
 def check_still(compiled: Compiled) -> Iterator[Finding]:
-    """Check that a model has no joints, and nothing but bodies, geoms, sites and assets."""
+    """Check that a model has no joints, and consists only of bodies, geoms, sites and assets."""
     model = compiled.model
     for joint in range(model.njnt):
         body = model.body(int(model.jnt_bodyid[joint])).name
@@ -143,7 +143,7 @@ def check_still(compiled: Compiled) -> Iterator[Finding]:
 
 
 def check_groups(compiled: Compiled) -> Iterator[Finding]:
-    """Check that geoms in groups 0 and 3 collide and geoms in groups 1 and 2 do not."""
+    """Check that geoms in groups 0 and 3 collide, and that geoms in groups 1 and 2 do not collide."""
     model = compiled.model
     collides = (model.geom_contype | model.geom_conaffinity) != 0
     solid = np.isin(model.geom_group, SOLID_GROUPS)
@@ -164,7 +164,7 @@ def check_groups(compiled: Compiled) -> Iterator[Finding]:
 
 
 def check_contact_bits(compiled: Compiled) -> Iterator[Finding]:
-    """Check that colliding geoms have MuJoCo's default contact bits. Otherwise they would pass through each other."""
+    """Check that colliding geoms set MuJoCo's default contact bit. Others pass through each other."""
     model = compiled.model
     for geom in compiled.solid:
         contype, conaffinity = int(model.geom_contype[geom]), int(model.geom_conaffinity[geom])

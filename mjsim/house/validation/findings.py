@@ -1,4 +1,4 @@
-"""Findings: faults of a model or an episode, each with a remedy."""
+"""Findings, which describe problems in a model or an episode and how to solve them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault of a model or an episode."""
+    """A problem in a model or an episode, and how to solve it."""
 
-    rule: str  # broken rule, such as `mass`: a heading in docs/models.md
-    subject: str  # faulty model or object, such as `object mug`, `house` or `object_03`
-    message: str  # description of the fault, with the faulty value
+    rule: str  # name of the violated rule in docs/models.md, such as `mass`
+    subject: str  # affected model or object, such as `object mug`, `house` or `object_03`
+    message: str  # description of the problem, including the wrong value
     remedy: str
-    # Errors prevent use. Warnings announce effects that may surprise participants.
+    # A model with errors cannot be used. Warnings are about effects that may surprise participants.
     severity: Severity = "error"
-    file: str = ""  # name of the file to change, unless `subject` already identifies it
-    # Position in the frame of the house or object in metres: (x, y) or (x, y, z)
+    file: str = ""  # name of the file to correct, unless `subject` identifies the file
+    # Position of the problem in the house or object, in metres: (x, y) or (x, y, z)
     place: tuple[float, ...] | None = None
 
     def __str__(self) -> str:
@@ -33,7 +33,7 @@ def errors(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def one_line(findings: Iterable[Finding], name: object) -> str:
-    """Format an exception message from the first error and the number of further errors, prefixed with `name`."""
+    """Format a message with the name of the subject, the first error and the number of further errors."""
     first, *more = errors(findings)
     rest = f" ({len(more)} more; `mjsim check` lists them)" if more else ""
     return f"{name}: {first}{rest}"

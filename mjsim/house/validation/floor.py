@@ -1,4 +1,4 @@
-"""The walkable floor of a compiled house, with grids of rooms and clearances."""
+"""The walkable floor of a compiled house, and grids that assign rooms and clearances to its cells."""
 
 import math
 from dataclasses import dataclass
@@ -12,25 +12,25 @@ from mjsim.house.compiled.house import NavigableFloor
 from mjsim.house.compiled.sites import ReceptacleGeometry, RoomMap
 from mjsim.house.validation.checked_model import Compiled
 
-BODY_BAND = (0.05, 1.8)  # Geoms between these heights obstruct a person, in metres.
-BORDER = 1.0  # width of the border around the rooms, in metres
+BODY_BAND = (0.05, 1.8)  # range of heights in which geoms obstruct a person, in metres
+BORDER = 1.0  # margin of the grids around the rooms, in metres
 _CELLS = 1e6  # approximate maximum number of cells in a grid
 _FINEST = 0.025  # minimum cell size in metres
 
 
 @dataclass(frozen=True, eq=False)
 class WalkableFloor:
-    """A compiled house with its receptacles, and grids derived from it."""
+    """The walkable floor of a compiled house, with grids for validation rules."""
 
     compiled: Compiled
     rooms: RoomMap
     receptacles: dict[str, ReceptacleGeometry]
-    rooms_of: dict[str, str]  # room of each receptacle according to the catalogue, both as keys
+    rooms_of: dict[str, str]  # receptacle key -> key of its room in the catalogue
     navigable: NavigableFloor
 
     @cached_property
     def walkable(self) -> tuple[NDArray[np.float64], float]:
-        """Points (k, 2) of the largest connected region, on a grid of about 5 cm, and the area per point in m^2."""
+        """The grid points (k, 2) of the largest walkable region, in metres, and the area per point in m^2."""
         xmin, ymin, xmax, ymax = self.rooms.bounds
         islands = self.navigable.topdown_map
         size = np.array([(xmax - xmin) / islands.shape[1], (ymax - ymin) / islands.shape[0]])
@@ -39,7 +39,7 @@ class WalkableFloor:
 
     @cached_property
     def clearance(self) -> ClearanceField:
-        """Grid of distances to the nearest wall or piece of furniture."""
+        """A grid of the distances to the nearest wall or piece of furniture."""
         xmin, ymin, xmax, ymax = self.rooms.bounds
         area = (xmax - xmin + 2 * BORDER) * (ymax - ymin + 2 * BORDER)
         low, high = BODY_BAND
@@ -53,7 +53,7 @@ class WalkableFloor:
 
     @cached_property
     def centres(self) -> NDArray[np.float64]:
-        """Centres of the cells of `clearance` in metres, shape (nx, ny, 2)."""
+        """The centres of the cells of the `clearance` grid, in metres, shape (nx, ny, 2)."""
         field = self.clearance
         nx, ny = field.distance.shape
         x, y = (o + field.resolution * np.arange(n) for o, n in ((field.origin_x, nx), (field.origin_y, ny)))
@@ -61,7 +61,7 @@ class WalkableFloor:
 
     @cached_property
     def rectangle_of(self) -> NDArray[np.intp]:
-        """Index of the room rectangle that contains each cell's centre, or -1, shape (nx, ny)."""
+        """The index of the room rectangle that contains each cell's centre, or -1 outside, shape (nx, ny)."""
         field = self.clearance
         found = np.full(field.distance.shape, -1)
         for k, (centre, half, axes) in enumerate(zip(*self.rooms.rectangles, strict=True)):
@@ -73,11 +73,11 @@ class WalkableFloor:
         return found
 
     def cell_of(self, points: NDArray[np.float64]) -> NDArray[np.intp]:
-        """Return the cells nearest to points (..., 2) in metres, shape (..., 2)."""
+        """Return the indices of the cells nearest to points (..., 2) in metres, shape (..., 2)."""
         field = self.clearance
         cells = np.rint((points - [field.origin_x, field.origin_y]) / field.resolution).astype(np.intp)
         return np.clip(cells, 0, np.array(field.distance.shape) - 1)
 
     def rectangles_of(self, key: str) -> NDArray[np.intp]:
-        """Return the indices (k,) of a room's rectangles."""
+        """Return the indices (k,) of all rectangles of a room."""
         return np.flatnonzero(np.array(self.rooms.keys) == key)

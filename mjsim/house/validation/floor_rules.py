@@ -1,4 +1,4 @@
-"""Rules for a house's floor: it is closed, level and connected, and a person can use all receptacles from it."""
+"""Rules that check whether the floor of a house is enclosed by walls, level and walkable."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -17,15 +17,15 @@ from mjsim.house.validation.floor import BODY_BAND, BORDER, WalkableFloor
 from mjsim.values.person_parameters import PersonParameters
 
 DEFAULT = PersonParameters()
-PASSAGE = 0.70  # A person squeezes through passages narrower than this, in metres.
-MIN_PASSAGE = 0.50  # width of the body plus the planner's clearance, in metres
-ROOM_AREA = 0.25  # minimum walkable area of a room in m^2
-FLOOR_GAP = 0.006  # maximum deviation of the floor from z = 0, in metres
-HEADROOM = 2.0  # height of the tallest person's eyes, in metres
+PASSAGE = 0.70  # width below which a passage counts as narrow, in metres
+MIN_PASSAGE = 0.50  # minimum width of a passage: body width plus the planner's clearance, in metres
+ROOM_AREA = 0.25  # minimum walkable area of each room, in m^2
+FLOOR_GAP = 0.006  # maximum deviation of the floor's height from z = 0, in metres
+HEADROOM = 2.0  # eye height of the tallest person, in metres
 _RAYS = 3000
-# Geom groups in which things can hang: colliding geoms, ceilings and lamps
+# Mask of the geom groups that rays can hit: colliding geoms, ceilings and lamps
 _HANGING = np.array([1, 1, 0, 1, 0, 0], np.uint8)
-_CHEST = 1.0  # start height of vertical rays, in metres, which is free wherever a person can stand
+_CHEST = 1.0  # start height of vertical rays, in metres; it is free wherever a person can stand
 
 
 def check_floor(floor: WalkableFloor) -> list[Finding]:
@@ -33,7 +33,7 @@ def check_floor(floor: WalkableFloor) -> list[Finding]:
 
 
 def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
-    """Report that a person can stand nowhere in a house, most often because the floor is too high."""
+    """Create the finding that there is no place to stand in a house, often because the floor is too high."""
     steps = np.stack(np.meshgrid(*2 * [np.linspace(-0.9, 0.9, 7)]), axis=-1).reshape(-1, 2)
     offsets = np.einsum("kij,nkj->nki", rooms.axes, steps[:, None] * rooms.half_sizes)
     points = (rooms.centers + offsets).reshape(-1, 2)
@@ -46,7 +46,7 @@ def nowhere_to_stand(compiled: Compiled, rooms: RoomMap) -> Finding:
 
 
 def _shell(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check that outer walls are closed, so that free space in the rooms is not connected to the border of the grid."""
+    """Check that the outer walls have no gaps through which the rooms are connected to the outside."""
     free = floor.clearance.distance > 0
     components, _ = label(free)
     indoors = floor.rectangle_of >= 0
@@ -85,7 +85,7 @@ def _rooms(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _passages(floor: WalkableFloor) -> Iterator[Finding]:
-    """Find passages narrower than `PASSAGE`, by the rooms that a wider person could not enter."""
+    """Find rooms that a person could not enter with a body as wide as `PASSAGE`."""
     field = floor.clearance
     inside = distance_transform_edt(floor.rectangle_of < 0) * field.resolution <= BORDER / 2
     radius = PASSAGE / 2 - field.resolution
@@ -99,7 +99,7 @@ def _passages(floor: WalkableFloor) -> Iterator[Finding]:
     for key in dict.fromkeys(floor.rooms.keys):
         room = np.isin(floor.rectangle_of, floor.rectangles_of(key))
         if (wide[room] == main).any() or not (body[room] == at_home).any():
-            continue  # The passage is wide enough, or there is none, which another rule reports.
+            continue  # Either the passage is wide enough, or there is no passage, which another rule reports.
         place, width = _narrowest(field, wide, main, room & (wide > 0), body == at_home)
         at = floor.centres[place]
         yield floor.compiled.warning(
@@ -117,9 +117,9 @@ def _narrowest(
     beyond: NDArray[np.bool_],
     body: NDArray[np.bool_],
 ) -> tuple[tuple[int, int], float]:
-    """Return the cell and the width of the widest passage that connects the component `main` to the cells `beyond`."""
+    """Return the narrowest cell between the component `main` and the cells `beyond`, and the width there."""
     seeds = (wide == main) | beyond
-    if not beyond.any():  # The whole room is narrow, so use the edge of the wide component.
+    if not beyond.any():  # The whole room is narrow, so use the edge of the main component.
         seeds = wide == main
     nearest = distance_transform_edt(~seeds, return_distances=False, return_indices=True)
     near_main = (wide == main)[tuple(nearest)]
@@ -147,7 +147,7 @@ def _level(floor: WalkableFloor) -> Iterator[Finding]:
 
 
 def _headroom(floor: WalkableFloor) -> Iterator[Finding]:
-    """Check that nothing hangs at eye height. Anything that reaches below 1.8 m is an obstacle, and is allowed."""
+    """Check that nothing hangs at eye height, except for obstacles that reach below 1.8 m."""
     points = _places(floor)
     heights = np.array([_CHEST + _free(floor.compiled, p, 1.0) for p in points])
     low = int(heights.argmin())

@@ -1,4 +1,4 @@
-"""Rules for a house's MJCF file, except its floor (docs/models.md, "A house")."""
+"""Rules that check the MJCF file of a house, except for its floor (docs/models.md, "A house")."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -22,20 +22,20 @@ from mjsim.house.validation.findings import Finding
 from mjsim.house.validation.floor import BODY_BAND
 from mjsim.values.errors import AssetError
 
-AREA = 0.1  # maximum floor area that a mesh's convex hull may cover but the mesh itself does not, in m^2
-_SIDE = 24  # number of grid points along each side of a hull's outline
+AREA = 0.1  # maximum floor area that a mesh's convex hull may cover beyond the mesh, in m^2
+_SIDE = 24  # number of grid points along each side of a hull's bounding box
 _MAX_CROSSINGS = 50
-SIZE = (1.5, 150.0)  # minimum and maximum side of the rectangle around all rooms, in metres
+SIZE = (1.5, 150.0)  # minimum and maximum side length of the rectangle around all rooms, in metres
 GRAVITY = (0.0, 0.0, -9.81)  # standard gravity in m/s^2
-GRAVITY_SLACK = 0.1  # accepted deviation from the standard gravity in m/s^2
-OVERLAP = 0.05  # maximum overlap of two rooms in m^2
+GRAVITY_SLACK = 0.1  # maximum deviation from standard gravity in m/s^2
+OVERLAP = 0.05  # maximum area in which two rooms may overlap, in m^2
 MOUNT = "mount:"
 RESERVED = "avatar"
 DEFAULT_TIMESTEP = 0.002  # MuJoCo's timestep for a file that does not set one, in seconds
 
 
 def check_hulls(compiled: Compiled) -> Iterator[Finding]:
-    """Find meshes whose convex hulls, which MuJoCo uses for collision, cover floor that the meshes leave free."""
+    """Find meshes whose convex hulls block free floor. MuJoCo uses the hull of a mesh for collisions."""
     model, (low, high) = compiled.model, BODY_BAND
     meshes = compiled.solid[model.geom_type[compiled.solid] == mujoco.mjtGeom.mjGEOM_MESH]
     for geom in meshes.tolist():
@@ -55,7 +55,7 @@ def check_hulls(compiled: Compiled) -> Iterator[Finding]:
 
 
 def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Return grid points (k, 2) in the convex hull of points (n, 2), and the area per grid point."""
+    """Return the grid points (k, 2) inside the convex hull of points (n, 2), and the area per grid point."""
     sides = np.ptp(points, axis=0) / _SIDE
     steps = np.stack(np.meshgrid(np.arange(_SIDE), np.arange(_SIDE)), axis=-1).reshape(-1, 2)
     places = points.min(axis=0) + (steps + 0.5) * sides
@@ -65,7 +65,7 @@ def _places_within(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], fl
 
 
 def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
-    """Return True if a mesh leaves the floor point (2,) free from the floor to chest height."""
+    """Return True if a mesh does not occupy the space above a floor point (2,) up to chest height."""
     low, high = BODY_BAND
     at, crossings = np.array([*place, high / 2]), 0
     below = _to_mesh(compiled, geom, at, -1.0)
@@ -76,7 +76,7 @@ def _is_free(compiled: Compiled, geom: int, place: NDArray[np.float64]) -> bool:
 
 
 def _to_mesh(compiled: Compiled, geom: int, start: NDArray[np.float64], up: float) -> float:
-    """Return the distance from a point (3,) straight up (1) or down (-1) to a mesh, or -1 if the ray misses it."""
+    """Return the vertical distance from a point (3,) up (1) or down (-1) to a mesh, or -1 for a miss."""
     return float(mujoco.mj_rayMesh(compiled.model, compiled.data, geom, start, np.array([0.0, 0.0, up])))
 
 
@@ -147,7 +147,7 @@ def _rooms(compiled: Compiled, catalogue: Catalogue) -> Iterator[Finding]:
 def _overlaps(compiled: Compiled, rooms: RoomMap) -> Iterator[Finding]:
     reach = np.einsum("kij,kj->ki", np.abs(rooms.axes), rooms.half_sizes)
     low, high = rooms.centers - reach, rooms.centers + reach
-    # Skip rotated rooms, because their axis-aligned extents are too large.
+    # Rotated rooms are skipped, because their axis-aligned bounding boxes are too large.
     square = np.abs(rooms.axes).max(axis=(1, 2)) > 1 - 1e-9
     for i, j in itertools.combinations(np.flatnonzero(square), 2):
         sides = np.minimum(high[i], high[j]) - np.maximum(low[i], low[j])

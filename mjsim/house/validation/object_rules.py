@@ -1,4 +1,4 @@
-"""Rules for objects that a person can carry (docs/models.md, "An object")."""
+"""Rules that check the models of objects that a person can carry (docs/models.md, "An object")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,17 +16,17 @@ from mjsim.house.validation.checked_model import (
 )
 from mjsim.house.validation.findings import Finding, errors
 
-SIZE = (0.06, 0.32)  # minimum and maximum length of the longest side, in metres
-MASS = (0.03, 1.5)  # minimum and maximum mass in kilograms
-REST_GAP = 0.002  # maximum distance of the lowest point from z = 0, in metres
-OFF_CENTRE = 0.03  # maximum distance of the footprint's centre from the origin, in metres
-GRIP_GAP = 0.03  # maximum height difference between a grip and the top, in metres
-GRIP_REACH = 0.05  # maximum distance from a grip to the nearest part, in metres
-UPRIGHT = 0.99  # minimum cosine of the angle between a grip's z axis and the vertical
-TURN = 0.1  # maximum deviation from -1 of the cosine of the angle between the x axes of the two grips
-THIN = 0.015  # minimum thickness of a colliding part, in metres
-LOOK_GAP = 0.03  # maximum difference between the extents of visible and colliding geoms, in metres
-SLENDER = 1e-4  # minimum ratio of the moment of inertia to mass times the square of the largest distance
+SIZE = (0.06, 0.32)  # minimum and maximum length of an object's longest side, in metres
+MASS = (0.03, 1.5)  # minimum and maximum mass of an object, in kilograms
+REST_GAP = 0.002  # maximum distance of an object's lowest point from z = 0, in metres
+OFF_CENTRE = 0.03  # maximum distance from an object's origin to the centre of its footprint, in metres
+GRIP_GAP = 0.03  # maximum height difference between a grip site and the top of the object, in metres
+GRIP_REACH = 0.05  # maximum distance from a grip site to the nearest colliding part, in metres
+UPRIGHT = 0.99  # minimum cosine of the angle between the z axis of a grip site and the vertical
+TURN = 0.1  # tolerance for the cosine of the angle between the x axes of both grips, which should be -1
+THIN = 0.015  # minimum thickness of the colliding parts of an object, in metres
+LOOK_GAP = 0.03  # maximum distance between the bounding boxes of visible and colliding geoms, in metres
+SLENDER = 1e-4  # minimum moment of inertia, relative to mass times squared radius
 ROUND = [
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "CYLINDER", "ELLIPSOID")
 ]
@@ -34,7 +34,7 @@ GRIPS = ("grip_0", "grip_1")
 
 
 def check_object(path: Path, key: str | None = None) -> list[Finding]:
-    """Check an object's MJCF file. Its catalogue key `key` defaults to the file's name."""
+    """Check the MJCF file of an object. `key` is the catalogue key, which defaults to the file name."""
     subject = f"object {key or path.stem}"
     compiled = compile_model(subject, path)
     return check_compiled_object(compiled) if isinstance(compiled, Compiled) else compiled
@@ -46,7 +46,7 @@ def check_compiled_object(compiled: Compiled) -> list[Finding]:
 
 
 def check_structure(compiled: Compiled, body: str) -> Iterator[Finding]:
-    """Check that a model has a single body, named `body`, with colliding and visible geoms."""
+    """Check that a model has a single body, called `body`, with colliding and visible geoms."""
     model = compiled.model
     names = [model.body(b).name for b in range(1, model.nbody)]
     if names != [body]:
@@ -189,7 +189,7 @@ def _parts(compiled: Compiled) -> Iterator[Finding]:
     model = compiled.model
     for geom in compiled.solid:
         thin = float(2 * model.geom_aabb[geom, 3:].min())
-        if thin < THIN - 5e-5:  # tolerance, so that a part passes whose thickness is printed as 15.0 mm
+        if thin < THIN - 5e-5:  # A part passes if its thickness is printed as 15.0 mm.
             yield compiled.warning(
                 "thin",
                 f"geom {compiled.geom_name(int(geom))} is {1000 * thin:.1f} mm thin",

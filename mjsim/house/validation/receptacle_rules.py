@@ -1,4 +1,4 @@
-"""Rules for a single receptacle (docs/models.md, "A receptacle")."""
+"""Rules that check the model of a receptacle (docs/models.md, "A receptacle")."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,19 +11,19 @@ from mjsim.house.validation.checked_model import Compiled, compile_model
 from mjsim.house.validation.findings import Finding, errors
 from mjsim.house.validation.object_rules import check_structure
 
-SIDE = (0.1, 1.2)  # minimum and maximum side of the interior, in metres
-DEPTH = (0.08, 0.8)  # minimum and maximum height of the interior, in metres
-FLOOR = 0.03  # minimum thickness of the receptacle's floor, in metres
-GAP = 0.02  # maximum gap between the volume and the floor or walls, in metres
-BASE_GAP = 0.005  # maximum distance of the lowest point from z = 0, in metres
-STIFF = 0.02  # maximum time constant of the receptacle's contacts, in seconds
+SIDE = (0.1, 1.2)  # minimum and maximum side length of a receptacle's interior, in metres
+DEPTH = (0.08, 0.8)  # minimum and maximum height of a receptacle's interior, in metres
+FLOOR = 0.03  # minimum thickness of a receptacle's floor, in metres
+GAP = 0.02  # maximum gap between a receptacle's volume and its floor or walls, in metres
+BASE_GAP = 0.005  # maximum distance of a receptacle's lowest point from z = 0, in metres
+STIFF = 0.02  # maximum time constant of a receptacle's contacts, in seconds
 _SLOTS = ((0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5))
 _SIDES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
 def check_receptacle(path: Path, key: str | None = None) -> list[Finding]:
-    """Check a receptacle's MJCF file. Its catalogue key `key` defaults to the file's name."""
+    """Check the MJCF file of a receptacle. `key` is the catalogue key, which defaults to the file name."""
     compiled = compile_model(f"receptacle {key or path.stem}", path)
     return check_compiled_receptacle(compiled) if isinstance(compiled, Compiled) else compiled
 
@@ -59,7 +59,7 @@ def _sites(compiled: Compiled) -> Iterator[Finding]:
 
 
 class _Volume:
-    """The site `volume` of a compiled receptacle: centre (3,), half sizes (3,) and axes."""
+    """The volume of a compiled receptacle in which objects count as delivered."""
 
     def __init__(self, compiled: Compiled) -> None:
         site = compiled.site("volume")

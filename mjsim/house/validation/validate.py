@@ -1,4 +1,4 @@
-"""Validation of a house together with its objects and receptacles."""
+"""Validate a house together with its objects and receptacles."""
 
 import contextlib
 from collections.abc import Iterator, Mapping
@@ -21,14 +21,14 @@ from mjsim.support.files import source_digest
 from mjsim.support.kernels import cache_base
 from mjsim.values.errors import AssetError, MjsimError
 
-SLOTS = 2.5  # minimum number of average objects that fit side by side into a receptacle
+SLOTS = 2.5  # minimum number of average-sized objects that must fit side by side into a receptacle
 
 
 def require_usable(house: CompiledHouse) -> None:
-    """Check a house unless it is shipped with the package, and raise an AssetError with the first error.
+    """Check a house and raise an AssetError with the first error. Houses of this package are not checked.
 
-    Each process checks a house once. For generated houses, a file in the cache records that a house of this content was
-    found usable by this code, so later processes do not check it again.
+    A process checks each house only once. For a generated house, a file in the cache records that the current
+    code has accepted it, so that later processes do not check it again.
     """
     catalogue = house.catalogue
     if catalogue.ref.kind == "shipped":
@@ -39,7 +39,7 @@ def require_usable(house: CompiledHouse) -> None:
     if found := errors(house.cached("findings", lambda: check_house(house))):
         raise AssetError(one_line(found, catalogue.name))
     if verdict is not None:
-        with contextlib.suppress(OSError):  # If the disk is full, the next process checks the house again.
+        with contextlib.suppress(OSError):  # If the disk is full, the next process repeats the check.
             verdict.parent.mkdir(parents=True, exist_ok=True)
             verdict.touch()
 
@@ -50,7 +50,7 @@ def _verdict(catalogue: Catalogue) -> Path:
 
 
 def check_house(house: CompiledHouse) -> list[Finding]:
-    """Check a house, its receptacles and its objects. If a file has errors, skip the rules for the house as a whole."""
+    """Check the files of a house, and then the house as a whole if no file has errors."""
     catalogue = house.catalogue
     found = check_house_file(catalogue)
     for receptacle in catalogue.receptacles.values():
@@ -77,7 +77,7 @@ def _check_composed(house: CompiledHouse) -> list[Finding]:
         navigable = house.navigable
     except MjsimError:
         raise
-    except Exception:  # A floor builder raises its own exception if no floor is free.
+    except Exception:  # Floor builders raise their own exceptions if there is no free floor.
         return [nowhere_to_stand(compiled, rooms)]
     rooms_of = {r.key: r.room for r in house.catalogue.receptacles.values()}
     return check_floor(WalkableFloor(compiled, rooms, receptacles, rooms_of, navigable))

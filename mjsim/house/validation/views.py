@@ -1,4 +1,4 @@
-"""Outlines of models from above and from the sides, for the images of `mjsim check`. Drawing needs no OpenGL."""
+"""Draw outlines of models for the images of the `mjsim check` command. OpenGL is not required."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ from mjsim.values.episode import Episode
 from mjsim.values.errors import AssetError
 
 Point = tuple[float, float]
-_BAND = (0.05, 1.8)  # heights between which a house is drawn, in metres
+_BAND = (0.05, 1.8)  # range of heights in which the geoms of a house are drawn, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Outlines of a model seen along an axis, in metres."""
+    """A drawing of the outlines of a model, seen along an axis, in metres."""
 
-    title: str  # name of the view
-    axes: tuple[int, int]  # indices of the coordinates that point right and up, (0, 1) for a view from above
-    outlines: tuple[NDArray[np.float64], ...]  # convex polygons, each of shape (k, 2)
+    title: str  # title of the drawing
+    axes: tuple[int, int]  # indices of the right and up coordinates, such as (0, 1) in a view from above
+    outlines: tuple[NDArray[np.float64], ...]  # outlines as convex polygons, each of shape (k, 2)
     rooms: tuple[tuple[str, NDArray[np.float64]], ...] = ()  # name and corners (4, 2) of each room rectangle
-    marks: Mapping[str, Point] = field(default_factory=dict)  # named points: sites, receptacles and objects
+    marks: Mapping[str, Point] = field(default_factory=dict)  # named positions, such as those of sites
 
 
 def floor_view(
@@ -35,7 +35,7 @@ def floor_view(
     receptacles: Mapping[str, ReceptacleGeometry] | None = None,
     episode: Episode | None = None,
 ) -> Drawing:
-    """Draw a house from above: obstacles, rooms, receptacles, and optionally an episode's objects and start."""
+    """Draw a house from above, optionally with the objects and the start position of an episode."""
     marks = {key: _point(r.center, (0, 1)) for key, r in (receptacles or {}).items()}
     if episode is not None:
         marks |= {o.name: _point(o.position, (0, 1)) for o in episode.objects}
@@ -44,7 +44,7 @@ def floor_view(
 
 
 def side_views(compiled: Compiled) -> tuple[Drawing, ...]:
-    """Draw an object or receptacle with its sites from above, from the front and from the right."""
+    """Draw an object or receptacle and its sites from above, from the front and from the right."""
     sites = {compiled.model.site(s).name: compiled.data.site_xpos[s] for s in range(compiled.model.nsite)}
     return tuple(
         Drawing(title, axes, _outlines(compiled, axes), marks={n: _point(p, axes) for n, p in sites.items()})
@@ -82,7 +82,7 @@ def _outlines(
                 compiled.model, int(geom), turn @ compiled.data.geom_xpos[geom], turn @ rotation
             )
             found.append(points[ConvexHull(points[:, :2]).vertices, :2])
-        except (AssetError, QhullError, ValueError):  # flat or not finite, which another rule reports
+        except (AssetError, QhullError, ValueError):  # Flat or infinite geoms are reported by another rule.
             continue
     return tuple(found)
 

@@ -1,1 +1,1 @@
-"""Importer for houses from scenes of other simulators (docs/import.md)."""
+"""Import houses from scenes of other simulators (docs/import.md)."""

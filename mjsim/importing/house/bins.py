@@ -1,4 +1,4 @@
-"""Placement of bins in an imported house: back to a wall, free floor in front, and no way blocked."""
+"""Place bins along the walls of an imported house, such that no passage is blocked."""
 
 import math
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ from mjsim.importing.house.floor_grid import BODY, CELL, FloorGrid, Mask, cleara
 from mjsim.importing.house.rooms import Rooms
 from mjsim.values.errors import AssetError
 
-AREA = 5.0  # walkable floor required per bin, in square metres
-_STAND = 0.8  # depth of the free floor in front of a bin, in metres
-_ASIDE = 0.05  # free width on each side of a bin, in metres
+AREA = 5.0  # walkable floor area that is required for each bin, in square metres
+_STAND = 0.8  # depth of the free floor that is required in front of a bin, in metres
+_ASIDE = 0.05  # width of the free floor on each side of a bin, in metres
 _WALL = 0.15  # maximum distance between a bin and the wall behind it, in metres
-_WIDE = 0.4  # body radius in metres for which the floor must stay connected
-_TRIES = 300  # maximum number of poses tried for a bin in each room
-_LOST = 1.0  # walkable floor that may be lost beyond a bin and its surroundings, in square metres
-# Bins by descending priority, and the room types in which people would look for them.
+_WIDE = 0.4  # radius of a body for which bins must leave the floor connected, in metres
+_TRIES = 300  # maximum number of poses that are tried for a bin in each room
+_LOST = 1.0  # walkable floor that a bin may block in addition to its surroundings, in square metres
+# Bins in order of priority, and the types of rooms in which people would look for them.
 _HOMES = {
     "dish_bin": ("kitchen", "living_kitchen", "dining_room"),
     "toy_box": ("bedroom", "living_room"),
@@ -32,22 +32,22 @@ _HOMES = {
     "office_box": ("office", "bedroom", "living_room"),
     "bookshelf": ("living_room", "living_kitchen", "office"),
 }
-# Possible yaw angles of a bin, and for each the direction of its back.
+# Possible yaw angles of a bin, each with the direction in which the back of the bin points.
 _TURNS = ((0.0, (0, 1)), (math.pi, (0, -1)), (math.pi / 2, (-1, 0)), (-math.pi / 2, (1, 0)))
 
 
-Span = tuple[int, int]  # first cell, and end cell (exclusive)
+Span = tuple[int, int]  # indices of the first cell and of the cell after the last one
 
 
 @dataclass(frozen=True)
 class _Size:
     width: float
     depth: float
-    middle: tuple[float, float]  # middle of the base
+    middle: tuple[float, float]  # centre of the bin's base
 
 
 def place_bins(grid: FloorGrid, rooms: Rooms, catalogue: Catalogue, seed: int = 0) -> tuple[Bin, ...]:
-    """Place as many bins as the floor area allows. Raise `AssetError` if none fits."""
+    """Place as many bins as the floor area allows. Raise an AssetError if no bin fits."""
     rng = np.random.default_rng(seed)
     wanted = [key for key in _HOMES if key in catalogue.receptacles]
     wanted = wanted[: max(1, int(grid.area / AREA))]
@@ -80,7 +80,7 @@ def _placed(
 ) -> tuple[Bin, FloorGrid] | None:
     """Place a bin, and return it with the updated grid. Return None if the bin does not fit.
 
-    Prefer a room where people would look for it, then a room with few bins.
+    Prefer rooms in which people would look for the bin, and rooms with few other bins.
     """
     numbers = list(range(1, len(rooms.names) + 1))
     homes = _HOMES[key]
@@ -105,13 +105,13 @@ class _Choice:
     cells: tuple[slice, slice]
     before: tuple[slice, slice]
     yaw: float
-    back: tuple[int, int]  # direction of the bin's back
+    back: tuple[int, int]  # direction in which the back of the bin points
 
 
 def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator) -> list[_Choice]:
     free = grid.free & room
     standing = grid.walkable & room
-    # The outer shell is added later, so cells outside count as walls.
+    # Cells outside the house count as walls, because the outer shell is added later.
     walls = (grid.walls & ~grid.doors) | ~grid.indoors
     ahead = round(_STAND / CELL)
     found: list[_Choice] = []
@@ -122,7 +122,7 @@ def _choices(grid: FloorGrid, room: Mask, size: _Size, rng: np.random.Generator)
         before = [_beyond(span, -way, ahead) for span, way in zip(spans, back, strict=True)]
         behind = np.zeros_like(walls)
         for step in range(1, round(_WALL / CELL) + 1):
-            behind |= _shifted(walls, back, step)  # cells with a wall at most _WALL behind them
+            behind |= _shifted(walls, back, step)  # cells that have a wall at most `_WALL` behind them
         fits = _all(free, spans) & _all(behind, edge) & _all(free, before) & (_count(standing, before) > 0)
         found += [
             _Choice(_at(spans, place), _at(before, place), yaw, back) for place in np.argwhere(fits).tolist()
@@ -138,7 +138,7 @@ def _last(span: Span, way: int) -> Span:
 
 
 def _beyond(span: Span, way: int, cells: int) -> Span:
-    """Return the first `cells` cells beyond a span in direction `way` (1 or -1), or the span itself if `way` is 0."""
+    """Return the first `cells` cells after a span in direction `way` (1 or -1), or the span if `way` is 0."""
     start, stop = span
     return {1: (stop, stop + cells), 0: span, -1: (start - cells, start)}[way]
 
@@ -164,7 +164,7 @@ def _with_bin(grid: FloorGrid, rooms: Rooms, size: _Size, choice: _Choice) -> Fl
 
 
 def _parts(grid: FloorGrid, radius: float) -> int:
-    """Count the connected parts of the floor above 0.2 m^2 for a body with this radius, in metres."""
+    """Count the connected floor areas above 0.2 m^2 for a body with this radius in metres."""
     parts, _ = label(clearance(grid.free) > radius)
     return int((np.bincount(parts.ravel())[1:] * CELL**2 > 0.2).sum())
 
@@ -182,7 +182,7 @@ def _origin(grid: FloorGrid, size: _Size, choice: _Choice) -> tuple[float, float
 
 
 def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
-    """For each cell, count the cells of `mask` in a rectangle given by two spans relative to the cell."""
+    """Count the cells of `mask` in a rectangle near each cell. The two spans are relative to the cell."""
     total = np.pad(np.cumsum(np.cumsum(mask, axis=0), axis=1), ((1, 0), (1, 0)))
     (a, b), (c, d) = (
         [np.clip(np.arange(side) + end, 0, side) for end in span]
@@ -192,7 +192,7 @@ def _count(mask: Mask, spans: Sequence[Span]) -> NDArray[np.int_]:
 
 
 def _all(mask: Mask, spans: Sequence[Span]) -> Mask:
-    """Return the cells for which `mask` is true in the whole rectangle given by two spans relative to the cell."""
+    """Return a mask of the cells for which `mask` is true in the whole rectangle given by two spans."""
     (a, b), (c, d) = spans
     return np.asarray(_count(mask, spans) == (b - a) * (d - c))
 

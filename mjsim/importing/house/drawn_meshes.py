@@ -1,4 +1,4 @@
-"""Meshes that are drawn for an imported house. Each has one material, and their number of triangles is limited."""
+"""Create the visual meshes of an imported house, with a limited number of triangles."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
@@ -14,27 +14,27 @@ from mjsim.importing.house.floor_grid import Mask
 from mjsim.importing.object.closed_body import is_closed
 from mjsim.importing.object.visual_mesh import VisualMesh, corner_normals
 
-BUDGET = 150_000  # maximum number of triangles of a house
-_LEAST = 100  # meshes are not simplified below this number of triangles
-_LEAST_VERTICES = 4  # minimum number of vertices that MuJoCo requires
-_SMALL, _FEW = 0.3, 1000  # size limit of small objects in metres, and their maximum number of triangles
-CEILING = 2.2  # height above which top-down views omit geoms, in metres
-_SAME = 8  # colours that differ by less are merged, on a scale from 0 to 255
+BUDGET = 150_000  # maximum total number of triangles in a house
+_LEAST = 100  # minimum number of triangles to which meshes are simplified
+_LEAST_VERTICES = 4  # minimum number of vertices that MuJoCo requires for a mesh
+_SMALL, _FEW = 0.3, 1000  # maximum size of small objects in metres, and their maximum number of triangles
+CEILING = 2.2  # height above which geoms are hidden in top-down views, in metres
+_SAME = 8  # step to which colours are rounded, on a scale from 0 to 255
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnMesh:
-    """A mesh with a single material."""
+    """A visual mesh with a single material."""
 
     name: str
     visual: VisualMesh
-    high: bool  # True if the mesh is above `CEILING` and over a room, so that top-down views omit it
+    high: bool  # True if the mesh is over a room and hidden in top-down views
 
 
 def make_drawn_meshes(
     pieces: Iterable[ScenePiece], over_floor: Callable[[Floats], Mask]
 ) -> tuple[DrawnMesh, ...]:
-    """Make meshes of all visible pieces.
+    """Create the visual meshes of all visible pieces of a scene.
 
     `over_floor` returns a mask of the points (k, 2), in metres, that are over rooms and not over walls.
     """
@@ -57,14 +57,14 @@ def make_drawn_meshes(
 
 
 def _over(surface: Surface, over_floor: Callable[[Floats], Mask]) -> Mask:
-    """Return a mask (n,) of the triangles whose centre, or a point halfway from it to a corner, is over a room."""
+    """Return a mask (n,) of the triangles that are over a room, judged by four points of each triangle."""
     middle = surface.corners.mean(axis=1)[:, :2]
     halfway = (middle[:, None] + surface.corners[:, :, :2]) / 2
     return np.asarray(over_floor(middle) | over_floor(halfway.reshape(-1, 2)).reshape(-1, 3).any(axis=1))
 
 
 def picture_key(mesh: VisualMesh) -> str:
-    """Return a hash of a mesh's image, or an empty string if it has no image."""
+    """Return a hash of the texture of a mesh, or an empty string if the mesh has no texture."""
     return "" if mesh.picture is None else hashlib.sha256(mesh.picture.tobytes()).hexdigest()[:12]
 
 
@@ -86,9 +86,9 @@ def _by_material(surface: Surface) -> Iterator[Surface]:
 
 
 def _reduced(surface: Surface, count: int) -> Surface:
-    """Simplify a surface of one material to at most about `count` triangles.
+    """Simplify a surface with one material to about `count` triangles.
 
-    Each triangle gets the texture coordinates of the nearest triangle that it replaces.
+    Each triangle takes its texture coordinates from the nearest original triangle.
     """
     if len(surface) <= count:
         return surface

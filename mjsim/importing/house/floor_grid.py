@@ -1,4 +1,4 @@
-"""Floor of a scene as a grid: obstacles, walls, the indoor area, and walkable cells."""
+"""Compute a grid of the floor of a scene, with its obstacles, walls and walkable cells."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +14,16 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.importing.house.solids import Solid
 from mjsim.values.errors import AssetError
 
-CELL = 0.05  # cell size in metres
-BODY = 0.27  # radius of a person's body with a safety margin, in metres
+CELL = 0.05  # side length of a grid cell, in metres
+BODY = 0.27  # radius of a person's body including a safety margin, in metres
 _MAX_AREA = 1500.0
-_BAND = (0.05, 1.8)  # range of heights in metres at which a person bumps into things
-# A wall is solid in each of these ranges of height, in metres.
+_BAND = (0.05, 1.8)  # range of heights in which solids obstruct a person, in metres
+# Ranges of heights, in metres. A wall must be solid in all of them.
 _WALL = ((0.1, 0.5), (0.6, 0.9), (1.0, 1.25), (1.7, 1.9))
-_GAP = 0.6  # openings in outer walls count as closed up to this half width, in metres
+_GAP = 0.6  # half the maximum width of openings that count as closed, in metres
 _PAD = 2 * _GAP + 0.3  # margin of the grid around the scene, in metres
-_DRAWN = 10.0  # additional weight of cells with a drawn floor
-_LEAST_SHARE = 0.15  # walls that enclose a smaller share of the floor are taken for a closet in an open house
+_DRAWN = 10.0  # additional weight of cells in which the source draws a floor
+_LEAST_SHARE = 0.15  # minimum share of the floor that outer walls must enclose
 _MIN_AREA = 3.0  # minimum area enclosed by the walls of a house, in square metres
 
 Mask = NDArray[np.bool_]
@@ -31,15 +31,15 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class FloorGrid:
-    """Grids of the floor. The first axis is x, and all masks have shape (nx, ny)."""
+    """Masks of the cells of a floor. All masks have the shape (nx, ny), and the first axis is x."""
 
     origin: Floats  # lower corner of cell (0, 0) in metres, shape (2,)
     blocked: Mask  # cells with obstacles
     walls: Mask  # cells with walls, including open doors
     doors: Mask
-    indoors: Mask  # area enclosed by the outer walls, including the walls
-    floor: Mask  # cells where the source draws a floor
-    enclosed: bool  # False if no outer walls enclose a floor; `indoors` is then a rectangle
+    indoors: Mask  # cells inside the outer walls, including the walls
+    floor: Mask  # cells in which the source draws a floor
+    enclosed: bool  # False if no outer walls enclose the floor, so that `indoors` is a rectangle
 
     @cached_property
     def free(self) -> Mask:
@@ -47,12 +47,12 @@ class FloorGrid:
 
     @cached_property
     def clearance(self) -> Floats:
-        """Distance from each cell to the nearest obstacle, in metres."""
+        """The distance from each cell to the nearest obstacle, in metres."""
         return clearance(self.free)
 
     @cached_property
     def walkable(self) -> Mask:
-        """Largest connected part of the floor where a person's centre can be. Cells with a drawn floor weigh more."""
+        """The largest connected floor on which a person can stand. Cells with a drawn floor weigh more."""
         parts, count = label(self.clearance > BODY)
         if not count:
             return np.zeros_like(self.free)
@@ -61,11 +61,11 @@ class FloorGrid:
 
     @property
     def area(self) -> float:
-        """Area of the walkable floor, in square metres."""
+        """The area of the walkable floor, in square metres."""
         return float(self.walkable.sum()) * CELL**2
 
     def cell(self, point: Sequence[float] | Floats) -> tuple[int, int]:
-        """Return the cell at a point (x, y) in metres, or the nearest cell if the point is outside the grid."""
+        """Return the cell at a point (x, y) in metres, or the nearest cell for a point outside the grid."""
         found = np.floor((np.asarray(point)[:2] - self.origin) / CELL).astype(int)
         x, y = np.clip(found, 0, np.array(self.free.shape) - 1).tolist()
         return x, y
@@ -77,7 +77,7 @@ class FloorGrid:
 
 
 def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floats) -> FloorGrid:
-    """Make the floor grid of a house.
+    """Compute the floor grid of a house.
 
     Args:
         solids: All solids of the scene except open doors.
@@ -102,10 +102,10 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
     blocked, shut = (_at_heights(shape, origin, chosen, _BAND) for chosen in (solids, doors))
     levels = [_at_heights(shape, origin, solids, band) for band in _WALL]
     drawn = _raster(shape, origin, floor)
-    standing = _box(shape, origin, solids)  # needed because a ground plane extends far beyond the house
-    for count in (len(_WALL), len(_WALL) - 1):  # first with walls up to eye level, then with lower ones
+    standing = _box(shape, origin, solids)  # limits ground planes that extend far beyond the house
+    for count in (len(_WALL), len(_WALL) - 1):  # try walls up to eye level, then lower walls
         walls = np.logical_and.reduce(levels[:count]) | shut
-        # Treat low openings as closed, so that a window with a sill is not taken for a door.
+        # Openings above a sill are treated as closed, so that a window is not taken for a door.
         indoors = _enclosed(walls | levels[0])
         grid = FloorGrid(origin, blocked, walls, shut & ~blocked, indoors, drawn, enclosed=True)
         whole = replace(grid, indoors=_rectangle(drawn), enclosed=False)
@@ -114,7 +114,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
             break
     else:
         grid = whole
-    if not grid.walls.any():  # no wall is high enough, so use everything that people bump into
+    if not grid.walls.any():  # No wall is high enough, so use all solids at knee height instead.
         grid = replace(grid, walls=levels[0] | shut)
     if grid.area > _MAX_AREA:
         raise AssetError(
@@ -129,7 +129,7 @@ def make_floor_grid(solids: Sequence[Solid], doors: Sequence[Solid], floor: Floa
 
 
 def too_large(sides: Floats) -> AssetError:
-    """Make an error about a scene with sides (2,) in metres. It names a unit in which the scene could be a house."""
+    """Create an error about a scene whose sides (2,), in metres, are too long. It suggests a better unit."""
     unit = unit_of(float(sides.max()))
     advice = "give its unit by --units, or --scale" if unit is None else f"try --units {unit}"
     return AssetError(f"spans {_metres(sides)}, and houses have at most {MAX_SIDE:g} m; {advice}")
@@ -140,13 +140,13 @@ def _metres(sides: Floats) -> str:
 
 
 def clearance(free: Mask) -> Floats:
-    """Return the distance in metres from each cell to the nearest cell that is not free, or to the border."""
+    """Return the distance from each cell to the nearest occupied cell or to the border, in metres."""
     padded = np.pad(free, 1)
     return np.asarray(distance_transform_edt(padded)[1:-1, 1:-1] * CELL)
 
 
 def _enclosed(walls: Mask) -> Mask:
-    """Return the area enclosed by walls, including the walls. Openings up to twice `_GAP` count as closed."""
+    """Return the cells enclosed by walls, and the walls. Openings up to twice `_GAP` count as closed."""
     distance = distance_transform_edt(~walls) * CELL if walls.any() else np.full(walls.shape, np.inf)
     parts, _ = label(distance > _GAP)
     border = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
@@ -158,7 +158,7 @@ def _enclosed(walls: Mask) -> Mask:
 
 
 def _rectangle(floor: Mask) -> Mask:
-    """Return the bounding rectangle of a floor, or of the whole scene if no floor is drawn."""
+    """Return the cells in the bounding box of a floor, or of the whole scene if no floor is drawn."""
     edge = round(_PAD / CELL)
     inside = np.zeros_like(floor)
     x, y = np.nonzero(floor)

@@ -1,4 +1,4 @@
-"""Import of a house from a scene of another simulator, with a report of the decisions made."""
+"""Import a house from a scene of another simulator, and report the decisions that were made."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -46,20 +46,20 @@ from mjsim.values.episode import POINTS
 from mjsim.values.errors import AssetError, RenderError
 
 REPORT, PICTURE = "report.json", "preview.png"
-_FLOOR_SEEN = 0.8  # no floor is added if the source draws at least this share of it
-_FEW = 4  # minimum number of obstacles in a house without walls
-# Maximum thickness, range of width and range of height of a door leaf, in metres.
+_FLOOR_SEEN = 0.8  # share of the floor that the source must draw so that no floor is added
+_FEW = 4  # minimum number of obstacles in a house that has no walls
+# Size of a door leaf in metres: maximum thickness, range of widths and range of heights.
 _DOOR = (0.3, (0.45, 3.0), (1.6, 2.8))
 
 
 def import_house(
     source: Path, out: Path, options: HouseOptions, *, label: str | None = None, force: bool = False
 ) -> tuple[tuple[ImportDecision, ...], CheckReport]:
-    """Import a scene as a house into a new folder. Return the decisions, and the report of the check.
+    """Import a scene as a house into a new folder. Return the import decisions and the check report.
 
     Raises:
-        AssetError: The scene cannot be read, is not a house or fails the check, or the folder exists. Nothing is
-            written.
+        AssetError: The scene cannot be read, is not a house or fails the check, or the folder exists.
+            Nothing is written.
     """
     if out.exists() and not force:
         raise AssetError(f"{out} is already there; choose another --out, or use --force to replace it")
@@ -79,7 +79,7 @@ def import_house(
         if found := errors(report.findings):
             raise AssetError(f"{source}: {_refusal(found)}")
         fits = int(report.facts["points that fit"].split()[0])
-        if fits < POINTS:  # use fewer points than fit, because other random samples may leave larger gaps
+        if fits < POINTS:  # Use fewer points than fit, because other random samples may leave larger gaps.
             points = max(fits - 2, 1)
             set_points(path, points)
             report = check_house_name(str(path))
@@ -108,7 +108,7 @@ def _refusal(found: Sequence[Finding]) -> str:
 
 
 def read_scene(source: Path, options: HouseOptions) -> SourceScene:
-    """Read a scene of any supported file type. Raise `AssetError` if the type is unknown or reading fails."""
+    """Read a scene from a file. Raise an AssetError if its type is unknown or the file cannot be read."""
     if not source.is_file():
         raise AssetError(f"there is no file {source}")
     for endings, read in _READERS:
@@ -210,7 +210,7 @@ def _converted(
 
 
 def _check_span(pieces: Sequence[ScenePiece]) -> None:
-    """Raise `AssetError` if the scene is much larger than a house, because its voxels would not fit into memory."""
+    """Raise an AssetError if a scene is much too large for a house. Its voxels would not fit into memory."""
     standing = [p.surface.corners.reshape(-1, 3) for p in pieces if p.solid]
     high = [corners for corners in standing if corners[:, 2].max() > LOW and corners[:, 2].min() < HIGH]
     sides = np.ptp(np.concatenate(high)[:, :2], axis=0) if high else np.zeros(2)
@@ -242,7 +242,7 @@ def _floor(pieces: Sequence[ScenePiece]) -> Floats:
 
 
 def _write_picture(catalogue: Path, out: Path) -> ImportDecision | None:
-    """Draw the house from above. Return a warning if drawing fails, for example because OpenGL is missing."""
+    """Draw the house from above. If this fails, for example without OpenGL, return a line for the report."""
     from mjsim.house.compiled.house import compiled_house
     from mjsim.render.pictures import render_house_map
 

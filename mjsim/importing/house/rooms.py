@@ -1,4 +1,4 @@
-"""Rooms of an imported house. They come from the source or the user, or else are separated at narrow passages."""
+"""Find the rooms of an imported house. Unless rooms are given, the floor is split at narrow passages."""
 
 import re
 import tomllib
@@ -19,16 +19,16 @@ from mjsim.importing.house.floor_grid import CELL, FloorGrid, Mask, clearance
 from mjsim.support.files import read_text
 from mjsim.values.errors import AssetError, brief
 
-# Half widths, in metres, of passages that separate rooms. All except the first are only for large floors.
+# Half the widths of passages that separate rooms, in metres. All except the first are for large rooms only.
 _NARROW = (0.65, 0.9, 1.2, 1.5, 1.8)
-_HALL = 45.0  # floor area in square metres above which a room is divided at wider passages
-_HALL_PART = 5.0  # a room is divided only if at least two parts are larger than this, in square metres
-# Minimum floor area of a room in square metres; smaller rooms are merged with their neighbours.
+_HALL = 45.0  # floor area above which a room is split at wider passages, in square metres
+_HALL_PART = 5.0  # floor area that two parts of a split room must exceed, in square metres
+# Minimum floor area of a room in square metres. Smaller rooms are merged with adjacent rooms.
 _MIN_AREA = 1.5
 _MIN_WALK = 0.5  # minimum walkable area of a room, in square metres
-_COARSE = 2  # side, in cells, of the blocks that make up a room's rectangles
-_LARGE = 0.5  # minimum size of furniture that determines a room's use, in metres
-# Key, label and groups of words. A room gets the first use for which its furniture has a word of every group.
+_COARSE = 2  # side length of the blocks that make up the rectangles of a room, in cells
+_LARGE = 0.5  # minimum size of furniture that determines the use of a room, in metres
+# Key, label and word groups of each use. A room needs furniture that matches a word of every group.
 _USES = (
     ("living_kitchen", "Living room with kitchen", ("kitchen fridge refrigerator", "sofa couch")),
     (
@@ -48,15 +48,15 @@ Labels = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Rooms:
-    """Rooms on a floor grid."""
+    """The rooms of a house on a floor grid."""
 
-    names: tuple[tuple[str, str], ...]  # key and label of each room, starting with room 1
+    names: tuple[tuple[str, str], ...]  # key and label of each room; the first entry is room 1
     labels: Labels  # room number of each cell, or 0 for none, shape (nx, ny)
-    floor: Mask  # cells of rooms without their walls, shape (nx, ny)
+    floor: Mask  # cells of all rooms without the walls, shape (nx, ny)
     reason: str  # explanation of how the rooms were found, for the report
 
     def rectangles(self, grid: FloorGrid) -> list[tuple[str, Floats, Floats]]:
-        """Return rectangles that cover the rooms: room key, lower corner (2,) and upper corner (2,) in metres."""
+        """Return rectangles that cover all rooms, each as room key, lower and upper corner (2,) in metres."""
         found = []
         nx, ny = (np.array(self.labels.shape) // _COARSE).tolist()
         blocks = self.labels[: nx * _COARSE, : ny * _COARSE].reshape(nx, _COARSE, ny, _COARSE)
@@ -69,7 +69,7 @@ class Rooms:
         return found
 
     def shell(self, grid: FloorGrid) -> list[tuple[Floats, Floats]]:
-        """Return boxes that close off what is outside the rooms: lower corner (2,) and upper corner (2,) in metres."""
+        """Return boxes that block the area around the rooms, as lower and upper corners (2,) in metres."""
         inside = binary_dilation(self.labels > 0)
         rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
         across, along = (slice(max(at[0] - 4, 0), at[-1] + 5) for at in (rows, columns))
@@ -90,7 +90,7 @@ class _RoomTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
-    """Read rooms from a TOML file. Raise `AssetError` if the file has no valid rooms."""
+    """Read rooms from a TOML file. Raise an AssetError if the file contains no rooms or invalid ones."""
     try:
         tables = tomllib.loads(read_text(path))
         rooms = msgspec.convert(tables.get("rooms", {}), dict[str, _RoomTable])
@@ -106,7 +106,7 @@ def read_rooms(path: Path) -> tuple[NamedRoom, ...]:
 
 
 def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[ScenePiece]) -> Rooms:
-    """Find rooms that cover all reachable floor. Raise `AssetError` if the given rooms cover none of it."""
+    """Divide the reachable floor into rooms. Raise an AssetError if the given rooms cover none of it."""
     if given:
         seeds, reason = _seeds_of(grid, given), "given"
         names = [(room.key, room.label) for room in given]
@@ -124,7 +124,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
     ]
     if not kept and given:
         raise AssetError("no given room has walkable floor; boxes are in the source's coordinates, in m")
-    if not kept:  # no part is large enough to be a room
+    if not kept:  # No part is large enough to be a room.
         seeds, kept, reason = grid.walkable.astype(np.int32), [1], "one room"
     numbered = np.zeros(int(seeds.max()) + 1, np.int32)
     numbered[kept] = np.arange(1, len(kept) + 1)
@@ -136,7 +136,7 @@ def find_rooms(grid: FloorGrid, given: Sequence[NamedRoom], pieces: Sequence[Sce
 
 
 def _parted(floor: Mask) -> Labels:
-    """Divide a floor without furniture into rooms at narrow passages. Return room numbers, shape (nx, ny)."""
+    """Split a floor without furniture at narrow passages. Return the room numbers, shape (nx, ny)."""
     distance = clearance(floor)
     labels = np.zeros(floor.shape, np.int32)
     waiting = [(floor, 0)]
@@ -144,7 +144,7 @@ def _parted(floor: Mask) -> Labels:
         region, level = waiting.pop()
         seeds, count = label(region & (distance > _NARROW[level]))
         parts = seeds
-        # Grow through wide places first, so that rooms meet at narrow ones.
+        # Fill wide areas first, so that rooms meet at narrow passages.
         for depth in np.arange(_NARROW[level], -CELL, -CELL):
             parts = _grown(parts, region & (distance > depth))
         sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:] * CELL**2
@@ -169,7 +169,7 @@ def _seeds_of(grid: FloorGrid, given: Sequence[NamedRoom]) -> Labels:
 
 
 def _grown(seeds: NDArray[np.integer], region: Mask) -> Labels:
-    """Grow labels over a region, around corners but not across cells outside the region."""
+    """Extend the labels to all cells of a region that are connected to a labelled cell."""
     labels = np.where(region, seeds, 0).astype(np.int32)
     while True:
         fresh = np.where(region & (labels == 0), _spread(labels, cv2.MORPH_CROSS), labels)
@@ -204,5 +204,5 @@ def _names(
 
 
 def _spread(labels: Labels, shape: int) -> Labels:
-    kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV cannot dilate integers
+    kernel = cv2.getStructuringElement(shape, (3, 3))  # OpenCV cannot dilate 32-bit integers.
     return np.asarray(cv2.dilate(labels.astype(np.float32), kernel), np.int32)

@@ -1,4 +1,4 @@
-"""Collision geometry of an imported house: boxes, convex hulls and boxes of merged voxels, limited in number."""
+"""Create the collision geometry of an imported house from boxes, convex hulls and merged voxels."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -14,36 +14,36 @@ from mjsim.formats.scene.source_scene import ScenePiece, merged_rectangles
 from mjsim.formats.scene.surface import Floats
 from mjsim.importing.object.parts import _few_vertices
 
-BUDGET = 1500  # maximum number of colliding geoms
-# People step over solids below this range of heights and pass under those above it, in metres.
+BUDGET = 1500  # maximum number of colliding geoms in a house
+# Range of heights, in metres, in which solids obstruct people. Solids below and above it are left out.
 LOW, HIGH = 0.051, 1.9
-# Possible voxel sizes in metres; the first one within the budget is used.
+# Voxel sizes in metres. The first size for which the number of geoms is within the budget is used.
 _PITCHES = (0.05, 0.075, 0.1, 0.15, 0.2)
-_BOX = 0.95  # a mesh is a box if its hull fills at least this share of its bounding box
-_CONVEX = 0.85  # a mesh is convex if it fills at least this share of its hull
-_SMALL = 0.5  # a mesh smaller than this is replaced by its hull, in metres
-_HANGING = 1.6  # lamps and pictures above this height do not collide, in metres
-# Furniture that begins above this height, in metres, becomes a box. A hull would seem to cover the floor below it.
+_BOX = 0.95  # minimum share of its bounding box that a box-shaped hull fills
+_CONVEX = 0.85  # minimum share of its hull that a convex mesh fills
+_SMALL = 0.5  # size below which a mesh is replaced by its hull, in metres
+_HANGING = 1.6  # height above which lamps and pictures do not collide, in metres
+# Height in metres above which furniture becomes a box. A hull would appear to cover the floor below.
 _OVERHEAD = 0.8
-_FURNITURE = 1.5  # maximum side of furniture in metres; its inside counts as filled
-_ROOM = (2.0, 2.0, 1.8)  # closed meshes larger than this in metres are hollow rooms rather than blocks
-_FEW = 30  # maximum number of voxel boxes for a piece of furniture
-_MAX_PARTS = 60  # maximum number of connected parts of a piece that are processed one by one
+_FURNITURE = 1.5  # maximum side length of furniture, whose inside counts as filled, in metres
+_ROOM = (2.0, 2.0, 1.8)  # size in metres above which a closed mesh is a hollow room, not a block
+_FEW = 30  # maximum number of voxel boxes in a piece of furniture
+_MAX_PARTS = 60  # maximum number of connected parts of a piece that are processed individually
 _THIN = 0.01  # minimum thickness of colliding geoms, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A convex part that collides."""
+    """A convex collision shape."""
 
     name: str
-    low: Floats  # lower corner in metres, shape (3,)
-    high: Floats  # upper corner in metres, shape (3,)
-    hull: Floats | None = None  # vertices (k, 3) in metres, or None for a box
+    low: Floats  # lower corner of the bounding box in metres, shape (3,)
+    high: Floats  # upper corner of the bounding box in metres, shape (3,)
+    hull: Floats | None = None  # vertices of a hull in metres, shape (k, 3), or None for a box
 
     @property
     def outline(self) -> Floats:
-        """Points (k, 2), in metres, whose convex hull is the outline seen from above."""
+        """The points (k, 2), in metres, whose convex hull is the outline of the solid seen from above."""
         if self.hull is not None:
             return self.hull[:, :2]
         (a, b), (c, d) = self.low[:2], self.high[:2]
@@ -52,17 +52,17 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Collision geometry of a whole house."""
+    """The collision geometry of a house."""
 
     solids: tuple[Solid, ...]
     boxes: int
     hulls: int
-    voxels: int  # number of boxes made of merged voxels
-    pitch: float  # side of a voxel, in metres
+    voxels: int  # number of boxes that were merged from voxels
+    pitch: float  # side length of a voxel, in metres
 
 
 def make_solids(pieces: Iterable[ScenePiece]) -> Solids:
-    """Make convex parts for all solid pieces at the height of a person."""
+    """Create the collision shapes of all solid pieces of a scene at the height of a person."""
     simple: list[Solid] = []
     rest: list[tuple[str, trimesh.Trimesh]] = []
     things: dict[str, list[trimesh.Trimesh]] = {}
@@ -99,7 +99,7 @@ def _parts(piece: ScenePiece) -> Iterator[trimesh.Trimesh]:
 
 
 def _together(meshes: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Join the parts of a piece of furniture if there are many, such as the keys of a keyboard."""
+    """Merge the parts of a piece of furniture if there are many, such as the keys of a keyboard."""
     if len(meshes) <= _FEW or not _compact(np.ptp([m.bounds for m in meshes], axis=(0, 1))):
         return meshes
     return [trimesh.util.concatenate(meshes)]
@@ -129,7 +129,7 @@ def _simple(name: str, mesh: trimesh.Trimesh) -> Solid | None:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Return vertices (k, 3). If all are in a plane or on a line, add shifted copies of them."""
+    """Add shifted copies of points (k, 3) if all of them are in a plane or on a line."""
     for axis in np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][::-1][:2]:
         if np.ptp(points @ axis) < _THIN:
             points = np.concatenate([points - axis * _THIN / 2, points + axis * _THIN / 2])
@@ -137,7 +137,7 @@ def _thickened(points: Floats) -> Floats:
 
 
 def _filled(mesh: trimesh.Trimesh, hull: trimesh.Trimesh) -> bool:
-    """Return True if a mesh nearly fills its hull. Volumes are compared if it is closed, otherwise areas."""
+    """Return True if a mesh nearly fills its hull. If the mesh is open, compare areas instead of volumes."""
     if mesh.is_watertight:
         return bool(abs(mesh.volume) > _CONVEX * hull.volume)
     return bool(abs(mesh.area - hull.area) < (1 - _CONVEX) * hull.area and _compact(mesh.extents))
@@ -149,7 +149,7 @@ def _box(name: str, low: Floats, high: Floats) -> Solid:
 
 
 def _compact(extents: Floats) -> bool:
-    """Return True for extents of furniture, whose inside counts as filled, and False for those of walls."""
+    """Return True if a solid is small enough for furniture, and False if it is a wall."""
     return bool(extents[:2].max() < _FURNITURE)
 
 
@@ -163,12 +163,12 @@ def _few_voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> list[Solid]:
 
 
 def _voxels(name: str, mesh: trimesh.Trimesh, pitch: float) -> Iterator[Solid]:
-    """Yield boxes of merged voxels around a surface, each shrunk to the part of the surface inside it."""
+    """Yield boxes of merged voxels around a surface. Each box is shrunk to the surface inside it."""
     samples = _samples(np.asarray(mesh.triangles), pitch / 2)
     samples = samples[samples[:, 2] < HIGH + pitch]
     if not len(samples):
         return
-    # The offset keeps faces away from cell borders, because walls are often multiples of 5 cm thick.
+    # The offset keeps the faces of walls away from cell borders. Walls are often multiples of 5 cm thick.
     origin = samples.min(axis=0) - 0.3 * pitch
     cells = np.floor((samples - origin) / pitch).astype(int)
     grid = np.zeros(cells.max(axis=0) + 1, bool)
@@ -201,9 +201,9 @@ def _samples(corners: Floats, step: float) -> Floats:
 
 
 def merged_boxes(grid: NDArray[np.bool_]) -> Iterator[tuple[tuple[int, int, int], tuple[int, int, int]]]:
-    """Yield boxes (first cell, exclusive end cell) that together cover each cell of a grid (nx, ny, nz) once.
+    """Yield boxes that together cover each True cell of a grid (nx, ny, nz) exactly once.
 
-    Columns with the same profile are merged into rectangles, so that walls and tables give few boxes.
+    Columns with the same profile are merged, so that walls and tables give few boxes. Box ends are exclusive.
     """
     packed = np.packbits(grid, axis=2)
     profiles, index = np.unique(packed.reshape(-1, packed.shape[2]), axis=0, return_inverse=True)

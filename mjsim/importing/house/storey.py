@@ -1,4 +1,4 @@
-"""Selection of the storey that becomes the house, from a scene with several storeys."""
+"""Select one storey of a scene with several storeys."""
 
 from collections.abc import Sequence
 
@@ -9,18 +9,18 @@ from mjsim.house.validation.object_rules import SIZE
 from mjsim.importing.house.solids import LOW
 from mjsim.values.errors import AssetError
 
-_STOREY = 2.1  # minimum height of a storey, in metres
-_LEVEL = 0.4  # minimum area of a floor, relative to the level with the largest area
-# Resolution of heights, and range of heights in which layers form one floor, in metres.
+_STOREY = 2.1  # minimum distance between two storeys, in metres
+_LEVEL = 0.4  # minimum area of a floor, relative to the largest area at any height
+# Resolution of heights, and maximum distance between layers of the same floor, in metres.
 _BIN, _STEP = 0.02, 0.3
-_UPWARD = 0.2  # if a larger share of level surfaces faces upwards, all other surfaces are ignored
-_FLAT = 0.95  # cosine of the maximum slope of a floor
-FAR = 200.0  # size in metres above which a scene is not a house in any unit
-_MOST = 0.9  # distant pieces are removed only if at least this share of all pieces is near
+_UPWARD = 0.2  # share of level surfaces that must face up for the others to be ignored
+_FLAT = 0.95  # cosine of the maximum slope angle of a floor
+FAR = 200.0  # size above which a scene cannot be a house, in metres
+_MOST = 0.9  # minimum share of nearby pieces for distant pieces to be removed
 
 
 def near_pieces(pieces: Sequence[ScenePiece]) -> tuple[list[ScenePiece], list[ImportDecision]]:
-    """Remove a few pieces that are far away, such as objects that fell through a simulated floor."""
+    """Remove pieces that are far from most others, such as objects that fell through the floor."""
     middles = np.array([piece.surface.corners.mean(axis=(0, 1)) for piece in pieces])
     near = np.abs(middles - np.median(middles, axis=0)).max(axis=1) < FAR
     if near.all() or near.mean() < _MOST:
@@ -31,14 +31,14 @@ def near_pieces(pieces: Sequence[ScenePiece]) -> tuple[list[ScenePiece], list[Im
 
 
 def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:
-    """Return the heights of the floor and of the next floor above it, in metres. The latter may be infinite."""
+    """Return the heights of the lowest floor and of the floor above it (or infinity), in metres."""
     corners = np.concatenate([p.surface.corners for p in pieces])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     area = np.linalg.norm(normals, axis=1)
     flat = np.abs(normals[:, 2]) > _FLAT * np.maximum(area, 1e-12)
     upward = flat & (normals[:, 2] > 0)
     if area[upward].sum() > _UPWARD * area[flat].sum():
-        flat = upward  # ignore the undersides of slabs
+        flat = upward  # Ignore the undersides of slabs.
     heights = corners[flat, :, 2].mean(axis=1)
     if not len(heights):
         raise AssetError("has no level surface; is it a house, and which way is up (--up)?")
@@ -47,22 +47,22 @@ def floor_and_ceiling(pieces: Sequence[ScenePiece]) -> tuple[float, float]:
     total = np.bincount(bins - first, area[flat])
     wide = np.convolve(total, np.ones(3))[1:-1]
     levels = np.flatnonzero(wide >= _LEVEL * wide.max())
-    # Ground, slab and floor are often separate layers.
+    # The ground, the slab and the floor are often separate layers.
     near_ground = levels[levels <= levels[0] + round(_STEP / _BIN)]
     lowest = near_ground[np.argmax(total[near_ground])] if np.ptp(near_ground) <= 2 else near_ground[-1]
-    if (lowest + first) * _BIN >= corners[:, :, 2].max() - LOW:  # no floor was found, only the tops of walls
+    if (lowest + first) * _BIN >= corners[:, :, 2].max() - LOW:  # Only wall tops were found, no floor.
         return float(corners[:, :, 2].min()), np.inf
     near = np.abs(bins - first - lowest) <= 1
     order = np.argsort(heights[near])
     share = np.cumsum(area[flat][near][order])
-    # Median height, weighted by area.
+    # The floor height is the median, weighted by area.
     floor = float(heights[near][order][np.searchsorted(share, share[-1] / 2)])
     above = [height for height in (levels + first) * _BIN if height > floor + _STOREY]
     return floor, (min(above) if above else np.inf)
 
 
 def of_one_storey(pieces: list[ScenePiece], ceiling: float) -> tuple[list[ScenePiece], list[ImportDecision]]:
-    """Remove loose objects, and everything above the ceiling height, in metres, or below the floor."""
+    """Remove loose objects, and all geometry below the floor or above `ceiling`, in metres."""
     kept, loose = [], []
     dropped = 0
     for piece in pieces:
@@ -88,5 +88,5 @@ def of_one_storey(pieces: list[ScenePiece], ceiling: float) -> tuple[list[SceneP
 
 
 def counted(number: int, what: str) -> str:
-    """Format a number with a noun, which is in the plural if necessary."""
+    """Format a number followed by a noun, in the plural if necessary."""
     return f"{number:,} {what}{'' if number == 1 else 's'}"

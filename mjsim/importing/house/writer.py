@@ -1,4 +1,4 @@
-"""Writer for the files of an imported house. The same house gives the same bytes."""
+"""Write the files of an imported house. Equal houses always give identical files."""
 
 import json
 import re
@@ -22,29 +22,29 @@ from mjsim.importing.object.model_writer import comment, obj_lines, write_png
 
 MODEL = "house.xml"
 MESHES = "meshes"
-_HEIGHT = 2.5  # height of the boxes that close off the house, in metres
+_HEIGHT = 2.5  # height of the boxes around the rooms, in metres
 _DEPTH = 0.1  # thickness of the colliding floor, in metres
-# Depth of an added floor below z = 0 in metres, so that it does not hide rugs and floors of the source.
+# Depth of the added floor below z = 0, in metres. The floor must not hide rugs and floors of the source.
 _UNDER = 0.002
 _LIGHTS = (("0 0 -1", 0.25), ("0.7 1 -0.5", 0.28), ("-1 -0.7 -0.5", 0.25), ("0.2 0.5 1", 0.3))
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedHouse:
-    """Contents of an imported house's files."""
+    """An imported house that can be written to files."""
 
-    label: str  # name shown to participants
+    label: str  # name of the house shown to participants
     source: str  # name of the source file
     solids: Sequence[Solid]
     looks: Sequence[DrawnMesh]
     grid: FloorGrid
     rooms: Rooms
     bins: Sequence[Bin]
-    floor_seen: bool  # True if the source draws a floor
+    floor_seen: bool  # True if the source draws most of the floor
 
 
 def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Path:
-    """Write a house into an existing folder, with categories of another catalogue. Return the new catalogue's file."""
+    """Write a house with the objects of a catalogue to a folder. Return the path of the new catalogue."""
     (folder / MESHES).mkdir()
     lines = [
         f"<mujoco model={quoteattr(_name(house.label))}>",
@@ -73,7 +73,7 @@ def write_house(house: ImportedHouse, folder: Path, catalogue: Catalogue) -> Pat
 
 
 def set_points(catalogue: Path, points: int) -> None:
-    """Change the number of drop points in a catalogue file."""
+    """Set the number of points for objects in a catalogue file."""
     text = catalogue.read_text(encoding="utf-8")
     catalogue.write_text(text.replace("[house]\n", f"[house]\npoints = {points}\n", 1), encoding="utf-8")
 

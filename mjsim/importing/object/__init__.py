@@ -1,1 +1,1 @@
-"""Importer for objects from mesh files into a house's catalogue."""
+"""Import objects from mesh files into the catalogue of a house."""

@@ -1,4 +1,4 @@
-"""Closed bodies made from surfaces, and their mass. Holes are filled. Pieces that stay open become convex hulls."""
+"""Close the holes of surfaces, and compute the mass of the closed bodies."""
 
 from dataclasses import dataclass
 
@@ -9,30 +9,30 @@ from mjsim.formats.scene.surface import Floats
 from mjsim.house.validation.object_rules import MASS
 from mjsim.values.errors import AssetError
 
-MAX_TRIANGLES = 20_000  # maximum number of triangles of a surface; finer surfaces are simplified first
-MAX_PIECES = 400  # maximum number of pieces of a surface that are closed one by one
-SHEET = 0.001  # thickness given to a flat sheet, in metres
+MAX_TRIANGLES = 20_000  # maximum number of triangles of a surface; finer surfaces are simplified
+MAX_PIECES = 400  # maximum number of pieces of a surface that are closed individually
+SHEET = 0.001  # thickness that is given to a flat sheet, in metres
 MIN_MASS, MAX_MASS = MASS
-DENSITY = 400.0  # kg/m^3; lower than wood, higher than cloth and hollow plastic
-_MIN_GYRATION = 0.005  # minimum radius of gyration in metres, that of a body as wide as the thinnest part
-_GENTLE = 3  # how aggressively edges are collapsed, from 1 to 10; the default is 7
-_FLAT = 1e-5  # width in metres up to which points count as lying in a plane
+DENSITY = 400.0  # default density in kg/m^3, between that of cloth and that of wood
+_MIN_GYRATION = 0.005  # minimum radius of gyration of an object, in metres
+_GENTLE = 3  # aggressiveness of the mesh simplification, from 1 to 10; the default is 7
+_FLAT = 1e-5  # maximum thickness of a set of points that counts as flat, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedBody:
-    """A closed body, with the repairs that were needed to close it."""
+    """A closed body, and the repairs that were needed to close it."""
 
-    mesh: trimesh.Trimesh  # surface in metres with outward normals; the enclosed volume is positive
-    pieces: int  # number of connected pieces of the surface
+    mesh: trimesh.Trimesh  # closed surface in metres, with outward normals
+    pieces: int  # number of connected pieces of the original surface
     filled: int = 0  # number of pieces whose holes were filled
     hulled: int = 0  # number of pieces replaced by their convex hulls
-    flat: bool = False  # True for a flat sheet that was given a thickness
-    open_share: float = 0.0  # share of the surface's area that belongs to pieces replaced by hulls
+    flat: bool = False  # True if the surface was a flat sheet and was given a thickness
+    open_share: float = 0.0  # share of the surface area in pieces that were replaced by hulls
 
 
 def close(mesh: trimesh.Trimesh) -> ClosedBody:
-    """Close a surface. All of its triangles must have an area above 0."""
+    """Close the holes of a surface. All of its triangles must have an area above 0."""
     sheet = _thickened_sheet(mesh.vertices)
     if sheet is not None:
         return ClosedBody(sheet, 1, flat=True)
@@ -46,9 +46,9 @@ def close(mesh: trimesh.Trimesh) -> ClosedBody:
 
 
 def simplified(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """Simplify a mesh to at most about `faces` faces by quadric edge collapse (Garland and Heckbert 1997).
+    """Simplify a mesh to about `faces` faces by quadric edge collapse (Garland and Heckbert, 1997).
 
-    Thin wires cannot be collapsed, and whole pieces would disappear instead. Such a mesh keeps more faces.
+    A mesh with thin wires keeps more faces, because whole pieces would disappear otherwise.
     """
     if len(mesh.faces) <= faces:
         return mesh
@@ -67,7 +67,7 @@ def _as_it_is(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
         whole.invert()
     shells = whole.split(only_watertight=False, repair=False) if whole.body_count > 1 else []
     overlapping = sum(shell.volume > 0 for shell in shells) > 1 or any(s.volume < 0 for s in shells)
-    # Nested shells may be cavities or pieces turned inside out, so only a single body is accepted.
+    # Nested shells may be cavities or inverted pieces. Accept them only if there is a single outer shell.
     return None if overlapping and not _is_hollow(shells) else whole if whole.volume > 0 else None
 
 
@@ -87,7 +87,7 @@ def _piecewise(mesh: trimesh.Trimesh) -> ClosedBody:
         body = _closed_piece(piece)
         if body is not None:
             filled += not piece.is_watertight
-        elif np.sort(_spread(piece.vertices)[0])[1] > _FLAT:  # otherwise the piece is a line
+        elif np.sort(_spread(piece.vertices)[0])[1] > _FLAT:  # Leave out pieces that are only lines.
             hulled += 1
             area += piece.area
             body = _thickened_sheet(piece.vertices) or _hull(piece.vertices)
@@ -107,7 +107,7 @@ def _closed_piece(piece: trimesh.Trimesh) -> trimesh.Trimesh | None:
     body.fix_normals(multibody=False)
     if body.volume < 0:
         body.invert()
-    # A hole filled with a fan of triangles may bulge beyond the hull.
+    # A hole that is filled with a fan of triangles may bulge beyond the hull.
     enclosed = body.is_volume and body.volume <= 1.001 * body.convex_hull.volume
     return body if enclosed and body.volume > 0.01 * body.convex_hull.volume else None
 
@@ -124,7 +124,7 @@ def _hull(points: Floats) -> trimesh.Trimesh:
 
 
 def _thickened_sheet(points: Floats) -> trimesh.Trimesh | None:
-    """Return a slab around points (n, 3) in one plane, or None if they are not in a plane."""
+    """Return a thin slab around points (n, 3), or None if the points are not in a plane."""
     spread, axes = _spread(points)
     if spread[2] > _FLAT:
         return None
@@ -133,7 +133,7 @@ def _thickened_sheet(points: Floats) -> trimesh.Trimesh | None:
 
 
 def _spread(points: Floats) -> tuple[Floats, Floats]:
-    """Return the extents (3,) of points (n, 3) along their principal axes, and these axes (3, 3), longest first."""
+    """Return the extents (3,) of points (n, 3) along their principal axes, and the axes as rows (3, 3)."""
     offsets = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(offsets.T @ offsets)
     axes = axes.T[::-1]
@@ -141,16 +141,16 @@ def _spread(points: Floats) -> tuple[Floats, Floats]:
 
 
 def is_closed(mesh: trimesh.Trimesh) -> bool:
-    """Return True if no edge is the rim of a hole. Pieces may touch each other along edges."""
+    """Return True if a surface has no holes. Its pieces may touch each other along edges."""
     _, counts = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
     return bool(np.all(counts % 2 == 0))
 
 
 @dataclass(frozen=True, eq=False)
 class Weight:
-    """Mass properties of an object."""
+    """The mass, centre of mass and inertia of an object."""
 
-    mass: float  # mass in kg
+    mass: float  # mass of the object in kg
     centre: Floats  # centre of mass in metres, shape (3,)
     inertia: Floats  # inertia about the centre of mass in kg m^2, shape (3, 3)
     reason: str  # explanation of how the mass was determined, for the report
@@ -163,9 +163,9 @@ class Weight:
 
 
 def weigh(body: trimesh.Trimesh, *, mass: float | None, density: float | None) -> Weight:
-    """Compute the mass properties of a closed body in metres from its mass (kg), its density (kg/m^3), or `DENSITY`.
+    """Compute the mass properties of a closed body from a mass in kg, a density in kg/m^3, or `DENSITY`.
 
-    Raise `AssetError` if a hand cannot carry the mass.
+    Raise an AssetError if the mass is outside the range that a hand can carry.
     """
     volume = float(body.volume)
     litres = f"{1e3 * volume:.3g} litres"
@@ -186,9 +186,9 @@ def weigh(body: trimesh.Trimesh, *, mass: float | None, density: float | None) -
 
 
 def _inertia(body: trimesh.Trimesh, mass: float) -> Floats:
-    """Return the inertia (3, 3) about the centre of mass in kg m^2, at least that of a thin rod about its axis."""
+    """Return the inertia (3, 3) about the centre of mass in kg m^2. No principal moment is close to zero."""
     values, axes = np.linalg.eigh(np.asarray(body.moment_inertia) * mass / body.volume)
     values = np.maximum(values, mass * _MIN_GYRATION**2)
-    # Physical limit, which a self-intersecting body may violate.
+    # The largest moment cannot exceed the sum of the others, unless the body intersects itself.
     values[2] = min(values[2], values[0] + values[1])
     return np.asarray(axes @ np.diag(values) @ axes.T)

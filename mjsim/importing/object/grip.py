@@ -1,4 +1,4 @@
-"""Grasp of an object from above at a rim, a bar or a flat top."""
+"""Find a point where a hand can grasp an object from above, such as a rim, a bar or a flat top."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,25 @@ import trimesh
 
 from mjsim.formats.scene.surface import Floats
 
-MAX_OFFSET = 0.15  # maximum horizontal distance from a carried object's centre of mass to the hand, in metres
-_RIM = 0.01  # depth below the highest point in metres; lower points may be at the bottom of a hollow object
-_POINTS = 100_000  # number of surface points from which the grip is chosen
-_FINGERS = 0.02  # radius around the nearest point in which the hand may grasp the crest, in metres
-_CREST = 0.001  # points count as part of the crest up to this depth below it, in metres
-_ABOVE = 0.005  # points within this horizontal distance count as above the centre of mass, in metres
+MAX_OFFSET = 0.15  # maximum horizontal distance from an object's centre of mass to the hand, in metres
+_RIM = 0.01  # maximum depth of the grasped point below the top of the object, in metres
+_POINTS = 100_000  # number of random surface points from which the grip is chosen
+_FINGERS = 0.02  # radius around the best point within which the hand may grasp the object, in metres
+_CREST = 0.001  # maximum depth of the grasped point below the highest point around it, in metres
+_ABOVE = 0.005  # horizontal distance within which a point counts as above the centre of mass, in metres
 
 
 @dataclass(frozen=True, eq=False)
 class Grip:
-    """A grasp of an object."""
+    """The point and the direction in which a hand grasps an object."""
 
-    point: Floats  # grasped point in metres, shape (3,)
+    point: Floats  # point that the hand grasps, in metres, shape (3,)
     yaw: float  # direction of the fingers in radians, across the rim towards the centre of mass
-    offset: float  # horizontal distance from the centre of mass, in metres
+    offset: float  # horizontal distance of the point from the centre of mass, in metres
 
 
 def find_grip(mesh: trimesh.Trimesh, centre: Floats) -> Grip:
-    """Find the point at the top of an object's surface, in metres, that is nearest to a vertical through `centre`."""
+    """Find the point on top of an object that is horizontally closest to its centre of mass, in metres."""
     sampled, _ = trimesh.sample.sample_surface(mesh, _POINTS, seed=0)
     points = _upper(np.concatenate((mesh.vertices, sampled)), _RIM)
     if (near := _horizontal_distances(points, centre) < _ABOVE).any():

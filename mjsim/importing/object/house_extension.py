@@ -1,4 +1,4 @@
-"""Catalogue that extends a house with imported objects. Each has its own folder, which is written atomically."""
+"""Extend a house with imported objects. Each object has its own folder, which is written atomically."""
 
 import json
 import os
@@ -21,10 +21,10 @@ from mjsim.importing.object.model_writer import MODEL
 from mjsim.support.files import exchange, read_text, work_folder, write_text_atomically
 from mjsim.values.errors import AssetError
 
-HELD = 4  # minimum number of identical objects that a bin must hold, judged by their bounding boxes
-_SLOTS = 2  # number of slots along each side of a bin (mjsim.world.body.slots)
+HELD = 4  # minimum number of identical objects that must fit into a bin
+_SLOTS = 2  # number of slots along each side of a bin, as in `mjsim.world.body.slots`
 MAX_LABEL = 40
-_UNNAMED = ".unnamed"  # file that marks the folder of an object that is not in the catalogue yet
+_UNNAMED = ".unnamed"  # name of a file that marks an object that is not in the catalogue yet
 _WALL_GAP = 0.02  # gap between an object and the walls of its bin, in metres
 _HEADER = "# Objects that a house has in addition. Run in it with --house and the path of this file.\nextends = {}\n"
 _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {model}\n"
@@ -32,15 +32,15 @@ _ENTRY = "\n[objects.{key}]\nlabel = {label}\ncategory = {category}\nmodel = {mo
 
 @dataclass(frozen=True)
 class CatalogueEntry:
-    """Names of an object in a catalogue."""
+    """The key, the label and the category of an object in a catalogue."""
 
-    key: str  # catalogue key, which is also the name of the object's folder
-    label: str  # name shown to participants
+    key: str  # key in the catalogue, which is also the name of the object's folder
+    label: str  # object name shown to participants
     category: str
 
     @classmethod
     def named(cls, name: str, category: str) -> "CatalogueEntry":
-        """Make an entry from a name such as `Toy robot`. Raise `AssetError` if the name gives no valid key."""
+        """Create an entry from a name such as `Toy robot`. Raise an AssetError if the name is not valid."""
         label = " ".join(name.replace("_", " ").split())
         plain = unicodedata.normalize("NFKD", label.lower()).encode("ascii", "ignore").decode()
         key = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
@@ -52,12 +52,12 @@ class CatalogueEntry:
 
 
 class HouseExtension:
-    """A folder, which need not exist yet, with a catalogue that extends a house with imported objects."""
+    """A folder with a catalogue that extends a house with imported objects. It is created when needed."""
 
     def __init__(self, folder: Path, house: str | None = None) -> None:
-        """Open or plan a folder that extends `house`. By default, this is the house it extended before, or `apartment`.
+        """Open or prepare a folder that extends `house`. A new folder extends `apartment` by default.
 
-        Raise `AssetError` if it is not a folder, or its catalogue is invalid or extends another house.
+        Raise an AssetError if `folder` is a file, or if its catalogue is invalid or extends another house.
         """
         self.folder = folder
         self.path = folder / CATALOGUE
@@ -75,7 +75,7 @@ class HouseExtension:
             self._text = _HEADER.format(json.dumps(_reference(house or "apartment", folder)))
 
     def check(self, entry: CatalogueEntry, *, force: bool) -> None:
-        """Check that an object can be added, before its model is computed.
+        """Check that an object can be added. Call this before computing its model.
 
         Raises:
             AssetError: The category is unknown, or the key is in use.
@@ -97,9 +97,9 @@ class HouseExtension:
             raise AssetError(f"{mine} is not an imported object and is not replaced; choose another --name")
 
     def fit(self, entry: CatalogueEntry, size: Floats) -> ImportDecision:
-        """Report how an object with extents (3,), in metres, fits into the bin of its category.
+        """Check that an object of size (3,), in metres, fits into its bin, and return a line for the report.
 
-        Raise `AssetError` if the bin holds so few of them that a clean-up could be impossible.
+        Raise an AssetError if so few objects of this size fit into the bin that a task could be impossible.
         """
         receptacle = self.catalogue.receptacles[self.catalogue.categories[entry.category].receptacle]
         room = 2 * compiled_house(self.catalogue).receptacles[receptacle.key].half_size
@@ -114,9 +114,9 @@ class HouseExtension:
         return ImportDecision("size", f"{sides} m", f"{receptacle.label} has {inside} m")
 
     def add(self, entry: CatalogueEntry, write: Callable[[Path], None], *, force: bool = False) -> Catalogue:
-        """Add an object whose files `write` puts into a folder, or replace it with `force`. A failure changes nothing.
+        """Add an object, or replace it if `force` is True. If this fails, the folder is unchanged.
 
-        Raise `AssetError` if the category is unknown or the key is in use.
+        `write` writes the object's files into a folder. Raises an AssetError for the same reasons as `check`.
         """
         self.check(entry, force=force)
         created = not self.folder.exists()
@@ -132,7 +132,7 @@ class HouseExtension:
                 self.folder.rmdir()
 
     def _install(self, entry: CatalogueEntry, new: Path) -> Catalogue:
-        """Move a folder to its final location and add the object to the catalogue. Undo both on failure."""
+        """Move an object's folder into place and add the object to the catalogue. Undo both on failure."""
         place = self.folder / entry.key
         before = self._text if self.path.exists() else None
         swap = exchange if place.exists() else Path.rename
@@ -161,17 +161,18 @@ class HouseExtension:
 
 
 def held_in(room: Floats, size: Floats) -> int:
-    """Return how many objects of extents (3,) surely fit into a bin of inner size (3,), whichever side it is used from.
+    """Return the number of objects of size (3,) that fit into a bin with an interior of size (3,).
 
-    The objects stand upright in layers, side by side in the slots that people use, with their centres inside the bin.
+    The objects stand upright in layers, in the slots that people use, with their centres inside the bin. The
+    number is valid for all sides from which a person may fill the bin.
     """
     layers = int(room[2] / size[2] + 0.5)
-    turned = (size[:2], size[1::-1])  # a person may place a carried object in either orientation
+    turned = (size[:2], size[1::-1])  # A person may turn an object by 90 degrees.
     beside = [np.minimum((room[:2] - 2 * _WALL_GAP) // across, _SLOTS).prod() for across in turned]
     return int(min(beside)) * layers
 
 
 def _reference(house: str, folder: Path) -> str:
-    """Return a reference to a house for the catalogue in a folder: its name, or its path relative to the folder."""
+    """Return the name of a house, or its path relative to the folder if it is given by a path."""
     named = parse_house(house)
     return os.path.relpath(Path(named.name).resolve(), folder.resolve()) if named.is_path else named.name

@@ -1,4 +1,4 @@
-"""Import of a mesh file as an object of a catalogue, with a preview of its mesh, parts and grips."""
+"""Import a mesh file into a catalogue as an object, and draw a preview of the object."""
 
 import json
 from dataclasses import asdict
@@ -20,19 +20,19 @@ from mjsim.importing.object.object_import import ImportedObject, import_object
 from mjsim.render.pictures import draw_picture
 from mjsim.values.errors import AssetError, RenderError
 
-_PREVIEW_SIDE = 420  # width and height of the preview, in pixels
+_PREVIEW_SIDE = 420  # width and height of each picture in a preview, in pixels
 _COLOURS = (
     (0.90, 0.45, 0.13), (0.20, 0.55, 0.80), (0.30, 0.65, 0.30), (0.80, 0.30, 0.45), (0.55, 0.40, 0.75),
     (0.75, 0.65, 0.15), (0.45, 0.45, 0.45),
 )  # fmt: skip
 _GRIPS = {"grip_0": (0.85, 0.1, 0.1, 1.0), "grip_1": (0.1, 0.2, 0.85, 1.0)}
-_ARROW = 0.03  # length of a grip's arrow, in metres
-_LOOK, _PART = 2, 3  # geom groups defined in docs/models.md
+_ARROW = 0.03  # length of the arrow that shows a grip, in metres
+_LOOK, _PART = 2, 3  # geom groups of visual meshes and of collision parts
 PREVIEW, REPORT = "preview.png", "report.json"
 
 
 def write_preview(model: Path, out: Path) -> None:
-    """Draw an object's visual mesh and its parts side by side, with arrows along the x axes of its grips."""
+    """Draw the visual mesh and the collision parts of an object side by side, with arrows at its grips."""
     pictures = []
     for shown in (_LOOK, _PART):
         spec = read_model(model, body="object")
@@ -89,10 +89,10 @@ def add_mesh(
     *,
     force: bool = False,
 ) -> tuple[ImportDecision, ...]:
-    """Import a mesh file into a catalogue. Return the report, which is also stored with the object.
+    """Import a mesh file into a catalogue. Return the import report, which is also stored with the object.
 
-    Without OpenGL there is no preview, and the report says so. The catalogue is unchanged on `AssetError` (the file,
-    entry or object is unusable) and `OSError`. If the object cannot be held, a picture of it is kept.
+    Without OpenGL, there is no preview. Raise an AssetError, and leave the catalogue unchanged, if the file,
+    the entry or the object cannot be used. If a hand cannot hold the object, its preview is kept.
     """
     extension.check(entry, force=force)
     item = import_object(path, options)
@@ -115,7 +115,7 @@ def add_mesh(
 
 
 def _not_held(item: ImportedObject, findings: list[Finding]) -> str:
-    """Return the reason why an object cannot be held, or an empty string if it can."""
+    """Return the reason why a hand cannot hold an object, or an empty string if it can."""
     if found := errors(findings):
         return found[0].message
     if item.grip.offset <= MAX_OFFSET:

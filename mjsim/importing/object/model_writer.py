@@ -1,4 +1,4 @@
-"""Writer for the files of an imported object: MJCF, OBJ meshes and a PNG texture. Equal objects give equal bytes."""
+"""Write an imported object as MJCF, OBJ and PNG files. Equal objects always give identical files."""
 
 import math
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ _MJCF = """\
 
 
 def write_model(item: ImportedObject, folder: Path, *, key: str, label: str, source: str) -> Path:
-    """Write an object into an existing folder. Return its MJCF file."""
+    """Write the files of an object into an existing folder. Return the path of the MJCF file."""
     (folder / "look.obj").write_text("\n".join(obj_lines(item.visual)) + "\n", encoding="utf-8")
     if item.visual.picture is not None:
         write_png(folder / "look.png", item.visual.picture)
@@ -91,7 +91,7 @@ def _assets(item: ImportedObject, key: str) -> Iterator[str]:
 
 
 def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
-    """Yield the parts. Each part's mass is proportional to its volume, for tools that read only parts."""
+    """Yield the geoms of the collision parts, with masses for programs that ignore `<inertial>`."""
     volumes = [trimesh.convex.convex_hull(points).volume for points in item.hulls]
     for number, volume in enumerate(volumes):
         mass = item.weight.mass * volume / sum(volumes)
@@ -99,7 +99,7 @@ def _geoms(item: ImportedObject, key: str) -> Iterator[str]:
 
 
 def obj_lines(mesh: VisualMesh) -> Iterator[str]:
-    """Yield the lines of an OBJ file."""
+    """Yield the lines of an OBJ file with the geometry of a visual mesh."""
     yield from (f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in np.round(mesh.vertices, 6) + 0.0)
     columns = [mesh.faces + 1]
     if mesh.uv is not None:
@@ -115,7 +115,7 @@ def obj_lines(mesh: VisualMesh) -> Iterator[str]:
 
 
 def write_png(path: Path, rgb: NDArray[np.uint8]) -> None:
-    """Write an RGB image of shape (height, width, 3)."""
+    """Write an RGB image of shape (height, width, 3) to a PNG file."""
     done, data = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, 4])
     if not done:
         raise AssetError(f"the picture {path} cannot be encoded as PNG")
@@ -127,5 +127,5 @@ def _numbers(values: Floats) -> str:
 
 
 def comment(text: str) -> str:
-    """Escape text for an XML comment."""
+    """Escape text for use in an XML comment."""
     return text.replace("--", "- -").replace("&", "and").replace("<", "(").replace(">", ")")

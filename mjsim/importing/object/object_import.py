@@ -1,4 +1,4 @@
-"""Import of a mesh file as an object, with a report of the decisions made."""
+"""Convert a mesh file to an object, and report the decisions that were made."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,31 +19,31 @@ from mjsim.importing.object.scaling import Scaling, scaling
 from mjsim.importing.object.visual_mesh import VisualMesh, make_visual_mesh
 from mjsim.values.errors import AssetError
 
-_COARSE = 0.005  # maximum rounding error of 32-bit coordinates, relative to the longest side
-_FAR = 10.0  # distance from the origin above which the report mentions it, in longest sides
+_COARSE = 0.005  # maximum rounding error of coordinates, relative to the object's longest side
+_FAR = 10.0  # distance from the origin that is worth reporting, relative to the longest side
 
 
 @dataclass(frozen=True, eq=False)
 class ImportedObject:
-    """An object in its own frame: z up, on the floor at z = 0, with the middle of its footprint at the origin."""
+    """An imported object that stands on the plane z = 0, with the centre of its footprint at the origin."""
 
     visual: VisualMesh
-    hulls: tuple[Floats, ...]  # vertices of each convex part that collides, in metres, shape (k, 3) each
+    hulls: tuple[Floats, ...]  # vertices of each colliding part, in metres, shape (k, 3) each
     weight: Weight
     grip: Grip
-    rolls: bool  # True for a round object, which gets a foot and rolling friction
-    decisions: tuple[ImportDecision, ...]  # decisions made during the import, for the report
+    rolls: bool  # True if the object is round and was given a foot and rolling friction
+    decisions: tuple[ImportDecision, ...]  # decisions that were made during the import, for the report
 
     @property
     def size(self) -> Floats:
-        """Extents of the colliding parts in metres, shape (3,)."""
+        """The size of the bounding box of all colliding parts in metres, shape (3,)."""
         return np.asarray(np.ptp(np.concatenate(self.hulls), axis=0))
 
 
 def import_object(path: Path, options: ImportOptions) -> ImportedObject:
-    """Make an object from a mesh file. The result is bit-identical for the same file and options.
+    """Convert a mesh file to an object. Equal files and options give bit-identical results.
 
-    Raise `AssetError` if the file cannot be read, or a hand cannot carry the object.
+    Raise an AssetError if the file cannot be read, or if a hand cannot carry the object.
     """
     _check_options(options)
     raw = read_surface(path)
@@ -95,9 +95,9 @@ def _converted(path: Path, raw: Surface, options: ImportOptions) -> ImportedObje
 
 
 def _extent(surface: Surface) -> tuple[float, Floats]:
-    """Return the longest side and the middle (3,) of the bounding box, in the file's unit.
+    """Return the longest side and the centre (3,) of a surface's bounding box, in the unit of the file.
 
-    Raise `AssetError` if it has no finite extent, or is too far from the origin for the precision of its numbers.
+    Raise an AssetError if it has no finite extent, or is too far from the origin for 32-bit coordinates.
     """
     points = surface.corners.reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
@@ -124,7 +124,7 @@ def _into_place(rotation: Floats, points: Floats) -> Floats:
 
 
 def _on_the_floor(surface: Surface, transform: Floats) -> tuple[Surface, trimesh.Trimesh]:
-    """Move a surface into place, and lower it to the floor if thickened parts extend below it."""
+    """Move a surface into place, with its lowest point on the floor even if its parts were thickened."""
     placed = surface.moved(transform)
     down = np.eye(4)
     down[2, 3] = -placed.corners[..., 2].min()

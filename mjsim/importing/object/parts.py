@@ -1,4 +1,4 @@
-"""Convex collision parts of an object. They are few, made by CoACD, and thick enough for the physics time step."""
+"""Decompose an object into a few convex collision parts that are thick enough for the physics."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,28 @@ from mjsim.house.validation.object_rules import THIN
 from mjsim.importing.object.closed_body import ClosedBody, simplified
 
 MAX_PARTS = 6
-MAX_VERTICES = 64  # maximum number of vertices of a part
-MIN_WIDTH = THIN  # minimum width of each part in any direction, in metres
-_WALL = 0.008  # width in metres below which an object consists of thin walls; it then collides as its hull
-_CONVEX = 0.9  # a body is convex if it fills at least this share of its convex hull
+MAX_VERTICES = 64  # maximum number of vertices of a collision part
+MIN_WIDTH = THIN  # minimum width of a collision part in any direction, in metres
+_WALL = 0.008  # mean wall thickness below which an object collides as its convex hull, in metres
+_CONVEX = 0.9  # share of its convex hull that a body must fill to count as convex
 _TRIANGLES = 1000  # maximum number of triangles of a body before decomposition
-_CONCAVITY = 0.12  # concavity threshold of CoACD
-_COARSE = 0.35  # concavity threshold for slow bodies, which have many pieces or intersect themselves
-_MANY = 8  # number of pieces that counts as many
-_CUT = 1e-6  # minimum overlap of an intersecting edge and triangle, relative to their sides
+_CONCAVITY = 0.12  # default concavity threshold of CoACD
+_COARSE = 0.35  # concavity threshold for complex bodies, whose decomposition is slow
+_MANY = 8  # number of pieces above which a body counts as complex
+_CUT = 1e-6  # tolerance for the intersection of an edge and a triangle, relative to their sides
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Convex parts of an object."""
+    """The convex collision parts of an object."""
 
-    hulls: tuple[Floats, ...]  # vertices of each part in metres, shape (k, 3) each
+    hulls: tuple[Floats, ...]  # vertices of each collision part in metres, shape (k, 3) each
     reason: str  # explanation of how the parts were made, for the report
     thickened: int  # number of parts that were thickened
 
     @property
     def points(self) -> Floats:
-        """All vertices in metres, shape (k, 3)."""
+        """The vertices of all parts in metres, shape (k, 3)."""
         return np.concatenate(self.hulls)
 
 
@@ -42,7 +42,7 @@ def convex_parts(solid: ClosedBody) -> Parts:
     hulls, reason = [np.asarray(hull.vertices)], "convex: its own hull"
     filled = solid.mesh.volume / hull.volume
     if filled < _CONVEX:
-        # Walls of volume v, whose two sides have a total area of a, have a mean thickness of 2 v / a.
+        # The mean thickness of thin walls is twice their volume, divided by the area of both sides.
         walls = 2 * solid.mesh.volume / solid.mesh.area < _WALL
         pieces = [] if walls else _decomposed(solid)
         if walls or min(width(points) for points in pieces) < _WALL:
@@ -56,12 +56,12 @@ def convex_parts(solid: ClosedBody) -> Parts:
 
 
 def width(points: Floats) -> float:
-    """Return the minimum extent of the convex hull of points (n, 3) in any direction, in metres."""
+    """Return the width of the convex hull of points (n, 3) in its narrowest direction, in metres."""
     return _narrowest(points)[1]
 
 
 def _decomposed(solid: ClosedBody) -> list[Floats]:
-    """Return the vertices of the convex parts of a body, the largest part first (CoACD, Wei et al. 2022)."""
+    """Decompose a body with CoACD (Wei et al., 2022). Return the vertices of each part, largest first."""
     coarse = simplified(solid.mesh, _TRIANGLES)
     coacd.set_log_level("error")
     found = coacd.run_coacd(
@@ -79,7 +79,7 @@ def _decomposed(solid: ClosedBody) -> list[Floats]:
 
 
 def cuts_itself(mesh: trimesh.Trimesh) -> bool:
-    """Return True if an edge of a surface intersects one of its triangles."""
+    """Return True if a surface intersects itself, that is, if an edge intersects a triangle."""
     vertices, edges = np.asarray(mesh.vertices), mesh.edges_unique
     start = vertices[edges[:, 0]]
     along = vertices[edges[:, 1]] - start
@@ -87,7 +87,7 @@ def cuts_itself(mesh: trimesh.Trimesh) -> bool:
         corner, *others = vertices[face]
         one, two = others - corner
         normal = np.cross(one, two)
-        with np.errstate(all="ignore"):  # edges in the plane of the triangle give NaN
+        with np.errstate(all="ignore"):  # Edges in the plane of the triangle give NaN.
             share = (corner - start) @ normal / (along @ normal)
             there = start + share[:, None] * along - corner
             u, v = (np.cross(there, two) @ normal, np.cross(one, there) @ normal) / (normal @ normal)
@@ -98,7 +98,7 @@ def cuts_itself(mesh: trimesh.Trimesh) -> bool:
 
 
 def _few_vertices(points: Floats) -> Floats:
-    """Return at most `MAX_VERTICES` vertices of the hull of points (n, 3), with the same bounding box."""
+    """Simplify the hull of points (n, 3) to at most `MAX_VERTICES` vertices. Its bounding box is kept."""
     hull = trimesh.convex.convex_hull(points)
     if len(hull.vertices) <= MAX_VERTICES:
         return np.asarray(hull.vertices)
@@ -106,7 +106,7 @@ def _few_vertices(points: Floats) -> Floats:
         coarse = hull.simplify_quadric_decimation(face_count=faces).convex_hull
         if len(coarse.vertices) <= MAX_VERTICES:
             break
-    else:  # no edge can be collapsed, so take the extreme vertex in each of many directions
+    else:  # If no edge can be collapsed, take the farthest vertex in each of many directions.
         turn = np.arange(MAX_VERTICES) + 0.5
         z, angle = 1 - 2 * turn / MAX_VERTICES, np.pi * (1 + 5**0.5) * turn
         level = np.sqrt(1 - z * z)
@@ -118,7 +118,7 @@ def _few_vertices(points: Floats) -> Floats:
 
 
 def _thickened(points: Floats) -> Floats:
-    """Extend points (n, 3) symmetrically so that their hull is at least `MIN_WIDTH` wide."""
+    """Thicken the hull of points (n, 3) symmetrically until it is at least `MIN_WIDTH` wide."""
     for _ in range(4):
         direction, across = _narrowest(points)
         if across > MIN_WIDTH - 1e-6:
@@ -129,7 +129,7 @@ def _thickened(points: Floats) -> Floats:
 
 
 def _narrowest(points: Floats) -> tuple[Floats, float]:
-    """Return the direction (3,) in which the hull of points (n, 3) is narrowest, preferably an axis, and its width."""
+    """Return the direction (3,) in which the hull of points (n, 3) is narrowest, and the width there."""
     normals = scipy.spatial.ConvexHull(points).equations[:, :3]
     directions = np.concatenate((np.eye(3), normals))
     widths = np.ptp(points @ directions.T, axis=0)

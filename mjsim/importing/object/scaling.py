@@ -1,4 +1,4 @@
-"""Unit and vertical axis of a mesh file: given by the user, defined by the format, or guessed."""
+"""Determine the unit and the vertical axis of a mesh file."""
 
 from dataclasses import dataclass
 
@@ -15,25 +15,25 @@ _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0
 
 @dataclass(frozen=True)
 class Scaling:
-    """Conversion of a file's coordinates to metres with z up."""
+    """The conversion of the coordinates in a mesh file to metres, with the z axis up."""
 
-    unit: str  # unit of length, a key of `UNITS`
-    up: str  # vertical axis, `y` or `z`
-    factor: float  # metres per unit of the file, including `--scale`
+    unit: str  # unit of length in the file, which is a key of `UNITS`
+    up: str  # vertical axis in the file, `y` or `z`
+    factor: float  # number of metres per unit of the file, including `--scale`
     unit_reason: str
     up_reason: str
 
     @property
     def transform(self) -> Floats:
-        """Homogeneous transform (4, 4) from the file's coordinates to metres with z up."""
+        """The homogeneous transform (4, 4) from the coordinates in the file to metres, with the z axis up."""
         scale = np.diag([self.factor, self.factor, self.factor, 1.0])
         return np.asarray(_Y_UP @ scale if self.up == "y" else scale)
 
 
 def scaling(suffix: str, longest: float, *, units: str | None, up: str | None, scale: float) -> Scaling:
-    """Determine the unit and axis of a file from its suffix and longest side, unless they are given.
+    """Determine the unit and vertical axis of a file from its suffix and longest side, unless they are given.
 
-    Raise `AssetError` if no unit gives a size that a hand carries.
+    Raise an AssetError if no unit gives a size that a hand can carry.
     """
     unit, unit_reason = (units, "given") if units else _unit(suffix, longest * scale)
     size = longest * scale * UNITS[unit]

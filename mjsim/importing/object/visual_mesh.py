@@ -1,4 +1,4 @@
-"""Visual mesh of an object: a simplified surface whose texture is baked from the file's colours."""
+"""Simplify the surface of an object to a visual mesh, and bake its colours into a texture."""
 
 import math
 from dataclasses import dataclass
@@ -14,28 +14,28 @@ from mjsim.formats.scene.surface import Floats, Ints, Surface
 from mjsim.importing.object.closed_body import is_closed, simplified
 
 SIDE = 512  # width and height of the texture, in pixels
-_GUTTER = 2  # margin around a triangle against bleeding colours, in pixels
-_SHRINK = 0.93  # factor by which the scale is reduced until all triangles fit
-_MIN_SIDE = 2  # minimum width of a triangle, in pixels
+_GUTTER = 2  # margin around a triangle that keeps colours from bleeding, in pixels
+_SHRINK = 0.93  # factor by which the scale is reduced until all triangles fit into the image
+_MIN_SIDE = 2  # minimum width of a triangle in the texture, in pixels
 MAX_TRIANGLES = 1400
-_SAMPLES = 200_000  # number of surface points at which the file's colours are sampled
+_SAMPLES = 200_000  # number of surface points at which colours are sampled
 _FACING = 0.01  # weight of normals in the search for the nearest surface point, in metres
 _CREASE = math.radians(40.0)
 _SHEET = 2e-4  # distance between the two sides of an open surface, in metres
-_PLAIN = 3 / 255  # colours that differ by less count as equal
-_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence (Roberts 2018)
+_PLAIN = 3 / 255  # maximum difference of colours that count as equal
+_GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # steps of the R2 sequence (Roberts, 2018)
 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Layout of triangles in an image."""
+    """The layout of triangles in a texture image."""
 
-    shapes: Floats  # corners of each triangle in pixels from the upper left of its block, shape (n, 3, 2)
+    shapes: Floats  # corners of each triangle, in pixels from the upper left of its block, shape (n, 3, 2)
     blocks: Ints  # left, top, width and height of each block in pixels, shape (n, 4)
 
     @classmethod
     def pack(cls, corners: Floats) -> Self:
-        """Lay out triangles (n, 3, 3), in metres, as large as the image allows."""
+        """Arrange triangles (n, 3, 3), in metres, at the largest scale at which they fit into the image."""
         flat = _flattened(corners)
         scale = SIDE / np.sqrt(np.prod(np.ptp(flat, axis=1), axis=1).sum())
         while (blocks := _shelves(flat, scale)) is None:
@@ -44,12 +44,12 @@ class Atlas:
 
     @property
     def uv(self) -> Floats:
-        """Texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (n, 3, 2)."""
+        """The texture coordinates of all corners, from 0 to 1, shape (n, 3, 2). (0, 0) is the lower left."""
         places = (self.shapes + self.blocks[:, None, :2]) / SIDE
         return np.asarray(np.stack((places[..., 0], 1.0 - places[..., 1]), axis=-1))
 
     def texels(self) -> tuple[Ints, Floats]:
-        """Return the triangle (k,) and the barycentric weights (k, 3) of each pixel, block by block."""
+        """Return the triangle (k,) and the barycentric coordinates (k, 3) of each pixel, block by block."""
         faces = np.repeat(np.arange(len(self.blocks)), np.prod(self.blocks[:, 2:], axis=1))
         pixels = self._pixels() - self.blocks[faces, :2] + 0.5
         a, b, c = (self.shapes[faces, k] for k in range(3))
@@ -59,7 +59,7 @@ class Atlas:
         return faces, weights / weights.sum(axis=1, keepdims=True)
 
     def picture(self, colours: Floats) -> NDArray[np.uint8]:
-        """Return an image (SIDE, SIDE, 3) made of the colours (k, 3) of all `texels`, RGB from 0 to 1."""
+        """Create an image (SIDE, SIDE, 3) from the colours (k, 3) of all `texels`, as RGB from 0 to 1."""
         picture = np.empty((SIDE, SIDE, 3), np.uint8)
         picture[:] = np.round(255 * np.clip(colours.mean(axis=0), 0, 1))
         across, down = self._pixels().T
@@ -75,7 +75,7 @@ class Atlas:
 
 
 def _flattened(corners: Floats) -> Floats:
-    """Lay triangles (n, 3, 3) flat, with the longest side along x and the corners in the same order, as (n, 3, 2)."""
+    """Rotate triangles (n, 3, 3) into a plane, with the longest side along x. Return them as (n, 3, 2)."""
     count = np.arange(len(corners))
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     first = lengths.argmax(axis=1)
@@ -95,7 +95,7 @@ def _drawn(flat: Floats, scale: float) -> Floats:
 
 
 def _shelves(flat: Floats, scale: float) -> Ints | None:
-    """Place flat triangles in rows, the highest first. Return their blocks (n, 4), or None if they do not fit."""
+    """Pack flat triangles in rows, tallest first. Return their blocks (n, 4), or None if they do not fit."""
     sizes = np.ceil(np.ptp(_drawn(flat, scale), axis=1)).astype(int) + 2 * _GUTTER
     if sizes.max() > SIDE:
         return None
@@ -118,20 +118,20 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class VisualMesh:
-    """A surface with normals and either a texture or a colour."""
+    """A triangle mesh with normals, and with a texture or a single colour."""
 
     vertices: Floats  # vertices in metres, shape (n, 3)
     faces: Ints  # vertex indices, shape (m, 3)
-    normals: Floats  # unit normals at the corners of the faces, creased at sharp edges, shape (m, 3, 3)
-    # Texture coordinates of the corners, from 0 to 1 starting at the lower left, shape (m, 3, 2).
+    normals: Floats  # unit normals at the corners of all faces, shape (m, 3, 3)
+    # Texture coordinates of the corners from 0 to 1, shape (m, 3, 2). (0, 0) is the lower left.
     uv: Floats | None
-    picture: NDArray[np.uint8] | None  # RGB, shape (height, width, 3)
-    colour: tuple[float, float, float]  # RGB from 0 to 1, used if there is no picture
-    doubled: bool  # True if each face exists twice, because the surface is open and visible from both sides
+    picture: NDArray[np.uint8] | None  # texture as an RGB image, shape (height, width, 3)
+    colour: tuple[float, float, float]  # RGB colour from 0 to 1 of a mesh without a texture
+    doubled: bool  # True if each face of an open surface was duplicated to be visible from both sides
 
 
 def make_visual_mesh(surface: Surface, mesh: trimesh.Trimesh) -> VisualMesh:
-    """Simplify a surface and bake its colours into a texture. `mesh` is the same surface with joined vertices."""
+    """Simplify a surface and bake its colours into a texture. `mesh` is the surface with joined vertices."""
     closed = is_closed(mesh)
     coarse = simplified(mesh, MAX_TRIANGLES if closed else MAX_TRIANGLES // 2)
     closed = closed and is_closed(coarse)
@@ -167,7 +167,7 @@ def _painted(
 
 
 def _sampled(surface: Surface) -> tuple[Ints, Floats]:
-    """Spread points evenly over a surface. Return their triangles (k,) and barycentric weights (k, 3)."""
+    """Sample points evenly on a surface. Return their triangles (k,) and barycentric coordinates (k, 3)."""
     edges = np.diff(surface.corners, axis=1)
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     count = np.ceil(_SAMPLES * area / area.sum()).astype(int)
@@ -184,13 +184,13 @@ def _positions(surface: Surface, triangles: Ints, weights: Floats) -> Floats:
 
 
 def corner_normals(vertices: Floats, faces: Ints) -> Floats:
-    """Return the normal at each corner of each face, shape (m, 3, 3), averaged over faces at angles below `_CREASE`."""
+    """Return smooth normals at the corners of all faces, shape (m, 3, 3). Sharp edges stay sharp."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     units = _normals(corners)
     count = faces.size
     at = scipy.sparse.csr_array((np.ones(count), (np.arange(count), faces.ravel())))
-    here, there = (at @ at.T).nonzero()  # pairs of corners at the same vertex
+    here, there = (at @ at.T).nonzero()  # pairs of corners that share a vertex
     near = np.einsum("kd,kd->k", units[here // 3], units[there // 3]) > math.cos(_CREASE)
     total = np.zeros((count, 3))
     np.add.at(total, here[near], weighted[there[near] // 3])
@@ -205,7 +205,7 @@ def _normals(corners: Floats) -> Floats:
 
 
 def _projected(corners: Floats, points: Floats) -> Floats:
-    """Return barycentric weights (k, 3) of points (k, 3), clamped to triangles with corners (k, 3, 3)."""
+    """Return the barycentric coordinates (k, 3) of points (k, 3), clamped to triangles (k, 3, 3)."""
     weights = trimesh.triangles.points_to_barycentric(corners, points)
     weights = np.clip(np.nan_to_num(weights, nan=1 / 3), 0.0, 1.0)
     return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))

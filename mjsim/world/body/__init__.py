@@ -1,1 +1,1 @@
-"""The person's body and hands in full physics: picking, carrying and placing objects."""
+"""Physics simulation of the person's body and of the hands, which pick, carry and place objects."""

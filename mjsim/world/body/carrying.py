@@ -1,7 +1,7 @@
-"""Carrying: hands keep their postures, and hold loads clear of the house (`mjsim.world.body.postures`).
+"""A controller for hands that carry objects, which keeps the objects away from walls and furniture.
 
-A load that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, or if the hand lags far
-behind its servo.
+An object that gets stuck slips out of the hand. It counts as stuck if its weld is stretched, or if the hand
+lags far behind its target position.
 """
 
 import math
@@ -26,7 +26,7 @@ from mjsim.world.body.slots import object_corners
 
 Floats = NDArray[np.float64]
 
-# In metres. The servo reaches its force limit at 0.04 m, so a hand lagging this far is stuck.
+# Lag of a hand at which it counts as stuck, in metres. The servo reaches its force limit at 0.04 m.
 MAX_SERVO_LAG = 0.25
 LOW, HIGH = 0.93, 1.60  # range of heights of carried objects, in metres
 _NO_GEOMS, _NO_FRAMES = np.zeros((0, 2), np.int32), np.zeros((0, 9))
@@ -44,10 +44,10 @@ def count_strain(
     patience: float,
     strained: NDArray[np.int64],
 ) -> int:
-    """Count, for each hand, the consecutive control steps in which it was strained, in `strained` (2,).
+    """Update `strained` (2,), the number of consecutive control steps in which each hand was strained.
 
-    A hand is strained if its weld is stretched by more than `max_error` metres or its servo lags. Returns the hands
-    whose count exceeds `patience` as a bit mask: 1 for the left, 2 for the right hand.
+    A hand is strained if its weld is stretched by more than `max_error` metres or it lags far behind its
+    target. Returns a bit mask of the hands whose number exceeds `patience`: 1 for the left, 2 for the right.
     """
     slipping = 0
     for hand in range(2):
@@ -68,16 +68,16 @@ def count_strain(
 
 @dataclass(frozen=True, eq=False)
 class CarryingState:
-    """State of `Carrying` between control steps."""
+    """The state of a `Carrying` controller between control steps."""
 
-    # How far contacts have pushed each hand away from its posture, in metres, shape (2, 2).
+    # Horizontal offset by which contacts have pushed each hand from its posture, in metres, shape (2, 2).
     compliance: NDArray[np.float64]
     # Number of consecutive control steps in which each hand was strained, shape (2,).
     strained: NDArray[np.int64]
 
 
 class Carrying:
-    """Keeps both hands in their postures. Each world has one instance."""
+    """A controller that keeps both hands in their postures. Each world has one controller."""
 
     def __init__(self, person: Person) -> None:
         scene, rig = person.scene, person.rig
@@ -85,7 +85,7 @@ class Carrying:
         self.clearance: ClearanceField = compiled_house(scene.catalogue).cached(
             "carry clearance", lambda: ClearanceField.from_model(scene.model, low=LOW, high=HIGH)
         )
-        # Horizontal radius of each object around its grip and its extent below the grip, in metres, shape (n, 2).
+        # Horizontal radius and downward extent of each object from its grip, in metres, shape (n, 2).
         self.loads = np.array([_load(person, item) for item in range(len(scene.index.names))]).reshape(-1, 2)
         self._owners = _geom_owners(scene)
         self._no_contacts = (_NO_GEOMS, _NO_FRAMES, self._owners)
@@ -114,7 +114,7 @@ class Carrying:
         self._strained[:] = state.strained
 
     def update(self, held_posture: tuple[float, float, float]) -> None:
-        """Set the targets of hands that no motion moves, and keep the walking command from pressing into contacts."""
+        """Update the targets of hands that no motion moves. Cancel commands that push objects into walls."""
         person = self._person
         left, right = person.held
         left, right = -1 if left is None else left, -1 if right is None else right
@@ -124,7 +124,7 @@ class Carrying:
         _update_hands(self._body, self._hands, self._parameters, holding, contacts, person.dt)
 
     def carry_position(self, hand: int, item: int, body: BodyMotion | None = None) -> NDArray[np.float64]:
-        """Return the best position (3,) in the body frame for a hand to carry an object clear of the house."""
+        """Return the hand position (3,), in the body frame, for carrying an object without collisions."""
         radius, height = self.loads[item].tolist()
         forward, left, up = avatar.posture(hand, avatar.CARRY, self._person.parameters.eye_height)
         rig, carrying = self._person.rig, self._person.parameters.carrying
@@ -137,11 +137,11 @@ class Carrying:
         if not data.ncon:
             return self._no_contacts
         contact = data.contact
-        # Copy to contiguous arrays. Kernels are compiled per memory layout, which varies with the number of contacts.
+        # Kernels are compiled once per memory layout, so make the arrays contiguous.
         return np.ascontiguousarray(contact.geom), np.ascontiguousarray(contact.frame), self._owners
 
     def slipped(self) -> tuple[int, ...]:
-        """Count strained control steps, and return the hands whose loads have been strained for too long."""
+        """Update the strain of both hands. Return the hands that have been strained for too long."""
         person, options = self._person, self._person.options
         left, right = person.held
         if left is None and right is None:
@@ -162,7 +162,7 @@ class Carrying:
 
 @kernel
 def _update_hands(body: Any, hands: Any, carrying: Any, holding: Any, contacts: Any, dt: float) -> None:
-    """Call `update_hands` with plain tuples, which Numba unpacks in half the time of named tuples."""
+    """Call `update_hands`. Arguments are plain tuples, which Numba unpacks twice as fast as named tuples."""
     pose, command, clearance = body
     motion = BodyMotion(pose, command, ClearanceField(*clearance))
     update_hands(

@@ -1,4 +1,4 @@
-"""Conditions for picks and places: an object or receptacle in reach and in sight, and a suitable hand."""
+"""Conditions under which an object can be picked up or placed, such as reach, sight and a free hand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -76,7 +76,7 @@ def resolve_place(person: Person, action: Place, inventory: Inventory, *, busy: 
 
 
 def reachable_receptacles(person: Person) -> tuple[str, ...]:
-    """Return the receptacles that are within reach and in sight, in the episode's order."""
+    """Return the keys of all receptacles that are within reach and in sight, in the episode's order."""
     near = (k for k in person.scene.receptacles if _distance(person, k) <= person.parameters.reach)
     return tuple(k for k in near if _receptacle_in_sight(person, k))
 
@@ -90,7 +90,7 @@ def _object_distance(person: Person, item: int) -> float:
 
 
 def _object_in_sight(person: Person, item: int) -> bool:
-    """Return True if an object is visible from the eye or chest. This prevents a person from picking through walls."""
+    """Return True if an object is visible from the eye or chest. This prevents picks through walls."""
     viewpoints = person.rig.eye, np.array([*person.rig.position, _CHEST * person.parameters.eye_height])
     points = [person.center(item), *(person.grips.point(item, grip) for grip in avatar.GRIPS)]
     model, data = person.scene.model, person.data

@@ -1,4 +1,4 @@
-"""Grips: welds between a site of a hand and a grip site of an object."""
+"""Grips, which are MuJoCo welds between a hand and a grip site of an object."""
 
 import itertools
 import math
@@ -15,11 +15,11 @@ from mjsim.world.body.rig import Rig, find_id
 AWAKE = -11  # value of `MjData.tree_asleep` that keeps a tree awake for at least ten physics steps
 
 
-GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip in each hand
+GripState = tuple[tuple[int, int] | None, tuple[int, int] | None]  # object and grip index for each hand
 
 
 class Grips:
-    """Controls the welds that `avatar.attach_avatar` added between hands and objects."""
+    """The welds between hands and objects that `avatar.attach_avatar` has added to a model."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, rig: Rig) -> None:
         self._data = data
@@ -36,15 +36,15 @@ class Grips:
         ]
         self._grip_sites = np.array(sites, np.intp).reshape(len(names), len(avatar.GRIPS))
         self._welds = np.array(welds, np.intp).reshape(2, len(names), len(avatar.GRIPS), 2)
-        self.sites = np.full((2, 2), -1, np.intp)  # site of each hand and of the grip in it, or -1
+        self.sites = np.full((2, 2), -1, np.intp)  # site of each loaded hand and of its object's grip, or -1
         self.reset()
 
     def nearest_grip(self, hand: int, item: int) -> int:
-        """Return the grip of an object, 0 or 1, that requires the smaller turn of the hand."""
+        """Return the grip of an object (0 or 1) to which the hand has to turn less."""
         return self.grip_along(item, self._data.site_xmat[self._hand_sites[hand], 0::3])
 
     def grip_along(self, item: int, forward: NDArray[np.float64]) -> int:
-        """Return the grip of an object, 0 or 1, whose x axis is closest to a direction (3,)."""
+        """Return the grip of an object (0 or 1) whose x axis is best aligned with a direction (3,)."""
         agreement = [float(self._data.site_xmat[site, 0::3] @ forward) for site in self._grip_sites[item]]
         return int(np.argmax(agreement))
 
@@ -56,7 +56,7 @@ class Grips:
         return site_gap(self._data.site_xpos, self._hand_sites[hand], self._grip_sites[item, grip])
 
     def close(self, hand: int, item: int, grip: int, *, gently: bool = False) -> None:
-        """Weld an object to a hand, with a soft weld if `gently`. A sleeping object wakes up."""
+        """Weld an object to a hand, with a soft weld if `gently` is True. A sleeping object wakes up."""
         self._data.eq_active[self._welds[hand, item, grip]] = (gently, not gently)
         self._held[hand] = (item, grip)
         self._update()
@@ -65,13 +65,13 @@ class Grips:
         held = self._held[hand]
         if held is not None:
             self._data.eq_active[self._welds[hand, held[0], held[1]]] = 0
-            # A released object starts to fall slowly. Without this, MuJoCo would put it to sleep in the air.
+            # Otherwise, MuJoCo would put the object to sleep in the air, because it starts to fall slowly.
             self._data.tree_asleep[self._trees[held[0]]] = AWAKE
             self._held[hand] = None
             self._update()
 
     def error(self, hand: int) -> float:
-        """Return by how many metres the weld of a hand is stretched, or 0 if the hand is empty."""
+        """Return the distance in metres by which the weld of a hand is stretched, or 0 for an empty hand."""
         held = self._held[hand]
         return 0.0 if held is None else self.gap(hand, *held)
 
@@ -96,7 +96,7 @@ class Grips:
 
 @kernel
 def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
-    """Return the distance between two sites in metres. `site_xpos` is that of `MjData`, shape (nsite, 3)."""
+    """Return the distance between two sites in metres. `site_xpos` (nsite, 3) is an array of `MjData`."""
     total = 0.0
     for axis in range(3):
         total += (site_xpos[first, axis] - site_xpos[second, axis]) ** 2
@@ -105,7 +105,7 @@ def site_gap(site_xpos: NDArray[np.float64], first: int, second: int) -> float:
 
 @kernel
 def site_angle(site_xmat: NDArray[np.float64], first: int, second: int) -> float:
-    """Return the angle between two site frames in radians. `site_xmat` is that of `MjData`, shape (nsite, 9)."""
+    """Return the angle between two site frames in radians. `site_xmat` (nsite, 9) is an array of `MjData`."""
     trace = 0.0  # The trace of the rotation between the frames is 1 + 2 cos(angle).
     for k in range(9):
         trace += site_xmat[first, k] * site_xmat[second, k]

@@ -1,8 +1,8 @@
-"""Picking and placing as motions of a hand.
+"""Hand motions that pick up and place objects.
 
-During a pick, the person stands still, turns, reaches for the object, welds it gently, lifts it into the carrying
-posture, and welds it firmly. During a place, the hand moves over a slot of the receptacle, lowers the object to the
-measured fill height, releases it, and waits until it rests.
+In a pick, the person stops, turns to the object and reaches for it. A soft weld connects the object to the
+hand while it is lifted into the carrying posture. Then a firm weld replaces it. In a place, the hand moves
+over a slot, lowers the object to the measured fill height, opens, and waits until the object rests.
 """
 
 import math
@@ -18,14 +18,14 @@ from mjsim.world.body.motion_profiles import ACROSS_FIRST, STRAIGHT, UP_FIRST
 from mjsim.world.body.person import Motion, Person, Steps, wrap
 from mjsim.world.body.slots import Slot, best_slot, load_extent, object_corners
 
-_ARRIVAL_TIMEOUT = 0.4  # maximum wait after a reach until the hand arrives, in seconds
-_GRIP_TIMEOUT = 0.2  # maximum wait until the firm grip has pulled the load in, in seconds
-_CLOSE_ENOUGH = 0.012  # distance in metres at which the hand has arrived
+_ARRIVAL_TIMEOUT = 0.4  # maximum time to wait for the hand to arrive after a reach, in seconds
+_GRIP_TIMEOUT = 0.2  # maximum time to wait until the firm weld has pulled the object in, in seconds
+_CLOSE_ENOUGH = 0.012  # distance to a grip at which the hand counts as arrived, in metres
 Vector = NDArray[np.float64]
-_TOUCH = 0.0005  # overlap with other geoms at which the descent ends, in metres
-_OVERLAP = 0.001  # overlap below which the hand opens, in metres
-_RAISE = 0.003  # distance by which an overlapping load is raised per control step, in metres
-_RAISE_TIMEOUT = 0.6  # time limit for raising a load, in seconds
+_TOUCH = 0.0005  # overlap with other geoms at which an object is no longer lowered, in metres
+_OVERLAP = 0.001  # overlap with other geoms below which the hand opens, in metres
+_RAISE = 0.003  # distance by which an overlapping object is raised per control step, in metres
+_RAISE_TIMEOUT = 0.6  # time limit for raising an overlapping object, in seconds
 
 
 def pick(
@@ -35,7 +35,7 @@ def pick(
     carry_position: Callable[[int, int], NDArray[np.float64]],
     pitch: float,
 ) -> Motion:
-    """Reach for an object, lift it, and look to `pitch` (radians). Return True if the hand then holds the object."""
+    """Reach for an object and lift it, while the head returns to `pitch` radians. Return True on success."""
     rig, grips = person.rig, person.grips
     yield from person.face(person.center(item), person.motion.object_tolerance)
     person.moving_hand = hand
@@ -51,7 +51,7 @@ def pick(
         return False
     grips.close(hand, item, grip, gently=True)
     yield from _lift(person, hand, carry_position(hand, item), pitch)
-    # A gently held load hangs 2 cm below the hand. The firm weld pulls it in once it is clear of its neighbours.
+    # The object hangs 2 cm below the hand. It is now clear of its neighbours, so a firm weld can pull it in.
     grips.close(hand, item, grip)
     yield from _draw_in(person, hand)
     if grips.error(hand) > person.options.grip_error:
@@ -85,7 +85,7 @@ def _draw_in(person: Person, hand: int) -> Steps:
 
 
 def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, pitch: float) -> Motion:
-    """Put an object into its receptacle, and look to `pitch` (radians). Return True if it comes to rest inside."""
+    """Put an object into its receptacle, then turn the head to `pitch` radians. Return True on success."""
     heading = square_heading(person, receptacle)
     yield from person.face(receptacle.center, person.motion.receptacle_tolerance, heading)
     person.moving_hand = hand
@@ -102,7 +102,7 @@ def place(person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, 
 
 
 def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
-    """Return the heading along a side of the receptacle that is closest to facing it, so that objects fit squarely."""
+    """Return the heading parallel to a side of the receptacle at which the person faces it most directly."""
     rig = person.rig
     towards = rig.heading + rig.bearing(receptacle.center)
     side = math.atan2(receptacle.rotation[1, 0], receptacle.rotation[0, 0])
@@ -111,7 +111,7 @@ def square_heading(person: Person, receptacle: ReceptacleGeometry) -> float:
 
 
 def hover_height(person: Person, receptacle: ReceptacleGeometry, slot: Slot) -> float:
-    """Return the height above the volume's centre at which an object's lowest point moves over the receptacle."""
+    """Return the height above the volume's centre at which the bottom of an object hovers before release."""
     return max(float(receptacle.half_size[2]), slot.top) + person.motion.hover_gap
 
 
@@ -138,9 +138,9 @@ def _travel(person: Person, hand: int, receptacle: ReceptacleGeometry, hover: Ve
 def _descend(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, slot: Slot, low: float
 ) -> Steps:
-    """Lower an object until its lowest point, `low` metres below the hand, is just above the fill height.
+    """Lower an object until its lowest point, `low` relative to the hand, is just above the fill height.
 
-    If the object touches anything, stop, and raise it until the overlap is small.
+    If the object touches anything on the way down, it is raised until the overlap is small.
     """
     rig = person.rig
     release = slot.fill + person.motion.release_gap - low
@@ -170,7 +170,7 @@ def overlap(person: Person, item: int) -> float:
 def deepest_overlap(
     geoms: NDArray[np.int32], distances: Vector, owner: NDArray[np.int32], item: int, foot: int
 ) -> float:
-    """Return an object's deepest overlap in metres, ignoring the foot, from contacts (k, 2) and distances (k,)."""
+    """Return an object's deepest overlap in metres with geoms other than the foot. `geoms` is (k, 2)."""
     deepest = 0.0
     for c in range(len(distances)):
         first, second = geoms[c, 0], geoms[c, 1]

@@ -1,7 +1,7 @@
-"""Free space for carried loads, now and in the near future.
+"""Kernels that find free space for carried objects, both now and in the near future.
 
-The kernels look up the clearance where the hand will be soon, and move the hand away from geoms that are too near. For
-example, a person draws in a box when passing a door frame.
+They look up the clearance at predicted positions of the hand, and move the hand away from geoms that are too
+close. For example, a person who carries a box pulls it closer to the body before a door frame.
 """
 
 import math
@@ -21,15 +21,15 @@ X, Y, HEADING = 0, 1, 2
 FORWARD, LEFT, TURN = 0, 1, 2
 
 ROUNDS = 3
-# Candidate positions of a hand, as fractions of the way from the body's axis to the posture.
+# Candidate positions of a hand, as fractions of the distance from the body's axis to the posture.
 EXTENSIONS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class BodyMotion(NamedTuple):
-    """Pose and command of the body, and the clearance around it."""
+    """The pose and the command of the body, and the clearance field of the house."""
 
     pose: Floats  # starts with x, y (metres) and heading (radians), shape (10,) or longer
-    command: Floats  # starts with the forward and left velocity (m/s) and the yaw rate (rad/s), shape (3,) or longer
+    command: Floats  # starts with forward and left velocity (m/s) and yaw rate (rad/s), shape (3,) or longer
     clearance: ClearanceField  # clearance at the heights of carried objects
 
 
@@ -37,10 +37,10 @@ class BodyMotion(NamedTuple):
 def drawn_in(
     forward: float, left: float, radius: float, body: BodyMotion, carrying: CarryingParameters
 ) -> tuple[float, float]:
-    """Return the (forward, left) position closest to a posture where a load is clear of the house, now and soon.
+    """Return a hand position (forward, left) near a posture at which a load will not collide soon.
 
-    The kernel tries a sideways shift first, such as past a door frame. Otherwise it chooses a point between the body's
-    axis and the posture, as far out as the line from the axis is clear, because the far side of a wall is out of reach.
+    First, a sideways shift is tried, for example past a door frame. If it does not help, the hand is pulled
+    towards the body's axis until the line from the axis to the hand is clear.
     """
     needed = radius + carrying.margin
     shift_f, shift_l = _sideways(forward, left, needed, body, carrying)

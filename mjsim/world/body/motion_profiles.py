@@ -1,4 +1,4 @@
-"""Kernels for hand movements from point to point, and for commands whose rates are limited."""
+"""Kernels for point-to-point movements of a hand and for rate-limited commands."""
 
 import math
 
@@ -9,21 +9,21 @@ from mjsim.support.kernels import kernel
 
 STRAIGHT, ACROSS_FIRST, UP_FIRST = 0, 1, 2  # order of the horizontal and vertical parts of a movement
 
-# Velocity forward and left (m/s), yaw rate (rad/s) and pitch of the head (rad): `Rig.motion`, or part of a body state.
+# Forward and left velocity (m/s), yaw rate (rad/s) and pitch of the head (rad), as in `Rig.motion`.
 Command = NDArray[np.float64]
 FORWARD, LEFT, TURN, LOOK = 0, 1, 2, 3
 
 
 @kernel
 def minimum_jerk(phase: float) -> float:
-    """Return the progress from 0 to 1 of a minimum-jerk movement at a phase from 0 to 1 (Flash and Hogan, 1985)."""
+    """Return the progress of a minimum-jerk movement (Flash and Hogan, 1985) at a phase, both from 0 to 1."""
     s = min(1.0, max(0.0, phase))
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 @kernel
 def progress(phase: float, order: int, lead: float) -> tuple[float, float]:
-    """Return the horizontal and vertical progress at a phase, all from 0 to 1. One part starts earlier by `lead`."""
+    """Return the horizontal and vertical progress of a movement. One of the two starts `lead` earlier."""
     if order == STRAIGHT:
         share = minimum_jerk(phase)
         return share, share
@@ -47,7 +47,7 @@ def point_between(
 def change_velocity(
     command: Command, forward: float, left: float, max_speed: float, max_change: float
 ) -> None:
-    """Change the velocity towards a target, by at most `max_change` and up to `max_speed`, in m/s."""
+    """Change the commanded velocity towards a target by at most `max_change`, within `max_speed`, in m/s."""
     speed = math.hypot(forward, left)
     if speed > max_speed:
         forward, left = forward * (max_speed / speed), left * (max_speed / speed)
@@ -62,7 +62,7 @@ def change_velocity(
 
 @kernel
 def change_turn_rate(command: Command, rate: float, max_rate: float, max_change: float) -> None:
-    """Change the yaw rate towards a target, by at most `max_change` and up to `max_rate`, in rad/s."""
+    """Change the commanded yaw rate towards a target by at most `max_change`, within `max_rate`, in rad/s."""
     change = min(max_rate, max(-max_rate, rate)) - command[TURN]
     command[TURN] += min(max_change, max(-max_change, change))
 
@@ -71,7 +71,7 @@ def change_turn_rate(command: Command, rate: float, max_rate: float, max_change:
 def change_pitch(
     command: Command, rate: float, max_rate: float, lowest: float, highest: float, seconds: float
 ) -> None:
-    """Change the pitch at a rate of at most `max_rate` (rad/s), and keep it between `lowest` and `highest` (rad)."""
+    """Change the commanded pitch at `rate` (rad/s), within the limits of the rate and of the pitch (rad)."""
     rate = min(max_rate, max(-max_rate, rate))
     if rate != 0.0:
         command[LOOK] = min(highest, max(lowest, command[LOOK] + rate * seconds))

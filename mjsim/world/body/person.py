@@ -1,4 +1,4 @@
-"""The person in full physics: state, servos, grips, and the basic movements that make up motions."""
+"""The person in the physics simulation, and the basic movements of which picks and places consist."""
 
 import math
 from collections.abc import Callable, Generator, Iterator
@@ -21,25 +21,25 @@ from mjsim.world.body.motion_profiles import change_pitch, change_turn_rate, cha
 from mjsim.world.body.postures import move_hand, posture_pace
 from mjsim.world.body.rig import Rig
 
-# A motion sets the servos, yields once per control step, and finally returns True if it succeeded.
+# A motion is a generator that sets the servos, yields once per control step, and returns True on success.
 Motion = Generator[None, None, bool]
 Steps = Generator[None, None, None]
 
 
 @dataclass(eq=False)
 class Person:
-    """The person's body in a running world."""
+    """The person's body in a running physics simulation."""
 
     scene: Scene
     options: WorldOptions
     data: mujoco.MjData
     rig: Rig
     grips: Grips
-    # Indices of the objects in the left and the right hand, or None.
+    # Indices of the objects in the left and the right hand, None for an empty hand.
     held: list[int | None] = field(default_factory=lambda: [None, None])
-    # Velocities of the targets of hands that no motion moves, in m/s, shape (2, 3).
+    # Velocity of each hand's target while no motion moves the hand, in m/s, shape (2, 3).
     hand_velocities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 3)))
-    moving_hand: int | None = None  # hand that a motion moves; the other hand keeps its posture
+    moving_hand: int | None = None  # hand that the current motion moves, or None
     receptacle_heights: ReceptacleHeights = field(init=False)
     posture_pace: NDArray[np.float64] = field(init=False)  # see `Hands.pace` in `mjsim.world.body.postures`
 
@@ -73,14 +73,14 @@ class Person:
         return max(1, round(seconds / self.dt))
 
     def travel_steps(self, distance: float) -> int:
-        """Return the number of control steps that a loaded hand takes to travel a distance in metres."""
+        """Return the number of control steps that a loaded hand needs to move by a distance in metres."""
         motion = self.motion
         if distance < motion.least_travel:
             return 0
         return self.steps(motion.start_time + distance / motion.travel_speed)
 
     def descent_steps(self, height: float) -> int:
-        """Return the number of control steps that a hand takes to lower a load by a height in metres."""
+        """Return the number of control steps that a hand needs to lower an object by a height in metres."""
         return self.steps(self.motion.start_time + height / self.motion.descent_speed)
 
     def carried_bodies(self) -> frozenset[int]:
@@ -103,12 +103,12 @@ class Person:
         return not self.data.tree_awake[self.scene.index.trees[item]]
 
     def walk(self, move: Move) -> None:
-        """Change the commanded velocities and pitch towards those of a move, within the person's limits."""
+        """Change the commanded velocities and head pitch towards a move, within the person's limits."""
         forward, left, turn, look = float(move.forward), float(move.left), float(move.turn), float(move.look)
         change_command(self.rig.motion, forward, left, turn, look, self._limits)
 
     def brake(self) -> None:
-        """Slow down for one control step. Turning and looking are not affected."""
+        """Reduce the walking speed for one control step. Turns and head movements are not affected."""
         rig = self.rig
         size = math.hypot(rig.motion[0], rig.motion[1])
         rig.motion[:2] *= (
@@ -122,20 +122,20 @@ class Person:
         rig.motion[2] += _clip(change, person.turning_acceleration * self.dt)
 
     def glance(self, point: NDArray[np.float64]) -> None:
-        """Move the head's pitch towards a point (3,) in the house."""
+        """Tilt the head towards a point (3,) in the house for one control step."""
         x, y, z = point.tolist()
         eye_x, eye_y, eye_z = self.rig.eye.tolist()
         self.look_towards(math.atan2(z - eye_z, math.hypot(x - eye_x, y - eye_y)))
 
     def look_towards(self, pitch: float) -> None:
-        """Move the head's pitch towards an angle in radians, at the speed of a glance."""
+        """Tilt the head towards a pitch in radians for one control step, at the speed of a glance."""
         target, motion = self.rig.pitch_target, self.motion
         target += _clip(motion.look_gain * (pitch - target), motion.look_speed * self.dt)
         lowest, highest = avatar.PITCH_RANGE
         self.rig.motion[3] = min(highest, max(lowest, target))
 
     def face(self, point: NDArray[np.float64], tolerance: float, heading: float | None = None) -> Steps:
-        """Stand still, look at a point (3,), and turn to it or to a heading until the error is within a tolerance."""
+        """Stop, look at a point (3,), and turn to it or to `heading` until the error is below `tolerance`."""
         motion = self.motion
         for _ in range(self.steps(motion.turn_timeout)):
             error = self.rig.bearing(point) if heading is None else wrap(heading - self.rig.heading)
@@ -153,7 +153,7 @@ class Person:
     def swing(
         self, hand: int, goal: Callable[[], NDArray[np.float64]], steps: int, order: int
     ) -> Iterator[None]:
-        """Move a hand's target to a goal (3,), which may change on the way, one control step per iteration."""
+        """Move a hand's target to a goal (3,) that may itself move. Each iteration is one control step."""
         start = self.rig.hand_targets[hand].copy()
         for k in range(1, steps + 1):
             self.rig.hand_targets[hand] = point_between(start, goal(), k / steps, order, self.motion.lead)
@@ -176,8 +176,8 @@ def change_command(
 ) -> None:
     """Change a command (forward, left, yaw rate, pitch) towards a move for one control step.
 
-    `limits` (8,) has the maximum walking speed, acceleration, yaw rate, angular acceleration and pitch rate, the lowest
-    and highest pitch, and the duration of a control step, in SI units.
+    `limits` (8,) contains the maximum walking speed, acceleration, yaw rate, angular acceleration and pitch
+    rate, the lowest and highest pitch, and the duration of a control step, in SI units.
     """
     max_speed, acceleration, max_turn, turn_acceleration, max_look, lowest, highest, dt = limits
     change_velocity(command, forward, left, max_speed, acceleration * dt)

@@ -1,8 +1,7 @@
-"""Kernels that update the hands' postures for one control step, so that loads stay in free space.
+"""Kernels that update the hand postures in each control step and keep carried objects in free space.
 
-If a load nevertheless touches something static (`mjsim.world.body.load_room`), the hand yields along the contact's
-normal, up to a limit. Beyond the limit, the body stops walking or turning into the contact. The arrays belong to the
-`Rig` and to `Carrying`, and are changed in place.
+If an object nevertheless touches a static geom, the hand yields along the contact normal, up to a limit.
+Beyond this limit, the body stops walking or turning into the contact.
 """
 
 import math
@@ -18,43 +17,43 @@ from mjsim.world.body.load_room import FORWARD, HEADING, LEFT, TURN, BodyMotion,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-# A contact with a larger horizontal component of its normal is with an obstacle, not with a surface below.
+# Horizontal part of a contact normal above which the object touches an obstacle and not a surface below it.
 UPRIGHT = 0.3
 
 _ARRIVED = 0.0005  # distance to the goal at which a hand stops, in metres
 
 
 class Hands(NamedTuple):
-    """Control of both hands, left before right, in the body frame."""
+    """Arrays for the control of the left and the right hand, in the body frame."""
 
-    targets: Floats  # commanded positions in metres, shape (2, 3)
-    velocities: Floats  # target velocities in m/s, shape (2, 3)
-    compliance: Floats  # offsets by which the hands yield to contacts, in metres, shape (2, 2)
-    goals: Floats  # buffer for the goals of the targets, in metres, shape (2, 3)
+    targets: Floats  # commanded positions of the hands in metres, shape (2, 3)
+    velocities: Floats  # velocities of the targets in m/s, shape (2, 3)
+    compliance: Floats  # horizontal offsets by which the hands yield to contacts, in metres, shape (2, 2)
+    goals: Floats  # buffer for the positions towards which the targets move, in metres, shape (2, 3)
     rest: Floats  # rest posture of the left hand, in metres, shape (3,)
-    loads: Floats  # horizontal radius of each object around its grip and extent below the grip, in metres, shape (n, 2)
+    loads: Floats  # radius and downward extent of each object, measured from its grip in metres, shape (n, 2)
     pace: Floats  # gain (1/s), speed limit (m/s) and acceleration limit (m/s^2) of the targets, shape (3,)
 
 
 class Contacts(NamedTuple):
-    """Contacts of the physics."""
+    """The contacts in the physics simulation."""
 
-    geoms: Ints  # geoms of each contact, shape (k, 2)
-    frames: Floats  # frame of each contact, with the normal first, shape (k, 9)
+    geoms: Ints  # ids of the two geoms of each contact, shape (k, 2)
+    frames: Floats  # axes of each contact frame, of which the first is the normal, shape (k, 9)
     owners: Ints  # object index of each geom, -1 for the house, -2 for the person, shape (ngeom,)
 
 
 class Holding(NamedTuple):
-    """Loads of the hands, and the posture of loaded hands."""
+    """The objects in the hands, and the posture of a hand that holds an object."""
 
-    left: int  # index of the object in the hand, or -1
+    left: int  # index of the object in the hand, or -1 if the hand is empty
     right: int
-    moving: int  # hand that a motion moves, or -1
+    moving: int  # hand that the current motion moves, or -1
     posture: Floats  # posture of a loaded left hand, in metres, shape (3,)
 
 
 def posture_pace(motion: MotionParameters) -> Floats:
-    """Return a person's value of `Hands.pace`, shape (3,)."""
+    """Return the values of `Hands.pace` for a person, shape (3,)."""
     return np.array([motion.posture_gain, motion.posture_speed, motion.posture_acceleration])
 
 
@@ -67,7 +66,7 @@ def update_hands(
     contacts: Contacts,
     dt: float,
 ) -> None:
-    """Set the targets of hands that no motion moves, and keep the walking command from pressing into contacts."""
+    """Update the targets of hands that no motion moves. Cancel commands that push objects into walls."""
     for hand in range(2):
         side = 1.0 - 2.0 * hand
         hands.compliance[hand, 0] *= 1.0 - carrying.return_rate * dt
@@ -96,9 +95,9 @@ def update_hands(
 def move_hand(
     targets: Floats, velocities: Floats, hand: int, x: float, y: float, z: float, pace: Floats, dt: float
 ) -> None:
-    """Move a hand's target towards x, y, z in the body frame for `dt` seconds, slowing down near the goal.
+    """Move a hand's target towards x, y, z in the body frame for `dt` seconds. It slows down near the goal.
 
-    Updates `targets` (2, 3), in metres, and `velocities` (2, 3), in m/s. `pace` is `Hands.pace`.
+    `targets` (2, 3), in metres, and `velocities` (2, 3), in m/s, are updated. `pace` is `Hands.pace`.
     """
     dx, dy, dz = x - targets[hand, 0], y - targets[hand, 1], z - targets[hand, 2]
     gap = math.sqrt(dx * dx + dy * dy + dz * dz)

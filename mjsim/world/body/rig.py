@@ -1,4 +1,4 @@
-"""The person's servos: poses, commands, and the physics steps of a control step."""
+"""The person's joints and servos, and the physics steps of a control step."""
 
 import math
 from dataclasses import dataclass
@@ -15,31 +15,31 @@ from mjsim.values.errors import AssetError
 
 Vector = NDArray[np.float64]
 
-# Indices of a body state: pose, velocity in the house frame, commands in the body frame, the pitch of the head, and,
-# from `SERVO` on, the latest servo commands for x, y, yaw and pitch in the house frame. Units are metres and radians.
+# Indices into a body state: pose, velocities in the house frame, commands in the body frame, and the latest
+# servo commands for x, y, yaw and pitch in the house frame. Units are metres, radians and seconds.
 X, Y, HEADING, PITCH = 0, 1, 2, 3
 VX, VY, TURN_RATE, PITCH_RATE = 4, 5, 6, 7
 FORWARD, LEFT, TURN, LOOK = 8, 9, 10, 11
 SERVO = 12
 BODY_SIZE = 16
 
-# A position servo with damping lags behind a moving target by kv / kp seconds, so commands run ahead by that.
+# A damped position servo lags behind a moving target by kv / kp seconds. Commands lead by the same time.
 _LEAD = avatar.HAND_KV / avatar.HAND_KP
 _SERVOS = 10
 
 
 @dataclass(frozen=True, eq=False)
 class RigState:
-    """Commands of the person."""
+    """The commands to the person's servos."""
 
     motion: Vector  # see `Rig.motion`, shape (4,)
     hand_targets: Vector  # see `Rig.hand_targets`, in metres, shape (2, 3)
     previous_hand_targets: Vector  # `hand_targets` in the previous control step, shape (2, 3)
-    command: Vector  # previous servo commands: velocities of x, y and yaw, pitch, hand positions, shape (10,)
+    command: Vector  # previous servo commands: x, y and yaw velocity, pitch, and hand positions, shape (10,)
 
 
 class Rig:
-    """Interface to the person's joints and servos in a simulation."""
+    """An interface to the person's joints and servos in a simulation."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, control_timestep: float) -> None:
         self.model, self.data = scene.model, data
@@ -56,7 +56,7 @@ class Rig:
         self.rates = _view(data.qvel, model.jnt_dofadr[ids])  # velocities of `pose`, shape (10,)
         self._activations = _view(data.act, model.actuator_actadr[actuators])
         self._controls = _view(data.ctrl, actuators)
-        # Commanded velocity forward and left (m/s), yaw rate (rad/s) and pitch (rad).
+        # Commanded forward and left velocity (m/s), yaw rate (rad/s) and pitch of the head (rad).
         self.motion = np.zeros(4)
         self.hand_targets = np.zeros((2, 3))  # commanded hand positions in the body frame, in metres
         self._last_hand_targets = np.zeros((2, 3))
@@ -81,7 +81,7 @@ class Rig:
 
     @property
     def body_state(self) -> Vector:
-        """Poses, rates and commands, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
+        """The body state, shape (BODY_SIZE,), whose layout is defined by constants of this module."""
         return np.concatenate((self.pose[:4], self.rates[:4], self.motion, self._last_command[:4]))
 
     def get_state(self) -> RigState:
@@ -104,12 +104,12 @@ class Rig:
 
     @property
     def position(self) -> Vector:
-        """Position of the body's axis on the floor in metres, shape (2,)."""
+        """The position of the body's axis on the floor in metres, shape (2,)."""
         return self.pose[:2].copy()
 
     @property
     def heading(self) -> float:
-        """Yaw in radians, not wrapped."""
+        """The yaw angle in radians, which is not wrapped."""
         return float(self.pose[2])
 
     @property
@@ -126,12 +126,12 @@ class Rig:
 
     @property
     def hands(self) -> Vector:
-        """Positions (2, 3) of the hands in the body frame, in metres."""
+        """The positions (2, 3) of the hands in the body frame, in metres."""
         return self.pose[4:].reshape(2, 3).copy()
 
     @property
     def eye(self) -> Vector:
-        """Position (3,) of the eye in the house frame, in metres."""
+        """The position (3,) of the eye in the house frame, in metres."""
         x, y, heading, pitch = self.pose[:4].tolist()
         return np.array(avatar.eye_position(x, y, heading, pitch, self._eye_height))
 
@@ -150,7 +150,7 @@ class Rig:
         return math.atan2(c * dy - s * dx, c * dx + s * dy)
 
     def advance(self) -> None:
-        """Advance the physics by one control step, while the servos ramp from the previous commands to the new ones."""
+        """Simulate one control step, during which the servos ramp from the previous to the new commands."""
         ramp_servos(
             self.pose, self.motion, self.hand_targets, self._last_hand_targets, self._last_command,
             self._activations, self._controls, self._dt,
@@ -163,10 +163,10 @@ def ramp_servos(
     pose: Vector, motion: Vector, targets: Vector, last_targets: Vector, last_command: Vector,
     activations: Vector, controls: Vector, dt: float,
 ) -> None:  # fmt: skip
-    """Set up the servos' activations and their rates so that they reach the commands in one control step.
+    """Set the activations of the servos and their rates, so that they reach the commands in one control step.
 
-    The hands ramp from `last_targets` (2, 3), and the lead is applied at once. `activations` and `controls` (10,) are
-    those of `MjData.act` and `MjData.ctrl`. All arrays from `last_targets` on are overwritten.
+    The hand targets ramp from `last_targets` (2, 3) to `targets`, both shifted by the lead. `activations` and
+    `controls` (10,) are views of `MjData`. All arrays from `last_targets` on are overwritten.
     """
     heading = pose[2] + 0.5 * motion[2] * dt
     c, s = math.cos(heading), math.sin(heading)

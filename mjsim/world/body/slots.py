@@ -1,4 +1,4 @@
-"""Slots of receptacles: a height map of the contents, measured by ray casts, and the best slot for an object."""
+"""Choose slots in receptacles from height maps of their contents, which are measured by ray casts."""
 
 import itertools
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from mjsim.world.body.person import Person
 
 Vector = NDArray[np.float64]
 
-_WALL_GAP = 0.012  # gap between an object and the walls, in metres
-_SIDE_GAP = 0.006  # free width around an object on its way down, in metres
+_WALL_GAP = 0.012  # gap between an object and the walls of its receptacle, in metres
+_SIDE_GAP = 0.006  # free space required on each side of an object that is lowered, in metres
 _MAX_SPACING = 0.02  # maximum distance between points of the height map, in metres
 _RAYS_ABOVE = 0.2  # start height of rays above the receptacle's volume, in metres
 _SLOTS = np.array(list(itertools.product((-0.5, 0.5), repeat=2)))
 _OTHER_PLACES = np.array(list(itertools.product(np.linspace(-1.0, 1.0, 9), repeat=2)))
-_SLOPE_COST = 2.0  # cost of a mean gap below the object relative to the cost of fill height
-# Another position is preferred to the best slot only if it costs less by at least this, in metres.
+_SLOPE_COST = 2.0  # cost of the mean gap below an object, relative to the cost of an equal fill height
+# Minimum reduction of the cost for which a position between the slots is chosen, in metres.
 _MIN_GAIN = 0.015
 
 
 @dataclass(frozen=True, eq=False)
 class LoadExtent:
-    """Extent of a held object around the hand, along the receptacle's axes."""
+    """The bounding box of a held object relative to the hand, along the receptacle's axes."""
 
     low: Vector  # minimum coordinates of the object's corners in metres, shape (3,)
     high: Vector  # maximum coordinates of the object's corners in metres, shape (3,)
@@ -34,11 +34,11 @@ class LoadExtent:
 
 @dataclass(frozen=True, eq=False)
 class Slot:
-    """A position in a receptacle for an object."""
+    """A position in a receptacle at which an object can be placed."""
 
-    hand: Vector  # position of the hand when it releases the object, along the receptacle's axes, in metres, shape (2,)
-    fill: float  # height of the contents below the object, relative to the centre of the receptacle's volume, in metres
-    top: float  # height of the highest contents, relative to the same centre, in metres
+    hand: Vector  # position of the opening hand along the receptacle's axes, in metres, shape (2,)
+    fill: float  # height of the contents below the object, relative to the volume's centre, in metres
+    top: float  # height of the highest contents, relative to the volume's centre, in metres
 
 
 def object_corners(model: mujoco.MjModel, geoms: NDArray[np.intp]) -> Vector:
@@ -69,7 +69,7 @@ def _geom_points(model: mujoco.MjModel, geom: int) -> Vector:
 def load_extent(
     person: Person, hand: int, item: int, receptacle: ReceptacleGeometry, corners: Vector
 ) -> LoadExtent:
-    """Measure the extent of an object in a hand from its `corners` (k, 3), which are in the object's frame."""
+    """Return the extent of a held object, given its `corners` (k, 3) in the object's frame."""
     body = int(person.scene.index.bodies[item])
     world = corners @ person.data.xmat[body].reshape(3, 3).T + person.data.xpos[body]
     local = (world - person.data.site_xpos[person.rig.grip_sites[hand]]) @ receptacle.rotation
@@ -79,8 +79,8 @@ def load_extent(
 def best_slot(person: Person, item: int, receptacle: ReceptacleGeometry, extent: LoadExtent) -> Slot:
     """Choose the slot in which an object will lie lowest and most level.
 
-    There are 2 x 2 slots. Among equally good ones, the nearest to the person is chosen. A position between slots is
-    chosen only if it is better by more than `_MIN_GAIN`. At all positions, the object clears the walls if possible.
+    A receptacle has 2 x 2 slots. Among equally good slots, the nearest to the person is chosen. A position
+    between slots must be better by more than `_MIN_GAIN`. If possible, the object does not touch the walls.
     """
     half = receptacle.half_size[:2]
     middle = 0.5 * (extent.low + extent.high)[:2]
@@ -114,7 +114,7 @@ def _height_map(person: Person, item: int, receptacle: ReceptacleGeometry) -> tu
 @kernel
 def _fill_below(centres: Vector, half: Vector, points: Vector, heights: Vector) -> tuple[Vector, Vector]:
     fills, costs = np.full(len(centres), -np.inf), np.empty(len(centres))
-    # Large enough to include at least one point of the map.
+    # The reach is large enough to include at least one point of the height map.
     reach = np.maximum(half + _SIDE_GAP, _MAX_SPACING)
     for k in range(len(centres)):
         total, count = 0.0, 0

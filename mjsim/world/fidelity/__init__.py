@@ -1,4 +1,4 @@
-"""Levels of fidelity: `full` physics, and `event`, which simulates only falling objects (docs/simulation.md)."""
+"""The two levels of fidelity. `full` simulates all movements by physics, and `event` only falling objects."""
 
 from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
@@ -9,5 +9,5 @@ __all__ = ["make_tier"]
 
 
 def make_tier(scene: Scene, options: WorldOptions) -> Full | Event:
-    """Create the implementation of the fidelity in the options. Call `reset` before its first step."""
+    """Create a simulation with the fidelity given in the options. Call `reset` before its first step."""
     return (Full if options.fidelity == "full" else Event)(scene, options)

@@ -1,4 +1,4 @@
-"""Fidelity `event`: picks and places are planned in advance and played. Only released objects fall by physics."""
+"""Fidelity `event`, in which picks and places are planned in advance. Physics moves only falling objects."""
 
 import math
 from dataclasses import dataclass
@@ -24,23 +24,23 @@ from mjsim.world.walking.path_following import Walk
 
 @dataclass(eq=False)
 class ActiveMotion:
-    """A planned motion that is being played."""
+    """A planned motion that is in progress."""
 
     plan: PlannedMotion
-    result: ActionResult  # answer to the action that started the motion
+    result: ActionResult  # result of the action that started the motion
     hand: int
     item: int
     played: int = 0  # number of control steps played so far
 
     @property
     def next_stop(self) -> int:
-        """Next control step at which an event occurs, or else the last one. One call can play the motion up to it."""
+        """The next control step at which an event occurs, or the last control step if there is none."""
         incidents = (step + 1 for step, _, _ in self.plan.incidents if step >= self.played)
         return min(incidents, default=self.plan.length)
 
 
 class Event(Tier):
-    """Kinematic simulation of the person with planned motions."""
+    """A kinematic simulation of the person, in which picks and places follow planned trajectories."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         self._full = Full(scene, options)
@@ -48,11 +48,11 @@ class Event(Tier):
         self._kinematic = KinematicWorld(self._full, options)
         self._planner = MotionPlanner(self._full, self._kinematic)
         self._motion: ActiveMotion | None = None
-        self._in_step = False  # True if the physics data show the current state
+        self._in_step = False  # True if the physics data are up to date
 
     @property
     def data(self) -> mujoco.MjData:
-        """Physics data, updated to the current state for rendering and ray casts."""
+        """The physics data for rendering and ray casts, updated to the current state."""
         if not self._in_step:
             self._kinematic.write(self._full.data)
             self._in_step = True
@@ -86,7 +86,7 @@ class Event(Tier):
 
     @property
     def health_sample(self) -> HealthSample:
-        # Held objects are exactly at the hands, and nothing else touches anything.
+        # Held objects are aligned exactly with the hands, and there are no contacts.
         left, right = (math.nan if grasp is None else 0.0 for grasp in self._kinematic.grasps)
         return HealthSample(weld_error_m=(left, right), weld_error_rad=(left, right))
 

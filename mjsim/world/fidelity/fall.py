@@ -1,4 +1,4 @@
-"""Physics simulation of a released object's fall in an otherwise kinematic world."""
+"""Physics simulation of a falling object in an otherwise kinematic world."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,30 +15,30 @@ from mjsim.world.fidelity.full import Full
 from mjsim.world.fidelity.kinematic_steps import GRASPS, HAND_SPEEDS, HANDS
 from mjsim.world.fidelity.kinematic_world import KinematicWorld
 
-# Time for other objects to settle after the released object has come to rest, in seconds.
+# Maximum time for other objects to come to rest after the released object, in seconds.
 _SETTLING_TIME = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Fall:
-    """Result of releasing an object."""
+    """The result of simulating the fall of a released object."""
 
     # Poses (metres and wxyz) of all objects after each control step of the fall, shape (k, n, 7).
     poses: NDArray[np.float64]
     rest: NDArray[np.float64]  # final poses of all objects, shape (n, 7)
     success: bool  # True if the released object is at rest in its receptacle
-    incidents: tuple[tuple[int, EventKind, int], ...]  # other events: control step, type and object index
+    incidents: tuple[tuple[int, EventKind, int], ...]  # control step, type and object index of other events
 
 
 def drop(full: Full, kinematic: KinematicWorld, hand: int, item: int, receptacle: ReceptacleGeometry) -> Fall:
-    """Simulate the release of an object while the person stands. Sleeping objects stay asleep unless touched.
+    """Simulate the fall of an object that a standing person releases. Sleeping objects wake up if touched.
 
-    Afterwards, the hand is empty and the sleep states are updated in the kinematic world.
+    Afterwards, the hand in the kinematic world is empty, and the sleep states are updated.
     """
     person = full.person
     options = person.options
     _enter(full, kinematic)
-    full.monitor.check(person.held)  # record the last time and position at which the hand holds the object
+    full.monitor.check(person.held)  # records when and where the hand last held the object
     person.grips.open(hand)
     kinematic.release(hand)
     held = [None if other == item else other for other in person.held]
@@ -69,7 +69,7 @@ def _advance(full: Full, held: Sequence[int | None]) -> list[tuple[EventKind, in
 
 
 def _enter(full: Full, kinematic: KinematicWorld) -> None:
-    """Set the physics to the kinematic state, including velocities, commands, welds and sleep states."""
+    """Copy the kinematic state to the physics, including velocities, commands, welds and sleep states."""
     model, data, person = full.scene.model, full.data, full.person
     body, vector = kinematic.body, kinematic.state.vector
     hands, hand_speeds = vector[HANDS:HAND_SPEEDS], vector[HAND_SPEEDS:GRASPS]
@@ -86,7 +86,7 @@ def _enter(full: Full, kinematic: KinematicWorld) -> None:
         if grasp is not None:
             person.grips.close(hand, *grasp)
             _set_velocity(full, kinematic, hand, grasp[0])
-    mujoco.mj_makeM(model, data)  # Include sleeping objects, because one may wake up in the middle of a step.
+    mujoco.mj_makeM(model, data)  # includes sleeping objects, which may wake up during a step
     mujoco.mj_factorM(model, data)
     _put_to_sleep(data, kinematic)
     mujoco.mj_forward(model, data)
@@ -109,9 +109,9 @@ def _set_velocity(full: Full, kinematic: KinematicWorld, hand: int, item: int) -
 
 
 def _put_to_sleep(data: mujoco.MjData, kinematic: KinematicWorld) -> None:
-    """Put the kinematic trees that are at rest to sleep, with effect from the next forward pass.
+    """Put all kinematic trees that are at rest to sleep. This takes effect in the next forward pass.
 
-    MuJoCo updates its list of sleeping trees only when a tree wakes up, so this wakes the person's tree.
+    MuJoCo updates its list of sleeping trees only when a tree wakes up, so the person's tree is woken.
     """
     data.tree_asleep[:] = kinematic.asleep
     data.tree_awake[:] = data.tree_asleep < 0

@@ -1,6 +1,6 @@
-"""Fidelity `full`: walking, reaching, carrying and releasing are simulated by physics.
+"""Fidelity `full`, in which all movements of the person and the objects are simulated by physics.
 
-MuJoCo's timers of physics steps are turned off, because they would take a twentieth of a trial's time.
+MuJoCo's timers are turned off, because they would take a twentieth of a trial's computing time.
 """
 
 import functools
@@ -29,14 +29,14 @@ from mjsim.world.fidelity.tier import EpisodeState, Tier
 from mjsim.world.health.monitor import Health, HealthMonitor, HealthSample
 from mjsim.world.state import PersonState, StateHash, WorldState, set_physics, take_physics
 
-# Later objects may push a delivered object this far out of its receptacle's volume, in metres.
+# Distance in metres by which other objects may push a delivered object out of its receptacle's volume.
 _DISLODGED_MARGIN = 0.03
 
 
 def stop_engine_clock() -> None:
     """Stop MuJoCo's timers (`MjData.timer`) in this process, unless a custom clock is set.
 
-    `mujoco.set_mjcb_time(None)` restores MuJoCo's own clock.
+    To start the timers again, call `mujoco.set_mjcb_time(None)`.
     """
     if mujoco.get_mjcb_time() is None:
         mujoco.set_mjcb_time(_no_time().ctypes)
@@ -61,7 +61,7 @@ class _Motion:
 
 
 class Full(Tier):
-    """Simulation of everything by physics. `Event` uses parts of it where it needs physics."""
+    """A physics simulation of the person and all objects. `Event` reuses parts of it."""
 
     def __init__(self, scene: Scene, options: WorldOptions) -> None:
         stop_engine_clock()
@@ -125,7 +125,7 @@ class Full(Tier):
         return result
 
     def resolve(self, action: StepAction, *, busy: bool) -> ActionResult | None:
-        """Answer a pick or place from the state of the physics. Return None for a move."""
+        """Return the result of a pick or place in the current state of the physics, or None for a move."""
         if isinstance(action, Move):
             return None
         if isinstance(action, Pick):
@@ -137,7 +137,7 @@ class Full(Tier):
         raise ActionError(f"expected a Move, Pick or Place, got {action!r}")
 
     def hand_for(self, result: ActionResult) -> tuple[int, int]:
-        """Return the hand and object of a feasible action. If both hands are free, a pick uses the nearer one."""
+        """Return the hand and the object of an action. If both hands are free, a pick uses the nearer one."""
         item = self.scene.index.position_of(str(result.object))
         if isinstance(result.action, Place):
             return self.episode_state.held.index(item), item
@@ -156,7 +156,7 @@ class Full(Tier):
         self._motion = _Motion(steps, result.action, hand, item, result.receptacle)
 
     def advance(self, move: Move) -> None:
-        """Simulate one control step of walking or of the current motion. Raise a PhysicsError if the physics fails."""
+        """Simulate one control step of a walk or motion. Raise a PhysicsError if the simulation fails."""
         self.episode_state.events = []
         if self._motion is None:
             self.person.walk(move)
@@ -214,11 +214,11 @@ class Full(Tier):
 
     @property
     def is_settled(self) -> bool:
-        """True if all objects outside the hands sleep. Held objects are kept awake by the person."""
+        """True if all objects except the held ones are asleep."""
         return bool(self.data.ntree_awake == 1 + len(self.person.grips.gripped))
 
     def poses(self) -> NDArray[np.float64]:
-        """Return the poses (metres and wxyz) of all objects, shape (n, 7)."""
+        """Return the poses of all objects (metres and wxyz), shape (n, 7)."""
         return np.array(self.data.qpos[self.scene.index.qpos[:, None] + np.arange(7)])
 
     def _in_place(self, item: int) -> bool:
@@ -243,7 +243,7 @@ class Full(Tier):
         self.person.moving_hand = None
 
     def _held_posture(self) -> tuple[float, float, float]:
-        """Return the posture of loaded hands: close to the body during turns, and out of the way of a reaching hand."""
+        """Return the posture of loaded hands while the person walks, turns or reaches with the other hand."""
         if self._motion is None:
             return avatar.CARRY
         return avatar.TUCKED if self.person.moving_hand is None else avatar.ASIDE

@@ -1,4 +1,4 @@
-"""Kernels for kinematic control steps: the body walks, hands keep their postures, and held objects move along."""
+"""Kernels that compute kinematic control steps of the body, the hands and the held objects."""
 
 import math
 from typing import NamedTuple
@@ -19,12 +19,12 @@ from mjsim.world.walking.path_following import ARRIVED, BLOCKED, CHANGED, Walk, 
 
 Floats = NDArray[np.float64]
 
-# Layout of `KinematicState.vector`.
+# Indices into `KinematicState.vector`.
 TIME = 0  # simulated time in seconds
-BODY = 1  # body state, laid out as in `mjsim.world.body.rig`
+BODY = 1  # body state, with the layout of `mjsim.world.body.rig`
 HANDS = BODY + BODY_SIZE  # positions of both hands in the body frame, in metres
 HAND_SPEEDS = HANDS + 6  # velocities of the hands in m/s
-GRASPS = HAND_SPEEDS + 6  # for each hand, 2 * object + grip, or -1
+GRASPS = HAND_SPEEDS + 6  # for each hand, 2 * object index + grip index, or -1 if the hand is empty
 STATE_SIZE = GRASPS + 2
 
 REST, CARRY, TUCKED, ASIDE = 0, 1, 2, 3  # rows of `KinematicModel.postures`
@@ -35,7 +35,7 @@ _NO_GEOMS, _NO_FRAMES, _NO_OWNERS = np.zeros((0, 2), np.int32), np.zeros((0, 9))
 
 
 class KinematicState(NamedTuple):
-    """The variable state, which kernels change in place."""
+    """The state of a kinematic world, which kernels modify in place."""
 
     vector: Floats  # time, body, hands and grasps, shape (STATE_SIZE,)
     poses: Floats  # poses (metres and wxyz) of the objects, shape (n, 7)
@@ -44,24 +44,24 @@ class KinematicState(NamedTuple):
 class KinematicModel(NamedTuple):
     """The constants of a kinematic world."""
 
-    gait: Gait  # limits and servos of the body
-    floor: Floor  # outlines of the trunk's obstacles
-    grips: Floats  # pose of each object in the frame of the holding hand, by grip, shape (n, 2, 7)
-    loads: Floats  # horizontal radius of each object around its grip and extent below the grip, in metres, shape (n, 2)
+    gait: Gait  # movement limits and servo parameters of the body
+    floor: Floor  # outlines of the obstacles to the trunk
+    grips: Floats  # pose of each object relative to the holding hand, for each grip, shape (n, 2, 7)
+    loads: Floats  # radius and downward extent of each object, measured from its grip in metres, shape (n, 2)
     posture_pace: Floats  # see `Hands.pace`, shape (3,)
     carrying: CarryingParameters
-    # Postures of the left hand in metres, shape (4, 3): empty (`REST`), or loaded while walking (`CARRY`), turning
-    # (`TUCKED`) or while the other hand reaches (`ASIDE`).
+    # Positions of the left hand in metres, shape (4, 3): empty (`REST`), or loaded while the person walks
+    # (`CARRY`), turns (`TUCKED`) or reaches with the other hand (`ASIDE`).
     postures: Floats
     clearance: ClearanceField  # clearance at the heights of carried objects
     timestep: float  # physics timestep in seconds
-    compliance: Floats  # `Hands.compliance`, always 0 because there are no contacts
+    compliance: Floats  # see `Hands.compliance`; always 0, because there are no contacts
     goals: Floats  # buffer for `Hands.goals`
 
 
 @kernel
 def walk_rows(moves: Floats, state: KinematicState, model: KinematicModel, rows: StepStates) -> None:
-    """Execute one control step for each row of moves (n, 4): forward and left (m/s), turn and look (rad/s)."""
+    """Execute one control step per row of `moves` (n, 4): forward and left (m/s), turn and look (rad/s)."""
     body = state.vector[BODY:HANDS]
     for row in range(len(moves)):
         kinematics.command(body, moves[row, 0], moves[row, 1], moves[row, 2], moves[row, 3], model.gait)
@@ -78,7 +78,7 @@ def follow_rows(
     moves: Floats,
     rows: StepStates,
 ) -> tuple[int, int]:
-    """Walk along a path until the walk has to stop. Store the moves (n, 4) and the states of the steps.
+    """Walk along a path until the walk has to stop. Store the moves (n, 4) and the state after each step.
 
     Returns the number of control steps, at most n, and the latest phase of the walk.
     """
@@ -104,8 +104,8 @@ def follow_rows(
 def control_step(state: KinematicState, posture: int, moving: int, model: KinematicModel) -> None:
     """Execute a control step with the current commands.
 
-    `posture` is the row of `KinematicModel.postures` for loaded hands. `moving` is the hand that keeps its position, or
-    -1.
+    `posture` is the row of `KinematicModel.postures` for loaded hands. `moving` is the hand whose position
+    remains unchanged, or -1.
     """
     vector = state.vector
     body = vector[BODY:HANDS]
@@ -127,7 +127,7 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
         model.gait.dt,
     )
     kinematics.advance(body, model.gait, model.floor)
-    # Add in a loop, so that the time is bit-identical to that of the physics.
+    # Add the timesteps one by one, so that the time is bit-identical to that of the physics.
     for _ in range(model.gait.substeps):
         vector[TIME] += model.timestep
     carry(state, model)
@@ -135,7 +135,7 @@ def control_step(state: KinematicState, posture: int, moving: int, model: Kinema
 
 @kernel
 def held_in(vector: Floats, hand: int) -> int:
-    """Return the object in a hand, or -1. `vector` is that of `KinematicState`."""
+    """Return the index of the object in a hand, or -1. `vector` is `KinematicState.vector`."""
     grasp = int(vector[GRASPS + hand])
     return grasp // 2 if grasp >= 0 else -1
 
@@ -173,7 +173,7 @@ def write_row(row: int, state: KinematicState, rows: StepStates) -> None:
     rows.object_position[row] = state.poses[:, :3]
     rows.object_quaternion[row] = state.poses[:, 3:]
     rows.state_hash[row] = state_hash(state)
-    # Held objects are exactly at the hands, and nothing else touches anything.
+    # Held objects are aligned exactly with the hands, and there are no contacts.
     rows.health[row, :2], rows.health[row, 6] = 0.0, math.nan
     for hand in range(2):
         error = 0.0 if vector[GRASPS + hand] >= 0.0 else math.nan
@@ -186,7 +186,7 @@ def state_hash(state: KinematicState) -> np.uint64:
     for word in state.vector.view(np.uint64):
         digest = (digest ^ word) * _PRIME
         digest ^= digest >> _SHIFT
-    # Hash in four independent chains, which the processor computes in parallel.
+    # Compute four independent hashes, which the processor can do in parallel.
     words = state.poses.reshape(state.poses.size).view(np.uint64)
     lanes = np.array([1, 2, 3, 4], np.uint64)
     for i in range(len(words)):

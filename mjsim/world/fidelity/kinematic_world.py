@@ -1,4 +1,4 @@
-"""Kinematic person and objects: their state, walking, and updates of the data for rendering and ray casts."""
+"""A simulation that moves the person and the objects without physics, and copies their poses to MuJoCo."""
 
 import mujoco
 import numpy as np
@@ -33,17 +33,17 @@ from mjsim.world.fidelity.kinematics import Gait
 from mjsim.world.fidelity.motion_primitives import MotionTrajectory, play_rows
 from mjsim.world.walking.path_following import Walk
 
-# A motionless object with a larger acceleration is not at rest, in m/s^2. Gravity causes 9.8, solver noise about 1.
+# Acceleration in m/s^2 above which a motionless object is not at rest. Solver noise is about 1, gravity 9.8.
 _REST_ACCELERATION = 3.0
 MAX_ROWS = 256  # maximum number of control steps per call
 
 
 class KinematicWorld:
-    """A person and objects that are moved kinematically, by `mjsim.world.fidelity.kinematic_steps`.
+    """A simulation that moves the person and the objects without physics.
 
     Attributes:
-        state: Variable state.
-        model: Constants.
+        state: Current state of the person and the objects.
+        model: Constants of the simulation.
         asleep: Sleep state of each kinematic tree, as in `MjData.tree_asleep`.
     """
 
@@ -81,12 +81,12 @@ class KinematicWorld:
 
     @property
     def body(self) -> NDArray[np.float64]:
-        """The person's body state (BODY_SIZE,). This is a view."""
+        """A view of the person's body state, shape (BODY_SIZE,)."""
         return self._body
 
     @property
     def hands(self) -> NDArray[np.float64]:
-        """Positions (2, 3) of the hands in the body frame, in metres. This is a view."""
+        """A view of the positions (2, 3) of the hands in the body frame, in metres."""
         return self.state.vector[HANDS:HAND_SPEEDS].reshape(2, 3)
 
     @property
@@ -98,7 +98,7 @@ class KinematicWorld:
         return [None if grasp < 0 else divmod(int(grasp), 2) for grasp in self.state.vector[GRASPS:]]
 
     def grasp(self, hand: int, item: int, grip: int) -> None:
-        """Put an object into a hand, aligned with the hand."""
+        """Put an object into a hand, and align it with the hand."""
         self.wake(item)
         self.state.vector[GRASPS + hand] = 2 * item + grip
         carry(self.state, self.model)
@@ -113,7 +113,7 @@ class KinematicWorld:
             self.asleep[tree], tree = AWAKE, int(self.asleep[tree])
 
     def reset(self, data: mujoco.MjData) -> None:
-        """Start from physics data after a reset and `mj_forward`."""
+        """Start from the state in `data`, for which `mj_forward` has been called after a reset."""
         rig, vector = self._rig, self.state.vector
         vector[TIME] = data.time
         self._body[:] = rig.body_state
@@ -129,10 +129,10 @@ class KinematicWorld:
         self.asleep[at_rest] = np.flatnonzero(at_rest)
 
     def write(self, data: mujoco.MjData) -> None:
-        """Update the poses of bodies, geoms, sites and cameras in `data`, for rendering and ray casts."""
+        """Write the poses of all bodies, geoms, sites and cameras to `data`, for rendering and ray casts."""
         model, vector = self._model, self.state.vector
         if data.ntree_awake < model.ntree:
-            # Without a reset, sleeping bodies would not follow their coordinates.
+            # Without a reset, MuJoCo would not update the poses of sleeping bodies.
             mujoco.mj_resetData(model, data)
         data.time = vector[TIME]
         data.qpos[self._qpos] = self.state.poses.ravel()
@@ -143,20 +143,20 @@ class KinematicWorld:
         mujoco.mj_camlight(model, data)
 
     def walk(self, moves: NDArray[np.float64]) -> StepStates | None:
-        """Execute one control step for each move (n, 4), and return the states between the moves."""
+        """Execute one control step per row of `moves` (n, 4). Return the states between the steps."""
         walk_rows(moves, self.state, self.model, self._rows)
         return self._passed(len(moves))
 
     def follow(
         self, walk: Walk, progress: NDArray[np.float64], limit: int
     ) -> tuple[int, NDArray[np.float64], StepStates | None]:
-        """Walk along a path. Return the walk's latest phase, the moves (n, 4), and the states between the moves."""
+        """Walk along a path. Return the latest phase, the moves (n, 4), and the states between the moves."""
         moves = np.empty((min(limit, MAX_ROWS), 4))
         count, phase = follow_rows(walk, progress, self.state, self.model, moves, self._rows)
         return phase, moves[:count], self._passed(count)
 
     def play(self, trajectory: MotionTrajectory, start: int, end: int) -> StepStates | None:
-        """Play control steps `start` to `end` of a trajectory, and return the states between the steps."""
+        """Play the control steps `start` to `end` of a trajectory. Return the states between the steps."""
         play_rows(trajectory, start, end, self.state, self._rows)
         return self._passed(end - start)
 

@@ -1,8 +1,8 @@
-"""Kernels for kinematic walking: the person's servos and trunk, one control step at a time.
+"""Kernels that simulate the person's servos and trunk during kinematic walking.
 
-A body state is an array of `BODY_SIZE` numbers. `command` changes its commands in the same way as `Person.walk`. In
-`advance`, the four servos follow the commands in steps of the physics, with the masses, gains and force limits of the
-compiled model. The trunk is a disc that slides along the outlines of the house. Loose objects are not obstacles.
+A body state is an array of `BODY_SIZE` numbers. `command` changes the commands in it, as `Person.walk` does.
+`advance` simulates the four servos in physics steps, with the masses, gains and force limits of the compiled
+model. The trunk is a disc that slides along the outlines of the house. Loose objects are not obstacles.
 """
 
 import math
@@ -37,9 +37,9 @@ from mjsim.world.fidelity.trunk_contact import is_clear, slide
 
 
 class Gait(NamedTuple):
-    """Limits of walking, and the parameters of its servos, in SI units."""
+    """The limits of a person's movements and the parameters of the servos, in SI units."""
 
-    # From `PersonParameters`: maximum walking, turning and looking speed, and walking and turning acceleration.
+    # From `PersonParameters`: maximum walking, turning and looking speed, walking and turning acceleration.
     max_speed: float
     max_turn: float
     max_look: float
@@ -47,18 +47,18 @@ class Gait(NamedTuple):
     turn_acceleration: float
     dt: float  # duration of a control step
     substeps: int  # number of physics steps per control step
-    mass: float  # mass moved along x and y, with gain and force limit of the velocity servos
+    mass: float  # moving mass, gain and force limit of the velocity servos for x and y
     walk_gain: float
     walk_force: float
-    # Moment of inertia around the vertical axis, with gain and torque limit of the velocity servo.
+    # Moment of inertia, gain and torque limit of the velocity servo for the yaw.
     inertia: float
     turn_gain: float
     turn_force: float
-    head_inertia: float  # moment of inertia of the head, with gains and torque limit of the position servo
+    head_inertia: float  # moment of inertia, gains and torque limit of the position servo for the head
     head_stiffness: float
     head_damping: float
     head_force: float
-    lowest: float  # range of the head's pitch
+    lowest: float  # lower and upper limit of the head's pitch
     highest: float
     radius: float  # radius of the trunk
     eye_height: float  # height of the eye above the floor
@@ -108,7 +108,7 @@ class Gait(NamedTuple):
 def command(
     body: NDArray[np.float64], forward: float, left: float, turn: float, look: float, gait: Gait
 ) -> None:
-    """Change the commands towards a move, in m/s and rad/s, for `advance` to execute."""
+    """Change the commands in a body state towards a move in m/s and rad/s."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, forward, left, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -117,7 +117,7 @@ def command(
 
 @kernel
 def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
-    """Change the commands of a body (BODY_SIZE,) towards standing, and its yaw rate towards `turn` (rad/s)."""
+    """Change the commanded velocity towards 0 and the commanded yaw rate towards `turn` (rad/s)."""
     motion = body[FORWARD:SERVO]
     motion_profiles.change_velocity(motion, 0.0, 0.0, gait.max_speed, gait.acceleration * gait.dt)
     motion_profiles.change_turn_rate(motion, turn, gait.max_turn, gait.turn_acceleration * gait.dt)
@@ -125,13 +125,13 @@ def brake(body: NDArray[np.float64], turn: float, gait: Gait) -> None:
 
 @kernel
 def look_at(body: NDArray[np.float64], pitch: float, gait: Gait) -> None:
-    """Command a pitch of the head in radians, clamped to the head's range."""
+    """Set the commanded pitch of the head, in radians, and clamp it to the head's range."""
     body[LOOK] = min(gait.highest, max(gait.lowest, pitch))
 
 
 @kernel
 def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
-    """Advance the servos and the trunk by one control step, while the servos ramp to the new commands."""
+    """Simulate the servos and the trunk for one control step. The servos ramp to the new commands."""
     heading = body[HEADING] + 0.5 * body[TURN] * gait.dt
     c, s = math.cos(heading), math.sin(heading)
     to_x = c * body[FORWARD] - s * body[LEFT]
@@ -145,7 +145,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
     )
     walk, turn = _servo(gait.mass, gait.walk_gain, h), _servo(gait.inertia, gait.turn_gain, h)
     head = _servo(gait.head_inertia, gait.head_damping, h)
-    # The speed of a servo never exceeds its previous and its new command.
+    # The speed never exceeds the largest of the current speed, the previous command and the new command.
     reach_x = gait.radius + gait.dt * max(abs(body[VX]), abs(body[SERVO]), abs(to_x))
     reach_y = gait.radius + gait.dt * max(abs(body[VY]), abs(body[SERVO + 1]), abs(to_y))
     free = is_clear(body[X], body[Y], reach_x, reach_y, gait.radius, floor)
@@ -170,7 +170,7 @@ def advance(body: NDArray[np.float64], gait: Gait, floor: Floor) -> None:
 
 @kernel
 def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
-    """Return a servo's factors for a physics step: the kept speed, and the speed per force with and without damping."""
+    """Return the share of speed that remains after a step, and the speed per force, damped and undamped."""
     return mass / (mass + h * damping), h / (mass + h * damping), h / mass
 
 
@@ -178,7 +178,7 @@ def _servo(mass: float, damping: float, h: float) -> tuple[float, float, float]:
 def _driven(
     speed: float, push: float, damping: float, limit: float, servo: tuple[float, float, float]
 ) -> float:
-    """Return the speed after a step under `push - damping * speed`, implicit in the damping unless saturated."""
+    """Return the speed after a step. Damping is integrated implicitly unless the force is at its limit."""
     force = push - damping * speed
     if force > limit or force < -limit:
         return speed + servo[2] * min(limit, max(-limit, force))

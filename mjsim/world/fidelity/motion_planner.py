@@ -1,6 +1,6 @@
-"""Planner of picks and places without physics, with the times and speeds of the person's parameters.
+"""A planner for picks and places without physics, which uses the times and speeds of the person.
 
-Only the fall of a released object is simulated by physics. The conditions for success are those of
+Only the fall of a released object is simulated by physics. Motions succeed under the same conditions as in
 `mjsim.world.body.hand_motions`.
 """
 
@@ -29,17 +29,17 @@ Vector = NDArray[np.float64]
 
 _INITIAL_STEPS = 200  # initial capacity of a trajectory, in control steps
 _REACH_LAG = 2  # number of control steps by which the hand lags behind its target at the end of a reach
-_SEATING = 1  # number of control steps in which a firm grip pulls the load into the hand
+_SEATING = 1  # number of control steps in which a firm grip pulls the object into the hand
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """A pick or place that was planned in advance."""
+    """The planned trajectory and outcome of a pick or place."""
 
     trajectory: MotionTrajectory  # state after each control step
     # True if a picked object is in the hand, or a placed object is at rest in its receptacle.
     success: bool = True
-    # Other events: control step, type and object index.
+    # Control step, type and object index of other events.
     incidents: tuple[tuple[int, EventKind, int], ...] = ()
 
     @property
@@ -48,9 +48,9 @@ class PlannedMotion:
 
 
 class MotionPlanner:
-    """Plans motions from the current state of a kinematic world, without changing that state.
+    """A planner that computes picks and places from the current state of a kinematic world.
 
-    The physics data must be up to date.
+    It does not change this state. The physics data must be up to date.
     """
 
     def __init__(self, full: Full, kinematic: KinematicWorld) -> None:

@@ -1,4 +1,4 @@
-"""Kernels for the hand and body movements of kinematic picks and places, with the timing of `mjsim.world.body`."""
+"""Kernels for the movements of hands and body during kinematic picks and places."""
 
 import math
 from typing import NamedTuple
@@ -43,10 +43,10 @@ Floats = NDArray[np.float64]
 
 
 class MotionTrajectory(NamedTuple):
-    """States of a motion that is planned before it is played, one per control step."""
+    """The states of a planned motion after each control step."""
 
     vectors: Floats  # `KinematicState.vector` after each step, shape (capacity, STATE_SIZE)
-    poses: Floats  # poses (metres and wxyz) of the objects, shape (capacity, n, 7)
+    poses: Floats  # poses of the objects (metres and wxyz) after each step, shape (capacity, n, 7)
     length: NDArray[np.int64]  # number of stored control steps, shape (1,)
 
     @classmethod
@@ -65,14 +65,14 @@ class MotionTrajectory(NamedTuple):
 
 
 class HandMovement(NamedTuple):
-    """A movement of a hand."""
+    """A movement of a hand to a goal, and the direction in which the person looks meanwhile."""
 
     hand: int
     goal: Floats  # final position in metres, shape (3,)
     in_house: bool  # True if the goal is in the house frame, False if it is in the body frame
     steps: int  # number of control steps
     order: int  # `STRAIGHT`, `ACROSS_FIRST` or `UP_FIRST`, from `mjsim.world.body.motion_profiles`
-    gaze: Floats  # point (3,) of the house to look at, or NaN, NaN and a pitch in radians
+    gaze: Floats  # point (3,) in the house to look at, or (NaN, NaN, pitch in radians)
 
 
 @kernel
@@ -104,7 +104,7 @@ def face(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Stand still and turn to a point (3,), or to a heading unless it is NaN."""
+    """Stop and turn to a point (3,), or to `heading` if it is not NaN."""
     body = state.vector[BODY:HANDS]
     for _ in range(max_steps):
         if _turn(body, point, heading, tolerance, motion, model.gait):
@@ -188,9 +188,9 @@ def withdraw(
     motion: MotionParameters,
     model: KinematicModel,
 ) -> None:
-    """Move a hand up and then to its rest posture, in one control step for each row of object poses (k, n, 7).
+    """Raise a hand and move it to its rest posture, with one control step per row of `poses` (k, n, 7).
 
-    Meanwhile, the head moves to `pitch` (radians).
+    Meanwhile, the head returns to `pitch` (radians).
     """
     first = HANDS + 3 * hand
     for k in range(len(poses)):
@@ -209,7 +209,7 @@ def withdraw(
 
 @kernel
 def end(state: KinematicState, trajectory: MotionTrajectory, model: KinematicModel) -> None:
-    """Append the control step after a motion, in which the hands move towards their postures."""
+    """Append the first control step after a motion, in which the hands move towards their postures."""
     state.vector[HAND_SPEEDS : HAND_SPEEDS + 6] = 0.0
     control_step(state, CARRY, -1, model)
     _append(trajectory, state)

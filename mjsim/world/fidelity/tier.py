@@ -1,4 +1,4 @@
-"""Base class of the levels of fidelity, and the episode state that they share."""
+"""The base class of the levels of fidelity, and the episode state that they share."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 class EpisodeState:
-    """Hands, statuses of the objects, and events of the current control step."""
+    """The contents of the hands, the status of each object, and the events of the current control step."""
 
     def __init__(self, scene: Scene, capacity: int) -> None:
         self._capacity = capacity
@@ -69,10 +69,10 @@ class EpisodeState:
     def observation(
         self, time: float, person: Floats, velocity: Floats, objects: tuple[Floats, Floats], *, busy: bool
     ) -> Observation:
-        """Create an observation.
+        """Create an observation of the current state.
 
-        `person` (4,) is x, y, yaw and pitch of the head. `velocity` (2,) is in the house frame. `objects` are positions
-        (n, 3) and orientations wxyz (n, 4). Lengths are in metres, angles in radians.
+        `person` (4,) contains x, y, yaw and the pitch of the head. `velocity` (2,) is in the house frame.
+        `objects` are positions (n, 3) and orientations wxyz (n, 4). Lengths are in metres, angles in radians.
         """
         x, y, heading, pitch = person.tolist()
         return Observation(
@@ -94,7 +94,7 @@ class EpisodeState:
         return StateDetails(self.inventory.hands, tuple(self.status), health, person)
 
     def restore(self, details: StateDetails) -> None:
-        """Continue from the hands and statuses of a world's state. Raise a StateError if its objects differ."""
+        """Set the hands and statuses to those of a state. Raise a StateError if its objects differ."""
         if len(details.status) != len(self._index.names) or not {*details.hands} <= {
             None,
             *self._index.names,
@@ -119,29 +119,29 @@ class EpisodeState:
 
 
 class Tier(ABC):
-    """A simulation of the person and the objects in control steps. Each level of fidelity has its own subclass."""
+    """A simulation of the person and the objects. Each level of fidelity has its own subclass."""
 
     episode_state: EpisodeState
 
     @property
     @abstractmethod
     def busy(self) -> bool:
-        """True during a pick or place."""
+        """True while a pick or place is in progress."""
 
     @property
     @abstractmethod
     def body(self) -> NDArray[np.float64]:
-        """Copy of the body state, laid out as in `mjsim.world.body.rig`, shape (BODY_SIZE,)."""
+        """A copy of the body state, shape (BODY_SIZE,), with the layout of `mjsim.world.body.rig`."""
 
     @property
     @abstractmethod
     def hands(self) -> NDArray[np.float64]:
-        """Positions (2, 3) of the left and the right hand in the body frame, in metres. This is a copy."""
+        """A copy of the positions of the left and right hand in the body frame, in metres, shape (2, 3)."""
 
     @property
     @abstractmethod
     def health_sample(self) -> HealthSample:
-        """Health of the physics in the latest control step."""
+        """The physics problems in the latest control step."""
 
     @abstractmethod
     def step(self, action: StepAction) -> ActionResult | None:
@@ -149,11 +149,11 @@ class Tier(ABC):
 
     @abstractmethod
     def answer(self, action: Pick | Place) -> ActionResult:
-        """Return the answer that a pick or place would receive now, without changing anything."""
+        """Return the result that `step` would return for a pick or place, without executing the action."""
 
     @abstractmethod
     def observation(self) -> Observation:
-        """Return the current state."""
+        """Return an observation of the current state."""
 
     @abstractmethod
     def state_hash(self) -> int:
@@ -162,9 +162,9 @@ class Tier(ABC):
     def follow(self, walk: Walk, progress: NDArray[np.float64], limit: int) -> tuple[int, Steps | None]:
         """Walk along a path for up to `limit` control steps, until an event occurs or the walk has to stop.
 
-        A path that no display shows takes one step per call, because the person looks along the path and may see other
-        objects. Updates `progress` (2,) of a `Walker`. Returns the latest phase of the walk, and the steps, or None if
-        the person has already arrived.
+        If no display shows the path, each call takes only one step, because the person may see other objects
+        on the way. Updates `progress` (2,) of a `Walker`. Returns the latest phase of the walk and the steps,
+        which are None if the person has already arrived.
         """
         arguments, phase, first = plain(walk), WALKING, True
 
@@ -181,7 +181,7 @@ class Tier(ABC):
         return phase, steps
 
     def wait(self, limit: int) -> Steps:
-        """Wait until the current pick or place ends or an event occurs. If there is none, wait one control step."""
+        """Wait until the current motion ends or an event occurs. Without a motion, wait one control step."""
         busy = self.busy
         steps = self._step_each(lambda _: IDLE if self.busy or not busy else None, limit if busy else 1)
         return cast(Steps, steps)

@@ -1,4 +1,4 @@
-"""Kernels for contacts between the trunk, a disc, and the house: the trunk slides along outlines."""
+"""Kernels that make the person's trunk, which is a disc, slide along the outlines of the house."""
 
 import math
 
@@ -9,17 +9,17 @@ from mjsim.house.compiled.footprint import CELL, MARGIN, Floor
 from mjsim.support.kernels import kernel
 from mjsim.world.body.rig import VX, VY, X, Y
 
-# Maximum length of a step, in metres, for which a disc of radius 0.20 m cannot jump over a wall.
+# Maximum length of a step in metres. With longer steps, a disc of radius 0.20 m could jump over a wall.
 _MAX_STEP = 0.05
 _MAX_ROUNDS = 12
-_TOUCHING = 1e-7  # tolerance in metres
+_TOUCHING = 1e-7  # overlap with an outline that is tolerated, in metres
 
 
 @kernel
 def is_clear(x: float, y: float, reach_x: float, reach_y: float, radius: float, floor: Floor) -> bool:
     """Return True if no outline is within the given distances along x and y."""
     if max(reach_x, reach_y) > radius + MARGIN:
-        return False  # A cell of the grid does not list outlines this far away.
+        return False  # the grid cell does not list outlines that are this far away
     start, end = _near(x, y, floor)
     for entry in range(start, end):
         box = floor.boxes[floor.near[entry]]
@@ -39,7 +39,7 @@ def _near(x: float, y: float, floor: Floor) -> tuple[int, int]:
 
 @kernel
 def slide(body: NDArray[np.float64], h: float, radius: float, floor: Floor) -> None:
-    """Move the trunk of a body (BODY_SIZE,) by its velocity for `h` seconds, sliding along outlines."""
+    """Move a body (BODY_SIZE,) at its velocity for `h` seconds, and let the trunk slide along outlines."""
     length = h * math.sqrt(body[VX] * body[VX] + body[VY] * body[VY])
     parts = 1 + int(length / _MAX_STEP)
     for _ in range(parts):
@@ -84,9 +84,9 @@ def _push_out(body: NDArray[np.float64], radius: float, floor: Floor, start: int
 def gap_to(
     x: float, y: float, edges: NDArray[np.float64], first: int, last: int
 ) -> tuple[float, float, float]:
-    """Return the signed distance from a point to a convex polygon, negative inside, and the unit vector away from it.
+    """Return the signed distance of a point from a convex polygon, and the unit vector away from the polygon.
 
-    `edges` are those of `Floor`, (e, 5), of which the polygon has `first` to `last`, exclusive.
+    The distance is negative inside. The polygon has the rows `first` to `last` - 1 of `Floor.edges` (e, 5).
     """
     nearest, near_x, near_y = math.inf, 0.0, 0.0
     depth, out_x, out_y = -math.inf, 0.0, 0.0

@@ -1,1 +1,1 @@
-"""Health of the physics at every control step: penetration, weld errors, ejections and tunnelling (docs/metrics.md)."""
+"""Checks for physics problems such as penetration and ejected objects (docs/metrics.md)."""

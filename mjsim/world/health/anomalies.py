@@ -1,4 +1,4 @@
-"""Detection of ejected objects and of tunnelling (docs/metrics.md)."""
+"""A detector of objects that are ejected or pass through solid geoms (docs/metrics.md)."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from mjsim.values.actions import EventKind
 from mjsim.world.health.scan import DISPLACED, FAST, OUTSIDE
 from mjsim.world.health.settle_times import SettlingObject
 
-# The path of an object is checked once the object is this far from its anchor, in metres.
+# Distance of an object from its anchor at which the path between them is checked, in metres.
 CHECK_DISTANCE = 0.02
 
 MAX_FLIGHT = 1.0  # maximum horizontal distance from the point of release, in metres
@@ -22,7 +22,7 @@ _MIN_HEIGHT, _MAX_HEIGHT = -0.05, 3.0  # range of heights at which an object is 
 
 @dataclass(frozen=True, eq=False)
 class AnomalyState:
-    """State of an `AnomalyDetector`."""
+    """The state of an `AnomalyDetector`."""
 
     anchors: NDArray[np.float64]  # see `AnomalyDetector`
     ejected: tuple[int, ...]  # objects that count as ejected until a hand holds them again
@@ -31,12 +31,12 @@ class AnomalyState:
 
 
 class AnomalyDetector:
-    """Finds and counts ejections and tunnelling of objects.
+    """A detector that finds and counts objects that are ejected or pass through solid geoms.
 
     Attributes:
         anchors: Centre of each object when its path was last checked, in metres, shape (n, 3).
         ejections: Number of ejections so far.
-        tunnellings: Number of objects so far that passed through something solid.
+        tunnellings: Number of times so far that an object passed through a solid geom.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -49,7 +49,7 @@ class AnomalyDetector:
         self.ejections = self.tunnellings = 0
 
     def move_anchors(self, data: mujoco.MjData) -> None:
-        """Move the anchors to the current positions, so that the paths up to there are not checked."""
+        """Move the anchors to the current positions of the objects, without checking the paths."""
         self.anchors[:] = data.xipos[self._bodies]
 
     def find(
@@ -59,7 +59,7 @@ class AnomalyDetector:
         settling: Mapping[int, SettlingObject],
         gripped: Collection[int],
     ) -> list[tuple[EventKind, int]]:
-        """Find ejections and tunnelling in this control step. Return each event with the index of its object."""
+        """Return the ejections and tunnelling in this control step, each with the index of its object."""
         found = []
         self._ejected.difference_update(gripped)
         far = {item for item, release in settling.items() if self._flew_off(data, item, release)}

@@ -1,7 +1,7 @@
-"""Health monitor: checks warnings, penetration, weld errors, settle times and anomalies after every control step.
+"""A monitor that checks the physics simulation for problems after every control step.
 
-docs/metrics.md defines all terms. An invalid state raises a `PhysicsError`. All other problems are counted, and
-reported as events.
+docs/metrics.md defines all terms. An invalid state raises a `PhysicsError`. All other problems are counted or
+measured, and ejections and tunnelling are also reported as events.
 """
 
 import math
@@ -31,15 +31,15 @@ NOTHING: Pair = (math.nan, math.nan)
 
 
 class HealthSample(NamedTuple):
-    """Health of the physics after a control step.
+    """Measurements of physics problems in one control step.
 
     Attributes:
-        penetration_m: Deepest overlap of an object with anything except the person, in metres. Contacts of the
-            person's foot do not count, because the foot is soft on purpose.
+        penetration_m: Deepest overlap of an object with anything except the person, in metres. Contacts with
+            the person's foot do not count, because the foot is soft by design.
         trunk_penetration_m: Deepest overlap of the person's trunk with the house, in metres.
         weld_error_m: Distance in metres between each hand and the grip in it, or NaN for an empty hand.
         weld_error_rad: Angle in radians between each hand and the grip in it, or NaN for an empty hand.
-        settle_s: Longest settle time in seconds of an object that came to rest in this step, or NaN if none did.
+        settle_s: Longest settle time of the objects that came to rest in this step, in seconds, or NaN.
     """
 
     penetration_m: float = 0.0
@@ -50,19 +50,19 @@ class HealthSample(NamedTuple):
 
     @property
     def row(self) -> tuple[float, ...]:
-        """The seven numbers of the sample in the order of the attributes, the left hand before the right."""
+        """The sample as seven numbers, in the order of the attributes, with the left hand first."""
         overlaps = (self.penetration_m, self.trunk_penetration_m)
         return (*overlaps, *self.weld_error_m, *self.weld_error_rad, self.settle_s)
 
 
 @dataclass(frozen=True)
 class Health:
-    """Extremes and counts since the last reset.
+    """Maxima and counts of physics problems since the last reset.
 
     Attributes:
-        settle_times: Times in seconds from each release to rest, in order.
-        ejections: Number of objects that flew off, left the house, or moved faster than falls and kicks allow.
-        tunnellings: Number of objects that passed through something solid.
+        settle_times: Time in seconds that each released object took to come to rest, in order.
+        ejections: Number of objects that flew off, left the house, or moved faster than is plausible.
+        tunnellings: Number of times that an object passed through a solid geom.
         warnings: Number of MuJoCo warnings. Any warning ends the simulation with a `PhysicsError`.
     """
 
@@ -78,21 +78,21 @@ class Health:
 
 @dataclass(frozen=True, eq=False)
 class HealthState:
-    """State of a `HealthMonitor`."""
+    """The state of a `HealthMonitor`."""
 
     # Maximum overlaps of objects and of the trunk (metres), and weld errors (metres and radians), shape (4,).
     extremes: NDArray[np.float64]
     settle_times: tuple[float, ...]  # see `Health.settle_times`
-    sample: HealthSample  # health after the latest control step
+    sample: HealthSample  # measurements in the latest control step
     anomalies: AnomalyState
     settling: SettleTimerState
 
 
 class HealthMonitor:
-    """Monitor that accumulates `Health` over control steps.
+    """A monitor that updates the values of `Health` after each control step.
 
     Attributes:
-        sample: Health after the latest control step.
+        sample: Measurements in the latest control step.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions, rig: Rig, grips: Grips) -> None:
@@ -137,7 +137,7 @@ class HealthMonitor:
         self._settling.reset()
 
     def check(self, held: Sequence[int | None]) -> Sequence[tuple[EventKind, int]]:
-        """Process the latest control step. Return ejections and tunnelling, each with the index of its object.
+        """Check the latest control step. Return ejections and tunnelling, each with the index of its object.
 
         Raises:
             PhysicsError: MuJoCo reported a warning, or a position or velocity is not finite.
@@ -155,7 +155,7 @@ class HealthMonitor:
         return self._anomalies.find(data, self._flags, settling.objects, gripped)
 
     def resume(self) -> None:
-        """Continue after the person and held objects were moved without physics."""
+        """Accept the current positions after the person and held objects were moved without physics."""
         self._anomalies.move_anchors(self._rig.data)
 
     def get_state(self) -> HealthState:
@@ -190,7 +190,7 @@ class HealthMonitor:
     def _scan(self, data: mujoco.MjData, held: Sequence[int | None]) -> bool:
         geoms, distances = _NO_GEOMS, _NO_DISTANCES
         if data.ncon:
-            # Copy to contiguous arrays: kernels are compiled per layout, which varies with the number of contacts.
+            # Kernels are compiled once per memory layout, so make the arrays contiguous.
             geoms, distances = map(np.ascontiguousarray, (data.contact.geom, data.contact.dist))
         found = scan(self._arrays, geoms, distances, held[0] is not None, held[1] is not None)
         if found == WARNED:

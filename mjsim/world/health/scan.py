@@ -1,4 +1,4 @@
-"""A Numba kernel that scans the state, objects, hands and contacts after each control step."""
+"""A Numba kernel that scans a physics simulation for problems after each control step."""
 
 import math
 from typing import Any, NamedTuple
@@ -16,19 +16,19 @@ from mjsim.world.body.grips import site_angle, site_gap
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-# Doorways are outside the rooms, so positions up to this far from a room count as inside. In metres.
+# Distance from a room up to which an object counts as inside, in metres. Doorways are not part of the rooms.
 OUTSIDE = 0.3
 
 _TOLERANCE = 1e-6  # tolerance for rounding errors, in metres
 
 # Results of a scan.
 NORMAL, SUSPECT, WARNED, NOT_FINITE = 0, 1, 2, 3
-# Flags of an object: far from its anchor, fast, slow, or touched by the person's foot. See `ScanArrays.limits`.
+# Flags of an object: far from its anchor, fast, slow, touched by the person's foot. See `ScanArrays.limits`.
 DISPLACED, FAST, SLOW, PUSHED = 1, 2, 4, 8
 
 
 def static_boxes(scene: Scene) -> Floats:
-    """Return the minimum and maximum corner of a box around each colliding geom of the house, shape (k, 6)."""
+    """Return the minimum and maximum corners of the house geoms' bounding boxes, shape (k, 6)."""
     return compiled_house(scene.catalogue).cached(("static boxes",), lambda: _static_boxes(scene.model))
 
 
@@ -44,7 +44,7 @@ def _static_boxes(model: mujoco.MjModel) -> Floats:
 
 
 class ScanArrays(NamedTuple):
-    """Inputs and outputs of scans: views of a simulation's state and model, and the results."""
+    """The inputs and outputs of a scan. Most inputs are views of a simulation's state."""
 
     qpos: Floats  # generalized positions, shape (nq,)
     qvel: Floats  # generalized velocities, shape (nv,)
@@ -55,20 +55,20 @@ class ScanArrays(NamedTuple):
     bodies: Ints  # body id of each object, shape (n,)
     dofs: Ints  # first degree of freedom of each object, shape (n,)
     geom_owner: Ints  # object index of each geom, or -1, shape (ngeom,)
-    trunk: int  # geoms of the person
+    trunk: int  # geom ids of the person's trunk and foot
     foot: int
-    # Squares of three limits, shape (3,): distance from the anchor (metres) beyond which an object is `DISPLACED`,
+    # Squares of three limits, shape (3,): distance (m) from its anchor at which an object is `DISPLACED`,
     # speed (m/s) above which it is `FAST`, and speed (m/s) below which it is `SLOW`.
     limits: Floats
     boxes: Floats  # boxes returned by `static_boxes`
     rooms: tuple[Floats, Floats, Floats]  # see `RoomMap.rectangles`
     grip_sites: NDArray[np.intp]  # see `Grips.sites`
-    # See `AnomalyDetector.anchors`. An anchor moves along if `boxes` show that the path is clear.
+    # See `AnomalyDetector.anchors`. An anchor follows its object if none of the `boxes` is on the path.
     anchors: Floats
     flags: NDArray[np.uint8]  # output: flags of each object, shape (n,)
-    # Output, shape (6,): both overlaps of a `HealthSample`, at least 0, then its weld errors in metres and in radians.
+    # Output, shape (6,): the two overlaps (at least 0), two distances and two angles of a `HealthSample`.
     sample: Floats
-    # Updated: largest overlaps (metres) and weld errors (metres and radians) so far, shape (4,).
+    # Input and output, shape (4,): largest overlaps (metres) and weld errors (metres and radians) so far.
     extremes: Floats
 
 
@@ -76,8 +76,8 @@ class ScanArrays(NamedTuple):
 def scan(fields: Any, geoms: Ints, distances: Floats, left: bool, right: bool) -> int:
     """Scan the state, objects, hands and contacts. Return `NORMAL`, `SUSPECT`, `WARNED` or `NOT_FINITE`.
 
-    `fields` are those of `ScanArrays` as a plain tuple, which Numba unpacks in half the time. `geoms` (ncon, 2) and
-    `distances` (ncon,), in metres, are those of the contacts. `left` and `right` are True if the hand holds an object.
+    `fields` is a `ScanArrays` as a plain tuple, which Numba unpacks twice as fast. `geoms` (ncon, 2) and
+    `distances` (ncon,), in metres, describe the contacts. `left` and `right` are True for loaded hands.
     """
     arrays = ScanArrays(*fields)
     for count in arrays.warnings:

@@ -1,4 +1,4 @@
-"""Settle times of released objects (docs/metrics.md)."""
+"""A timer for released objects that have not come to rest (docs/metrics.md)."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -14,10 +14,10 @@ from mjsim.world.health.scan import PUSHED, SLOW
 
 @dataclass
 class SettlingObject:
-    """An object between its release and rest."""
+    """An object that was released and has not yet come to rest."""
 
     time: float  # time at which a hand last held the object, in seconds
-    x: float  # position of the object's centre at that time, in metres
+    x: float  # x and y position of the object's centre at that time, in metres
     y: float
     still_steps: int = 0  # number of consecutive control steps in which the object has been slow or asleep
     still_since: float = 0.0  # time at the end of the first of these steps, in seconds
@@ -25,16 +25,16 @@ class SettlingObject:
 
 @dataclass(frozen=True)
 class SettleTimerState:
-    """State of a `SettleTimer`."""
+    """The state of a `SettleTimer`."""
 
-    # Index and state of released objects that are not at rest.
+    # Index and state of each released object that is not yet at rest.
     objects: tuple[tuple[int, SettlingObject], ...]
-    # Index of each held object, when it was last in the hand, and where its centre (3,) was at that time.
+    # Index of each held object, with the latest time and the latest position (3,) at which it was held.
     gripped: tuple[tuple[int, float, list[float]], ...]
 
 
 class SettleTimer:
-    """Tracks objects from release until they rest, are gripped again, or are pushed by the person's foot."""
+    """A timer that tracks released objects until they rest, are gripped again, or are pushed by a foot."""
 
     def __init__(self, scene: Scene) -> None:
         self._bodies, self._trees = scene.index.bodies.tolist(), scene.index.trees
@@ -46,7 +46,7 @@ class SettleTimer:
         self._gripped: dict[int, tuple[float, list[float]]] = {}
 
     def update(self, data: mujoco.MjData, gripped: Collection[int], flags: NDArray[np.uint8]) -> list[float]:
-        """Return the settle times in seconds of objects that came to rest. Objects in `gripped` are in hands."""
+        """Return the settle times, in seconds, of all objects that came to rest in this control step."""
         if not (gripped or self._gripped or self.objects):
             return []
         for item, (last, (x, y, _)) in self._gripped.items():

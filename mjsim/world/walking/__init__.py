@@ -1,1 +1,1 @@
-"""Path following: looking ahead, slowing down at corners, and walking around objects on the floor."""
+"""Path following, which includes slowing down at corners and walking around objects on the floor."""

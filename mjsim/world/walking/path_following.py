@@ -1,6 +1,6 @@
 """Kernels for walking along a polyline, one control step at a time.
 
-All levels of fidelity run the same kernels, one or many steps per call, so results are bit-identical.
+All levels of fidelity run the same kernels, so that their results are bit-identical.
 """
 
 import math
@@ -23,17 +23,17 @@ from mjsim.world.walking.polyline import (
     rest_of,
 )
 
-ARRIVED_WITHIN = 0.06  # A walk ends at this distance from the end of its path, in metres.
+ARRIVED_WITHIN = 0.06  # distance from the end of the path at which a walk ends, in metres
 
 WALKING, TURNING, ARRIVED, BLOCKED, CHANGED = range(5)  # phases of a walk
-# Indices into `progress`: shortest remaining distance so far (metres), and when it was reached (seconds)
+# Indices into `progress`: the shortest remaining distance so far (metres), and when it was reached (seconds).
 SHORTEST_LEFT, SINCE = range(2)
 
 Floats = NDArray[np.float64]
 
 
 class Pace(NamedTuple):
-    """Speeds and clearances of a walking person."""
+    """The speeds and clearances of a walking person."""
 
     speed: float  # preferred speed in m/s
     braking: float  # planned deceleration in m/s^2
@@ -51,7 +51,7 @@ class Pace(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """Objects and walls that a walking person avoids."""
+    """The objects and walls that a walking person avoids."""
 
     positions: Floats  # positions of all objects in metres, shape (n, 2) or wider
     is_loose: NDArray[np.bool_]  # True for objects on the floor, shape (n,)
@@ -60,7 +60,7 @@ class Obstacles(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """A `FollowPath` action for kernels, with the person's pace and the obstacles."""
+    """The data of a `FollowPath` action in a form for kernels, with the person's pace and the obstacles."""
 
     path: Floats
     goal: tuple[float, float]
@@ -82,7 +82,7 @@ def wrap_angle(angle: float) -> float:
 def turn_towards(
     heading: float, x: float, y: float, to_x: float, to_y: float, pace: Pace
 ) -> tuple[float, float]:
-    """Return the yaw rate (rad/s) for turning `heading` towards a point, and the remaining angle (rad)."""
+    """Return the yaw rate (rad/s) at which the person turns to a point, and the remaining angle (rad)."""
     error = wrap_angle(math.atan2(to_y - y, to_x - x) - heading)
     fastest = pace.turning_speed
     return min(max(pace.walking.turn_gain * error, -fastest), fastest), error
@@ -90,7 +90,7 @@ def turn_towards(
 
 @kernel
 def is_free(x: float, y: float, walls: Floats) -> bool:
-    """Return True if (x, y) is inside the outline of the navigable floor (e, 4), or if there is no outline."""
+    """Return True if (x, y) is inside the outline `walls` (e, 4) of the floor, or if there is no outline."""
     inside = len(walls) == 0
     for k in range(len(walls)):
         if (walls[k, 1] > y) != (walls[k, 3] > y):
@@ -109,12 +109,12 @@ def sidestep(
     obstacles: Obstacles,
     pace: Pace,
 ) -> tuple[float, float]:
-    """Return the point to walk to instead of `target`, in order to walk around objects on the floor.
+    """Return the point to which the person walks instead of `target` to avoid objects on the floor.
 
-    The person at (x, y) passes the nearest object ahead on its free side. If that side is blocked, the person takes the
-    other side unless it needs a detour, and otherwise walks straight over the object. `beyond`, a point farther along
-    the path, determines which object is in the way and on which side to pass it. Because `beyond` is behind the object,
-    the person does not change sides while passing it. All points are in metres.
+    The person at (x, y) passes the nearest object ahead on the side that needs the smaller sidestep. If that
+    side is blocked, the person tries the other side. If the other side is blocked too or needs a detour, the
+    person steps over the object. `beyond`, a point farther along the path, determines which object is in the
+    way and on which side to pass it. All points are in metres.
     """
     clearance, walking = pace.clearance, pace.walking
     reach = distance(x, y, beyond[0], beyond[1])
@@ -152,10 +152,10 @@ def sidestep(
 def follow(
     path: Path, x: float, y: float, heading: float, obstacles: Obstacles, pace: Pace
 ) -> tuple[float, float, float]:
-    """Walk one control step along `path`. Return velocities forward and left (m/s), and the yaw rate (rad/s).
+    """Compute a control step along `path`. Return the forward and left velocity (m/s) and yaw rate (rad/s).
 
-    The body turns towards the look-ahead point and walks straight to it, so that the person stays on the path at
-    corners and during turns. The speed decreases with the remaining angle and the remaining distance. The path has
+    The body turns towards the look-ahead point and walks straight to it, so that the person stays on the path
+    at corners and during turns. The person slows down for turns and near the end of the path. The path has
     shape (k, 2), k >= 1. Lengths are in metres, angles in radians.
     """
     arc, gap = project(path, x, y)
@@ -170,7 +170,7 @@ def follow(
 
 @kernel
 def makes_progress(path: Floats, x: float, y: float, time: float, progress: Floats, pace: Pace) -> bool:
-    """Return True if the remaining distance decreased within the person's patience. Updates `progress` (2,)."""
+    """Return True if the remaining distance has decreased within `pace.patience`. Updates `progress` (2,)."""
     arc, gap = project(path, x, y)
     left = path_length(path) - arc + gap
     if left < progress[SHORTEST_LEFT] - pace.walking.least_progress or left > progress[SHORTEST_LEFT] + 1.0:
@@ -185,8 +185,8 @@ def next_step(
 ) -> tuple[int, float, float, float]:
     """Compute the next control step of a walk.
 
-    `x` and `y` are in metres, `heading` in radians, `time` in seconds. Updates `progress` (2,). Returns the phase of
-    the walk, velocities forward and left (m/s), and the yaw rate (rad/s).
+    `x` and `y` are in metres, `heading` in radians, `time` in seconds. Updates `progress` (2,). Returns the
+    phase of the walk, the forward and left velocity (m/s), and the yaw rate (rad/s).
     """
     path = rest_of(walk.path, x, y) if walk.shown else walk.path
     at_the_end = distance(x, y, path[-1, 0], path[-1, 1]) < ARRIVED_WITHIN
@@ -204,7 +204,7 @@ def next_step(
 def later_step(
     walk: Walk, x: float, y: float, heading: float, time: float, progress: Floats
 ) -> tuple[int, float, float, float]:
-    """Compute a control step after the first one. Return `CHANGED` if the person has left the path or is blocked."""
+    """Compute a control step after the first. Return `CHANGED` if the person left the path or is blocked."""
     if project(walk.path, x, y)[1] > walk.tolerance:
         return CHANGED, 0.0, 0.0, 0.0
     step = next_step(walk, x, y, heading, time, progress)
@@ -215,10 +215,10 @@ def later_step(
 def step_from_python(
     walk: Any, position: Floats, heading: float, time: float, progress: Floats, places: Floats, first: bool
 ) -> tuple[int, float, float, float]:  # fmt: skip
-    """Call `next_step` or `later_step`. Return `CHANGED` also if a loose object has moved since the walk was planned.
+    """Call `next_step` or `later_step`. Return `CHANGED` if a loose object has moved since the walk began.
 
-    `walk` is a result of `plain`, because Numba unpacks plain tuples in half the time. `places` (n, 3) are the current
-    object positions in metres.
+    `walk` is a result of `plain`, because Numba unpacks plain tuples twice as fast. `places` (n, 3) contains
+    the current positions of the objects in metres.
     """
     path, goal, stop_distance, face_goal, shown, tolerance, pace, obstacles = walk
     speed, braking, turning_speed, clearance, patience, walking = pace

@@ -1,4 +1,4 @@
-"""Kernels for polylines on the floor: lengths, projections and remainders.
+"""Kernels that measure and cut polylines on the floor.
 
 A point is passed as two numbers, a polyline as an array (k, 2) with k >= 1, all in metres.
 """
@@ -12,7 +12,7 @@ from mjsim.support.kernels import kernel
 
 Path = NDArray[np.float64]
 
-AT_THE_END = 1e-9  # Smaller distances count as zero, in metres.
+AT_THE_END = 1e-9  # distance below which two points count as equal, in metres
 
 
 @kernel
@@ -22,7 +22,7 @@ def distance(x: float, y: float, to_x: float, to_y: float) -> float:
 
 @kernel
 def project(path: Path, x: float, y: float) -> tuple[float, float]:
-    """Return the arc length in metres at the point of `path` nearest to (x, y), and the distance to that point."""
+    """Return the arc length at the point of `path` nearest to (x, y), and the distance to it, in metres."""
     nearest_arc, nearest_gap = 0.0, distance(x, y, path[0, 0], path[0, 1])
     arc = 0.0
     for k in range(len(path) - 1):
@@ -65,7 +65,7 @@ def point_along(path: Path, arc: float) -> tuple[float, float]:
 
 @kernel
 def rest_of(path: Path, x: float, y: float) -> Path:
-    """Return the part of `path` after its point nearest to (x, y), shape (k, 2)."""
+    """Return the part of `path` that starts at its point nearest to (x, y), shape (k, 2)."""
     arc, _ = project(path, x, y)
     if path_length(path) - arc < AT_THE_END:
         return path[-1:].copy()
@@ -81,7 +81,7 @@ def rest_of(path: Path, x: float, y: float) -> Path:
 
 @kernel
 def first_off_path(path: Path, positions: NDArray[np.float64], first: int, gap: float) -> int:
-    """Return the index, from `first` on, of the first position (n, 2) more than `gap` metres off `path`, or -1."""
+    """Return the first index >= `first` of a position (n, 2) more than `gap` metres from `path`, or -1."""
     for k in range(first, len(positions)):
         if project(path, positions[k, 0], positions[k, 1])[1] > gap:
             return k

@@ -1,4 +1,4 @@
-"""State of a walk between actions: its progress, and stepping back if it is blocked."""
+"""The state of a walk between actions, which includes its progress and backing off from obstacles."""
 
 import math
 
@@ -19,15 +19,15 @@ from mjsim.world.walking.path_following import (
 )
 
 BACK_OFF = Move(forward=-0.4, left=0.3)
-BACK_OFF_TIME = 0.6  # how long a blocked person steps back, in seconds
+BACK_OFF_TIME = 0.6  # how long a blocked person backs off, in seconds
 
 
 class Walker:
-    """Executes `FollowPath` actions, one after the other.
+    """A walker that executes `FollowPath` actions, one after the other.
 
-    A path to another pick or place starts a new walk. A path without a pick or place continues the previous walk.
-    `walls` (e, 4) are the edges (x, y, x, y), in metres, of the floor on which the person may walk around objects.
-    Without edges, the whole floor is available.
+    A path to another pick or place starts a new walk. Other paths continue the previous walk. `walls` (e, 4)
+    are the edges (x, y, x, y), in metres, of the floor that the person may use to walk around objects. If
+    there are no edges, the person may use the whole floor.
     """
 
     def __init__(self, person: PersonParameters, walls: NDArray[np.float64]) -> None:
@@ -43,10 +43,10 @@ class Walker:
         self.blocked = False
 
     def walk(self, action: FollowPath, seen: Observation) -> Walk | None:
-        """Return the walk for kernels, or None while the person backs off.
+        """Convert an action to a `Walk` for the kernels. Return None while the person backs off.
 
-        A person backs off only on the way to a pick or place. A participant that is blocked elsewhere chooses another
-        path immediately.
+        A person backs off only on the way to a pick or place. A participant that is blocked elsewhere
+        immediately chooses another path.
         """
         if action.then is not None and action.then != self._visit:
             self._visit = action.then
@@ -67,14 +67,14 @@ class Walker:
         )
 
     def record(self, phase: int, time: float) -> None:
-        """Record the phase that the first control step of a walk returned. The step started at `time` seconds."""
+        """Record the phase returned by the first control step of a walk, which started at `time` seconds."""
         self.blocked = phase == BLOCKED
         if self.blocked:
             self._back_off_until = time + BACK_OFF_TIME
             self.progress[:] = np.inf, self._back_off_until
 
     def step(self, action: FollowPath, seen: Observation) -> StepAction:
-        """Compute the next control step, for worlds that are stepped elsewhere."""
+        """Compute the next control step of a walk, for callers that step the world themselves."""
         walk = self.walk(action, seen)
         if walk is None:
             return BACK_OFF

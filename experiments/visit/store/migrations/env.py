@@ -1,4 +1,4 @@
-"""Alembic environment that runs the migrations in the open transaction of a given connection."""
+"""Alembic environment that runs migrations within the open transaction of an existing connection."""
 
 from alembic import context
 

@@ -1,4 +1,4 @@
-"""Support several hosts: add the table `host` and the column `person.host`.
+"""Add the table `host` and the column `person.host`, which support several hosts.
 
 An interrupted upgrade may have added one of them already.
 """
