@@ -163,7 +163,10 @@ def count_text(items: tuple[ChecklistItem, ...], texts: HudTexts) -> str:
     if any(item.number is not None for item in items):
         number = len(items) - left + 1
         return filled(texts.next_step, number=number, count=len(items)) if left else texts.done
-    return filled(texts.left, count=left) if left else texts.none_left
+    if left:
+        return filled(texts.left, count=left)
+    carried = sum(item.carried for item in items)
+    return filled(texts.none_left_carried, count=carried) if carried else texts.none_left
 
 
 def hidden_text(above: int, more: int, texts: HudTexts) -> str:

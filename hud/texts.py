@@ -23,6 +23,7 @@ class HudTexts:
     decimal: str  # the decimal separator
     left: str  # contains the placeholder {count}
     none_left: str
+    none_left_carried: str  # contains the placeholder {count}
     next_step: str  # contains the placeholders {number} and {count}
     done: str
     above: str  # contains the placeholder {count}

@@ -120,11 +120,11 @@ class PauseEvent(LoggedEvent, frozen=True):
 
     Attributes:
         reason: `hidden` (the tab), `disconnected`, `silent` (no heartbeat from the page for 1 s), `restarted` (the
-            worker process died), `asked` or `taken over`.
+            worker process died), `asked`, `taken over` or `picture lost` (the browser cannot draw).
         wall: Unix time in seconds.
     """
 
-    reason: Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
+    reason: Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over", "picture lost"]
     wall: float
 
 
@@ -199,12 +199,12 @@ class DisplayEvent(LoggedEvent, frozen=True):
 
 
 class DrawEvent(LoggedEvent, frozen=True):
-    """Rendering moved to the server because the browser cannot draw.
+    """The view is drawn elsewhere or with another resolution.
 
     Attributes:
         draw: `browser` or `server`, depending on which of them draws from now on.
-        reason: Reason why the other side stopped drawing: `slow` (below 20 frames per second), `context
-            lost`, or the missing feature.
+        reason: Reason for the change: `slow` (below 20 frames per second), `slow: 70 % of the resolution` (the
+            browser draws fewer pixels), `context lost`, or the missing feature.
         wall: Unix time in seconds.
     """
 

@@ -38,7 +38,7 @@ REFUSED, REPLACED, IDLE, TOO_MUCH, SLOW = 4000, 4001, 4002, 4003, 4004  # WebSoc
 
 Codec = Literal["jpeg", "h264", "none"]
 Drawer = Literal["browser", "server"]  # program that renders the participant's view
-PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over"]
+PauseReason = Literal["asked", "hidden", "disconnected", "silent", "restarted", "taken over", "picture lost"]
 ErrorCode = Literal["malformed", "too early", "out of order", "too much", "idle"]
 Length = Annotated[int, msgspec.Meta(ge=1, le=8192)]  # length in pixels
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]

@@ -104,7 +104,7 @@ class PlayedSession:
         if self.browser is not None:
             self.browser.send(protocol.Replaced())
             self.browser.close(protocol.REPLACED, "the session is open elsewhere")
-            self._pause("taken over")
+            self._pause("taken over" if self.browser.tab != browser.tab else "disconnected")
         self.browser, self.heard, self._lost = browser, time.monotonic(), False
         self.take(view)
         if self._task is None:

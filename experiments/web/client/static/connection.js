@@ -1,20 +1,27 @@
 // The WebSocket: reconnects after a failure, numbers inputs, and repeats them until they are acknowledged.
 
+/** @import { Link } from "./page_state.js" */
 /** @import { FrameMessage, FromBrowser, Input, ToBrowser } from "./protocol.js" */
 
-import { CODECS, FRAME_HEAD_BYTES, IDLE, KEY_FLAG, MAX_INPUTS, REFUSED, REPLACED, TOO_MUCH } from "./protocol.js";
+import { CODECS, FRAME_HEAD_BYTES, IDLE, KEY_FLAG, MAX_INPUTS, MAX_SILENCE, REFUSED, REPLACED, TOO_MUCH } from "./protocol.js";
 
 const FIRST_WAIT = 250; // delay before reconnecting, in ms
-const MAX_WAIT = 500; // longest delay before reconnecting, in ms
-const FINAL = new Set([REFUSED, REPLACED, IDLE, TOO_MUCH]); // close codes after which the page does not reconnect automatically
+const MAX_WAIT = 5000; // longest delay before reconnecting, in ms
+const FIRST_PATIENCE = 5000; // silence after which a connection is replaced, in ms
+const MAX_PATIENCE = 40_000; // the same after several replacements without a message, in ms
+/** @type {Record<number, Link>} links after close codes after which the page does not reconnect automatically */
+const FINAL = { [REFUSED]: "closed", [REPLACED]: "replaced", [IDLE]: "idle", [TOO_MUCH]: "closed" };
 
-/** @typedef {{ type: "closed", code: number, final: boolean }} Closed */
-/** @typedef {ToBrowser | FrameMessage | Closed} Received */
+/** @typedef {{ type: "closed" } | { type: "silent" }} LinkLost The connection was closed, or is silent but open. */
+/** @typedef {ToBrowser | FrameMessage | LinkLost} Received */
 
 export class Connection {
+  /** @type {Link} */
+  link = "opening";
   /** @type {WebSocket | null} */
   #socket = null;
   #wait = FIRST_WAIT;
+  #patience = FIRST_PATIENCE;
   /** @type {Input[]} */
   #waiting = []; // unacknowledged inputs
   /** @type {Input[]} */
@@ -35,6 +42,7 @@ export class Connection {
   }
 
   open() {
+    this.#heard = performance.now();
     const socket = new WebSocket(location.href.replace(/^http/, "ws").replace(/[?#].*$/, ""));
     socket.binaryType = "arraybuffer";
     this.#socket = socket;
@@ -79,9 +87,23 @@ export class Connection {
     return this.#waiting.length;
   }
 
-  /** Time since the last message from the server, in ms. */
-  get silence() {
-    return performance.now() - this.#heard;
+  /**
+   * Replaces a connection that has been silent for too long, as after a change of network. Call it regularly.
+   * @param {boolean} strict true if the clock runs, so that a shorter silence counts as a lost link
+   */
+  watch(strict) {
+    if (!this.#socket || (this.link !== "open" && this.link !== "opening" && this.link !== "lost")) return;
+    const silence = performance.now() - this.#heard;
+    if (strict && this.link === "open" && silence > 1000 * MAX_SILENCE) {
+      this.link = "lost";
+      this.#on({ type: "silent" });
+    }
+    if (silence < this.#patience || this.#socket.readyState > WebSocket.OPEN) return;
+    this.#patience = Math.min(2 * this.#patience, MAX_PATIENCE);
+    const silent = this.#socket;
+    this.#lose("lost");
+    this.open();
+    silent.close();
   }
 
   /** Closes the connection without reconnecting. */
@@ -93,10 +115,13 @@ export class Connection {
 
   /** @param {string | ArrayBuffer} data */
   #take(data) {
-    this.#wait = FIRST_WAIT;
+    [this.#wait, this.#patience] = [FIRST_WAIT, FIRST_PATIENCE];
     this.#heard = performance.now();
     /** @type {Received} */
     const message = typeof data === "string" ? JSON.parse(data) : readFrame(data);
+    if (message.type === "occupied" || message.type === "replaced") this.link = message.type;
+    else if (message.type === "error" && message.code === "idle") this.link = "idle";
+    else if (this.link === "opening" || this.link === "lost" || message.type === "state") this.link = "open";
     if (message.type === "state") {
       this.#next = Math.max(this.#next, message.input + 1);
       const open = message.phase === "running" || message.phase === "paused";
@@ -117,12 +142,19 @@ export class Connection {
 
   /** @param {number} code */
   #closed(code) {
-    this.#open = false;
-    const final = FINAL.has(code);
-    this.#on({ type: "closed", code, final });
+    const final = this.link === "replaced" || this.link === "idle" ? this.link : FINAL[code];
+    this.#lose(final ?? "lost");
     if (final) return;
-    setTimeout(() => this.#socket && this.open(), this.#wait * (0.75 + 0.5 * Math.random()));
+    const closed = this.#socket;
+    setTimeout(() => this.#socket === closed && this.open(), this.#wait * (0.75 + 0.5 * Math.random()));
     this.#wait = Math.min(2 * this.#wait, MAX_WAIT);
+  }
+
+  /** @param {Link} link that remains */
+  #lose(link) {
+    this.#open = false;
+    this.link = link;
+    this.#on({ type: "closed" });
   }
 }
 

@@ -1,5 +1,7 @@
 // The contents of all dialogs.
 
+/** @import { PageState, Shown } from "./page_state.js" */
+
 import { textOf } from "./texts.js";
 
 /** @typedef {{ title: string, texts: string[], buttons?: [string, string][] }} Dialog buttons: label and action */
@@ -78,11 +80,40 @@ export const over = (reason, saved) => ({
 export const cannotDraw = (reason) => ({
   title: textOf("cannot_draw"),
   texts: [textOf("cannot_draw_text", { reason })],
+  buttons: [[textOf("try_again"), "reload"]],
 });
 
-export const occupied = () => dialog("occupied", "occupied_text", "continue_here", "takeover");
-export const replaced = () => dialog("replaced", "replaced_text", "continue_here", "reload");
-export const offline = () => dialog("offline", "offline_text");
-export const closed = () => dialog("closed", "session_kept", "reconnect", "reload");
-export const idle = () => dialog("idle", "session_kept", "next", "reload");
-export const failed = () => dialog("failed", "failed_text", "try_again", "reload");
+/**
+ * Returns the dialog of a page that shows neither the task nor its help or instructions.
+ * @param {Exclude<Shown, "task" | "help" | "instructions">} shown
+ * @param {PageState} state
+ * @param {number} left time until the trial may be ended, in s
+ * @param {string} fault reason why this browser does not draw
+ */
+export function dialogOf(shown, { wanted, reason, saved }, left, fault) {
+  switch (shown) {
+    case "loading":
+      return loading(wanted);
+    case "ending":
+      return ending(left);
+    case "paused":
+      return paused(reason);
+    case "over":
+      return over(reason, saved);
+    case "undrawable":
+      return cannotDraw(fault);
+    default:
+      return dialog(...OTHERS[shown]);
+  }
+}
+
+/** @type {Record<"occupied" | "replaced" | "redrawing" | "offline" | "closed" | "idle" | "failed", Parameters<typeof dialog>>} */
+const OTHERS = {
+  occupied: ["occupied", "occupied_text", "continue_here", "takeover"],
+  replaced: ["replaced", "replaced_text", "continue_here", "reload"],
+  redrawing: ["one_moment", "redrawing_text"],
+  offline: ["offline", "offline_text"],
+  closed: ["closed", "session_kept", "reconnect", "reload"],
+  idle: ["idle", "session_kept", "next", "reload"],
+  failed: ["failed", "failed_text", "try_again", "reload"],
+};

@@ -42,11 +42,9 @@ export class DrawnView {
   /**
    * @param {HTMLCanvasElement} canvas
    * @param {(until: number) => void} flush is called when a control step is over
-   * @param {() => void} lost is called when drawing has become impossible
    */
-  constructor(canvas, flush, lost) {
+  constructor(canvas, flush) {
     this.world = new World3D(canvas);
-    this.world.onLost = lost;
     this.#flush = flush;
   }
 

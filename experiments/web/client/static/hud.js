@@ -160,6 +160,8 @@ export class Hud {
 function countText(items) {
   const left = items.filter((item) => !item.done).length;
   const numbered = items.some((item) => item.number !== null);
+  const carried = items.filter((item) => item.carried).length;
+  if (!left && !numbered && carried) return textOf("none_left_carried", { count: carried });
   if (!left) return textOf(numbered ? "done" : "none_left");
   if (!numbered) return textOf("left", { count: left });
   return textOf("next_step", { number: items.length - left + 1, count: items.length });

@@ -15,7 +15,7 @@ export function connectKeyboard(bindings, inputs, commands, listens) {
     const action = bindings.action(event.code);
     if (!action) return;
     event.preventDefault();
-    if (event.repeat && !action.rows) return;
+    if (event.repeat && !action.rows && !action.axes) return; // a key held since before a pause walks on
     if (action.press) inputs.press(action.press);
     else if (action.rows) inputs.scroll(action.rows);
     else if (action.axes) inputs.hold(event.code, action.axes);

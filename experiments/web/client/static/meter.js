@@ -55,6 +55,7 @@ export class Meter {
     const now = performance.now();
     const seconds = Math.max(0.001, (now - this.#start) / 1000);
     const found = {
+      seconds,
       frames_per_s: rounded(this.#shown / seconds),
       frame_ms: rounded(quantile(this.#gaps, 0.5) ?? 0),
       frame_ms_95: rounded(quantile(this.#gaps, 0.95) ?? 0),

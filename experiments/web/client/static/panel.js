@@ -8,6 +8,7 @@ export class Panel {
   #dialog;
   #actions;
   #closed;
+  #shown = ""; // the dialog that is shown, as JSON
 
   /**
    * @param {HTMLDialogElement} dialog
@@ -30,7 +31,11 @@ export class Panel {
   }
 
   /** @param {Dialog} dialog */
-  show({ title, texts, buttons = [] }) {
+  show(dialog) {
+    const { title, texts, buttons = [] } = dialog;
+    const content = JSON.stringify(dialog);
+    if (content === this.#shown && this.open) return; // a button keeps its focus
+    this.#shown = content;
     within(this.#dialog, "h2", HTMLElement).textContent = title;
     within(this.#dialog, "#panel-text", HTMLElement).replaceChildren(...texts.map((text) => made("p", text)));
     const elements = buttons.map(([label, action], i) => {

@@ -1,5 +1,6 @@
 // The picture of the apartment, drawn by this browser or as frames from the server.
 
+/** @import { Drawing } from "./page_state.js" */
 /** @import { Codec, Draw, Input, SceneMessage, View } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
 /** @import { Drawn } from "./drawn_view.js" */
@@ -10,21 +11,28 @@ import { Meter } from "./meter.js";
 import { Screen, bestCodec } from "./screen.js";
 
 const DEGREE = Math.PI / 180; // rad
-const SLOWEST = 20; // frame rate below which the server draws instead, in fps
+const SLOWEST = 20; // frame rate below which the picture becomes coarser, or the server draws, in fps
+const JUDGED_AFTER = 2; // duration of measurements that may change how the picture is drawn, in s
+const COARSER = 0.7; // factor of the resolution of a slow picture
+const COARSEST = 0.5; // lowest resolution before the server draws, as a share of the display's
+const MAX_RATIO = 2; // most drawn pixels per CSS pixel in each direction
+const RESTORED_WITHIN = 5000; // how long a lost context may take to return, in ms
 
 /**
  * @typedef {object} Events
  * @property {(message: View | Draw | { type: "seen", frame: number }) => void} send
  * @property {(until: number) => void} flush sends the inputs of control steps before `until`
  * @property {(step: number) => void} shown the state of this control step is shown
- * @property {() => void} loaded the first picture is ready
- * @property {(reason: string) => void} failed this browser cannot draw, and the server must not
+ * @property {() => void} changed `drawing` has changed
  */
 
 export class Picture {
   meter = new Meter();
   /** @type {DrawnView | null} */
   drawn = null; // null if the server draws
+  /** @type {Drawing} */
+  drawing = "loading";
+  fault = ""; // reason why this browser does not draw
   #wanted;
   #events;
   #screen;
@@ -35,6 +43,9 @@ export class Picture {
   /** @type {number | null} */
   #chosen = null; // field of view in radians; null if it cannot be chosen
   #frame = ""; // description of the last frame
+  #scale = 1; // resolution as a share of the display's
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  #lost; // timer while the context is lost
 
   /** @param {string} wanted `auto`, `browser` or `server` @param {Events} events */
   constructor(wanted, events) {
@@ -61,16 +72,44 @@ export class Picture {
     if (this.#wanted === "server") return null;
     try {
       this.#show(true);
-      this.drawn = new DrawnView(byId("world", HTMLCanvasElement), this.#events.flush, () => this.fallBack("context lost"));
-      this.drawn.world.resize();
+      this.drawn = new DrawnView(byId("world", HTMLCanvasElement), this.#events.flush);
+      const { world } = this.drawn;
+      world.onLost = () => this.#lose();
+      world.onRestored = () => this.#restore();
+      this.resize();
       return null;
     } catch (error) {
       this.#show(false);
-      const reason = error instanceof Error ? error.message : `${error}`;
-      if (this.#wanted === "browser") this.#events.failed(reason);
-      return reason;
+      this.fault = error instanceof Error ? error.message : `${error}`;
+      if (this.#wanted === "browser") this.#change("failed");
+      return this.fault;
     }
   }
+
+  /** @param {Drawing} drawing */
+  #change(drawing) {
+    this.drawing = drawing;
+    this.#events.changed();
+  }
+
+  #lose() {
+    if (!this.drawn) return;
+    this.#change("lost");
+    this.#lost = setTimeout(() => this.fallBack("context lost"), RESTORED_WITHIN);
+  }
+
+  #restore() {
+    if (!this.drawn || this.drawing !== "lost") return;
+    clearTimeout(this.#lost);
+    this.#change("ready");
+  }
+
+  /** Adapts the drawing to the size of the view. */
+  resize() {
+    const ratio = window.devicePixelRatio || 1;
+    this.drawn?.world.resize(this.#scale * Math.min(1, MAX_RATIO / ratio));
+  }
+
 
   /** Returns the view to request from the server. @returns {View} */
   get view() {
@@ -90,11 +129,14 @@ export class Picture {
       case "frame":
         meter.came(message);
         this.#screen.show(message);
-        this.#events.loaded();
+        if (this.drawing === "loading" && !this.drawn) this.#change("ready");
         break;
       case "scene":
         this.#offer(message);
-        drawn?.load(message).then(this.#events.loaded, (error) => this.fallBack(`house not loaded: ${error.message}`));
+        drawn?.load(message).then(
+          () => this.drawing === "loading" && this.#change("ready"),
+          (error) => this.fallBack(`house not loaded: ${error.message}`),
+        );
         break;
       case "snapshot":
         drawn?.take(message, performance.now());
@@ -126,26 +168,38 @@ export class Picture {
     this.meter.sent(input.number);
   }
 
-  /** Returns the display quality since the last call. A browser that is too slow stops drawing. */
+  /** Returns the display quality since the last call or the start of the clock. A browser that is too slow draws less. */
   report() {
-    const seen = this.meter.take();
-    const slow = seen.frames_per_s < SLOWEST && !document.hidden;
+    const { seconds, ...seen } = this.meter.take();
+    const slow = seen.frames_per_s < SLOWEST && seconds > JUDGED_AFTER && !document.hidden;
     const draw = /** @type {"browser" | "server"} */ (this.drawn ? "browser" : "server");
     const { renderer } = this;
     const field = this.#chosen === null ? {} : { field_of_view: this.#chosen };
-    if (slow && this.drawn && this.#wanted === "auto") this.fallBack("slow");
+    if (slow && this.drawing === "ready") this.#lighten();
     return { draw, renderer, ...field, ...seen };
   }
 
-  /** Lets the server draw from now on. @param {string} reason */
+  /** Draws with a lower resolution. If that is the lowest one already, the server draws, unless the browser must. */
+  #lighten() {
+    if (this.#scale * COARSER >= COARSEST) {
+      this.#scale *= COARSER;
+      this.resize();
+      this.#events.send({ type: "draw", draw: "browser", reason: `slow: ${Math.round(100 * this.#scale)} % of the resolution` });
+    } else if (this.#wanted === "auto") this.fallBack("slow");
+  }
+
+  /** Lets the server draw until the page is loaded again. @param {string} reason */
   fallBack(reason) {
     if (!this.drawn) return;
-    if (this.#wanted === "browser") return this.#events.failed(reason);
+    clearTimeout(this.#lost);
+    this.fault = reason;
+    if (this.#wanted === "browser") return this.#change("failed");
     this.drawn = this.#chosen = null;
     byId("field-of-view", HTMLElement).hidden = true;
     this.#show(false);
     this.#events.send({ type: "draw", draw: "server", reason });
     this.#sendView();
+    this.#change("loading");
   }
 
   /** Requests another field of view. The next scene confirms it. @param {number} degrees 0 for the default */

@@ -1,7 +1,8 @@
 // The page on which a trial is played: joins view, controls, connection and dialogs.
 
-/** @import { PauseReason } from "./protocol.js" */
+/** @import { PauseReason, State } from "./protocol.js" */
 /** @import { Received } from "./connection.js" */
+/** @import { PageState, Shown } from "./page_state.js" */
 
 import { Bindings, learnLayout } from "./bindings.js";
 import { Connection } from "./connection.js";
@@ -14,10 +15,11 @@ import { Hud } from "./hud.js";
 import { Inputs } from "./inputs.js";
 import { connectKeyboard } from "./keyboard.js";
 import { watchPage } from "./page_events.js";
+import { pauseReason, resumes, shownIn } from "./page_state.js";
 import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { connectMouse, connectTouch } from "./pointer.js";
-import { BEAT_PERIOD, DISPLAY_PERIOD, MAX_SILENCE, TOO_MUCH } from "./protocol.js";
+import { BEAT_PERIOD, DISPLAY_PERIOD, } from "./protocol.js";
 import { Session } from "./session.js";
 import { Settings } from "./settings.js";
 import { Sounds } from "./sounds.js";
@@ -35,13 +37,19 @@ const tab = Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byt
 
 const session = new Session();
 let pressed = 0; // last input with a press, whose effect the server decides
-let silent = false; // true if the server is silent on an open connection
+let stopping = false; // true until the server confirms a pause
+let saved = false; // true once the run is complete on disk
+/** @type {PageState["asked"]} */
+let asked = "";
+let left = 0; // time until the trial may be ended, when that was asked for, in s
+/** @type {Shown} */
+let shown = "loading";
 const panel = new Panel(
   byId("panel", HTMLDialogElement),
   {
     run,
     leave: () => connection.send({ type: "leave" }),
-    hide: () => panel.hide(),
+    hide: () => ask(""),
     takeover: () => connection.send({ type: "takeover" }),
     reload: () => location.reload(),
   },
@@ -52,8 +60,7 @@ const picture = new Picture(choice || draw, {
   send: (message) => connection.send(message),
   flush: (until) => connection.flush(until),
   shown: (step) => hud.reached(step),
-  loaded: () => session.phase === "ready" && showInstructions(),
-  failed: (reason) => panel.show(dialogs.cannotDraw(reason)),
+  changed: update,
 });
 const connection = new Connection(() => ({ type: "hello", tab, trial, view: picture.view }), take);
 const inputs = new Inputs((values) => {
@@ -66,25 +73,23 @@ const inputs = new Inputs((values) => {
 const sounds = new Sounds();
 const bindings = new Bindings();
 const hud = new Hud(() => bindings.label("act"));
-const help = new Help(byId("help", HTMLDialogElement), bindings, () => canvas.focus());
+const help = new Help(byId("help", HTMLDialogElement), bindings, () => {
+  ask("");
+  canvas.focus();
+});
 const commands = {
   help: () => (help.open ? help.hide() : openHelp()),
-  pause: () => (session.phase === "paused" ? run() : pause("asked")),
+  pause: () => (shown === "paused" ? run() : pause("asked")),
   confirm: () => /** @type {HTMLElement | null} */ (document.querySelector("dialog[open] .button"))?.click(),
 };
-const listens = () => session.phase === "running" && !panel.open && !help.open;
+const listens = () => session.phase === "running" && shown === "task" && !help.open;
 
 /** @param {Received} message */
 function take(message) {
-  if (silent && message.type !== "closed") {
-    silent = false;
-    connection.send({ type: "pause", reason: "silent" }); // the next state allows the clock to run again
-  }
   picture.take(message);
   switch (message.type) {
     case "state":
-      session.take(message);
-      showState();
+      takeState(message);
       break;
     case "pictures":
       hud.learn(message);
@@ -109,28 +114,61 @@ function take(message) {
       break;
     case "saved":
       connection.close();
-      panel.show(dialogs.over(session.reason, true));
+      saved = true;
       setTimeout(() => location.reload(), DONE);
       break;
     case "queue":
       connection.close();
       location.reload(); // the page shows the queue
       break;
-    case "occupied":
-      panel.show(dialogs.occupied());
-      break;
-    case "replaced":
-      panel.show(dialogs.replaced());
-      break;
     case "error":
-      if (message.code === "idle") panel.show(dialogs.idle());
-      else console.warn(`the server refused a message (${message.code}): ${message.message}`);
+      if (message.code !== "idle") console.warn(`the server refused a message (${message.code}): ${message.message}`);
       break;
     case "closed":
-      silent = false;
-      if (!message.final) lose();
-      else if (message.code === TOO_MUCH) panel.show(dialogs.closed());
+      takeState({ phase: "loading", reason: "" });
   }
+  update();
+}
+
+/** @param {Pick<State, "phase" | "reason">} state */
+function takeState(state) {
+  const { phase } = session;
+  session.take(state);
+  if (state.phase !== "running") {
+    stopping = false;
+    picture.drawn?.end();
+  } else if (phase !== "running") inputs.send(); // the session may have the state of an earlier page
+  if (document.hidden && state.phase === "paused") session.wanted = false;
+}
+
+/** @returns {PageState} */
+const state = () => ({
+  phase: session.phase,
+  reason: session.reason,
+  saved,
+  wanted: session.wanted,
+  link: connection.link,
+  drawing: picture.drawing,
+  hidden: document.hidden,
+  asked,
+});
+
+/** Shows what the state demands, and lets the clock run only if that is the task. */
+function update() {
+  const now = state();
+  if (resumes(now)) return run();
+  const next = shownIn(now);
+  if (stopping && next === "task") return; // the server is about to confirm
+  if (next !== "task" && session.phase === "running") stop(pauseReason(next));
+  shown = next;
+  const stopped = session.phase === "running" ? "paused" : session.phase;
+  page.dataset.phase = shown === "task" ? "running" : stopped; // the style sheet hides the task while the clock is stopped
+  byId("redraw-button", HTMLElement).hidden = draw !== "auto" || !picture.fault;
+  if (shown === "task" || shown === "help") panel.hide();
+  else if (shown === "instructions") panel.show(instructions());
+  else panel.show(dialogs.dialogOf(shown, now, left, picture.fault));
+  if (shown === "failed") connection.close();
+  if (shown === "paused" && document.pointerLockElement) document.exitPointerLock();
 }
 
 /** @param {string} name of the text that explains why a key has no effect, or empty */
@@ -150,98 +188,80 @@ function drawPicture(now) {
   byId("view", HTMLElement).classList.toggle("moving", drawn.moving);
 }
 
-function showState() {
-  if (session.phase !== "running") picture.drawn?.end();
-  page.dataset.phase = session.phase; // the style sheet hides the task while the clock is stopped
-  switch (session.phase) {
-    case "loading":
-      panel.show(dialogs.loading(session.interrupted));
-      break;
-    case "running":
-      inputs.send(); // the session may have the state of an earlier page
-      panel.hide();
-      break;
-    case "paused":
-      if (session.interrupted && !document.hidden) run();
-      else {
-        if (document.pointerLockElement) document.exitPointerLock();
-        panel.show(dialogs.paused(session.reason));
-      }
-      break;
-    case "over":
-      panel.show(dialogs.over(session.reason, false));
-      break;
-    case "failed":
-      connection.close();
-      panel.show(dialogs.failed());
-  }
-}
-
-function lose() {
-  inputs.release();
-  session.lose();
-  showState();
-  panel.show(dialogs.offline());
-}
-
-function watchLink() {
-  if (session.phase !== "running" || connection.silence < 1000 * MAX_SILENCE) return;
-  silent = true;
-  lose();
-}
-
 function report() {
+  if (session.phase !== "running") return;
   const { kilobits, ...seen } = picture.report();
   const { width, height } = canvas.getBoundingClientRect();
   const size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
-  if (session.phase === "running" && seen.renderer) {
+  if (seen.renderer) {
     connection.send({ type: "display", ...seen, ...size, pixel_ratio: window.devicePixelRatio || 1 });
   }
   byId("debug", HTMLElement).textContent =
     `${seen.latency_ms ?? "–"} ms · ${seen.frames_per_s} fps · ${kilobits} kbit/s · ${seen.renderer} · ${connection.pending} not taken`;
 }
 
-function showInstructions() {
+function instructions() {
   const touch = matchMedia("(pointer: coarse)").matches;
   const controls = touch ? textOf("touch_text") : dialogs.keyControls((name) => bindings.label(name));
-  const dialog = dialogs.instructions(trial, Number(objects), controls, performance.now() >= endable);
-  if (panel.title !== dialog.title) panel.show(dialog);
+  return dialogs.instructions(trial, Number(objects), controls, performance.now() >= endable);
 }
 
 function run() {
+  asked = "";
   if (!session.run()) return;
-  showState();
+  stopping = false;
   picture.drawn?.begin(performance.now());
+  picture.meter.take(); // leaves the pause out of the measurements
   sounds.unlock();
   connection.send({ type: "run", until: picture.drawn ? 0 : null }); // the clock waits for our control steps
+  inputs.send(); // the server has released all keys during the pause
+  update();
 }
 
-/** @param {PauseReason} reason */
-function pause(reason) {
-  if (session.phase !== "running") return;
-  inputs.release();
+/** Stops the clock until `update` finds that it may run again. @param {PauseReason} reason */
+function stop(reason) {
+  if (session.phase !== "running" || stopping) return;
+  stopping = true;
   connection.send({ type: "pause", reason });
 }
 
-function askToEnd() {
+/** Stops the clock until the participant starts it. @param {PauseReason} reason */
+function pause(reason) {
+  if (session.phase !== "running") return;
+  session.wanted = false;
   inputs.release();
+  stop(reason);
+}
+
+/** Opens a dialog of the participant, or closes it. @param {PageState["asked"]} dialog */
+function ask(dialog) {
+  asked = dialog;
+  if (dialog) inputs.release();
+  if (dialog && document.pointerLockElement) document.exitPointerLock();
+  update();
+}
+
+function askToEnd() {
   if (page.dataset["leave"]) location.assign(page.dataset["leave"]);
-  else panel.show(dialogs.ending(Math.ceil((endable - performance.now()) / 1000)));
+  else {
+    left = Math.ceil((endable - performance.now()) / 1000);
+    ask("ending");
+  }
 }
 
 function openHelp() {
-  inputs.release();
-  if (document.pointerLockElement) document.exitPointerLock();
+  ask("help");
   help.show();
 }
 
 byId("panel", HTMLDialogElement).addEventListener("keydown", (event) => {
-  if (session.phase !== "paused" || bindings.action(event.code)?.name !== "pause") return;
+  if (shown !== "paused" || bindings.action(event.code)?.name !== "pause") return;
   event.stopPropagation(); // otherwise the view handles the key and pauses again
   run();
 });
 byId("help-button", HTMLElement).addEventListener("click", openHelp);
 byId("pause-button", HTMLElement).addEventListener("click", () => commands.pause());
+byId("redraw-button", HTMLElement).addEventListener("click", () => location.reload());
 byId("end-button", HTMLElement).addEventListener("click", askToEnd);
 byId("reach", HTMLElement).addEventListener("click", () => {
   if (listens()) inputs.press("act");
@@ -254,7 +274,7 @@ full.addEventListener("click", () => {
   else document.documentElement.requestFullscreen();
 });
 connectKeyboard(bindings, inputs, commands, listens);
-const mouse = connectMouse(canvas, inputs, listens, () => hud.reach);
+const mouse = connectMouse(canvas, inputs, listens);
 connectTouch(canvas, byId("touch", HTMLElement), inputs, listens);
 connectGamepad(inputs, commands, listens);
 watchPage(canvas, {
@@ -262,15 +282,16 @@ watchPage(canvas, {
   hidden: () => pause("hidden"),
   blur: (away) => connection.send({ type: "blur", away }),
   close: () => connection.close(),
-  resize: () => picture.drawn?.world.resize(),
+  resize: () => picture.resize(),
   resized: () => picture.tellSize(),
 });
-setInterval(watchLink, 1000 * BEAT_PERIOD);
+document.addEventListener("visibilitychange", update);
+setInterval(() => connection.watch(session.phase === "running"), 1000 * BEAT_PERIOD);
 setInterval(report, 1000 * DISPLAY_PERIOD);
 setInterval(() => session.phase === "running" && picture.drawn?.tick(performance.now()), TICK);
 byId("debug", HTMLElement).hidden = !new URLSearchParams(location.search).has("debug");
 rememberVisit();
-panel.show(dialogs.loading(false));
+update();
 learnLayout();
 const lack = await picture.prepare();
 const { drawn: view } = picture;

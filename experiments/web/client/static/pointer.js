@@ -12,16 +12,15 @@ const LINE = 40; // wheel movement per row, in pixels
  * @param {HTMLCanvasElement} canvas
  * @param {Inputs} inputs
  * @param {() => boolean} listens whether inputs are for the view
- * @param {() => boolean} reaches whether the action key would do something
  * @returns {{ sensitivity: number, inverted: boolean }} what may be changed: a factor, and whether forward looks down
  */
-export function connectMouse(canvas, inputs, listens, reaches) {
+export function connectMouse(canvas, inputs, listens) {
   const mouse = { sensitivity: 1, inverted: false };
   canvas.addEventListener("click", (event) => {
     if ((event instanceof PointerEvent && event.pointerType === "touch") || !listens()) return;
     canvas.focus();
     const locked = document.pointerLockElement === canvas;
-    if (locked || reaches()) inputs.press("act"); // the first click only captures the mouse if nothing is in reach
+    if (locked || !canvas.requestPointerLock) inputs.press("act"); // the first click only captures the mouse
     // Browsers refuse this right after Esc. The next click asks again.
     if (!locked) canvas.requestPointerLock?.()?.catch?.(() => {});
   });

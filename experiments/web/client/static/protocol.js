@@ -1,7 +1,7 @@
 // Types and constants of docs/protocol.md, made by `make client-protocol`; change them in experiments/web/protocol.py.
 
 /** @typedef {"jpeg" | "h264" | "none"} Codec */
-/** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over"} PauseReason */
+/** @typedef {"asked" | "hidden" | "disconnected" | "silent" | "restarted" | "taken over" | "picture lost"} PauseReason */
 /** @typedef {"loading" | "ready" | "running" | "paused" | "over" | "failed"} Phase */
 /** @typedef {{ type: "view"; width: number; height: number; codec?: "h264" | "jpeg" | "none"; field_of_view?: number | null }} View A request for a view of this size in CSS pixels. The codec is `none` if the page itself draws the view. */
 /** @typedef {{ type: "hello"; tab: string; trial: string; view: View }} Hello The first message of a connection. `tab` is a random name that the page keeps when it reconnects. */
@@ -13,7 +13,7 @@
 /** @typedef {{ type: "beat" }} Beat A heartbeat. The server sends two per second, and the page answers each of them. */
 /** @typedef {{ type: "display"; draw: "browser" | "server"; renderer: string; width: number; height: number; pixel_ratio: number; frames_per_s: number; frame_ms: number; frame_ms_95: number; dropped: number; latency_ms?: number | null; field_of_view?: number | null }} Display A report on the display quality over the last 5 s, which is written to the log. */
 /** @typedef {{ type: "draw"; draw: "browser" | "server"; reason: string }} Draw A notice that the browser or the server now draws the view. It is logged with its reason. */
-/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "restarted" | "silent" | "taken over" }} Pause A request to stop the clock. The reason is written to the log. */
+/** @typedef {{ type: "pause"; reason: "asked" | "disconnected" | "hidden" | "picture lost" | "restarted" | "silent" | "taken over" }} Pause A request to stop the clock. The reason is written to the log. */
 /** @typedef {{ type: "blur"; away: boolean }} Blur A notice that the page has lost or regained the keyboard focus. It is written to the log. */
 /** @typedef {{ type: "leave" }} Leave A request to end the trial immediately. */
 /** @typedef {{ type: "state"; phase: Phase; reason: string; input: number }} State The state of a session. `reason` explains a pause, end or failure. `input` numbers the last input. */

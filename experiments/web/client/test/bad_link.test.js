@@ -111,7 +111,6 @@ async function played(delay, lost) {
   const view = new DrawnView(
     /** @type {HTMLCanvasElement} */ ({}),
     (until) => up.send({ inputs: unsent.splice(0), until }, now),
-    () => {},
   );
   const scene = { path: "/", floor: "/floor", gait: GAIT, speeds: SPEEDS, field_of_view: 1.5, field_of_view_range: null, step_duration: DT };
   await view.load(/** @type {SceneMessage} */ ({ type: "scene", ...scene }));

@@ -97,10 +97,52 @@ describe("a connection", () => {
     FakeSocket.latest().onclose({ code: REPLACED });
     vi.runAllTimers();
     expect(FakeSocket.all).toHaveLength(2);
-    expect(received).toEqual([
-      { type: "closed", code: 1006, final: false },
-      { type: "closed", code: REPLACED, final: true },
-    ]);
+    expect(received).toEqual([{ type: "closed" }, { type: "closed" }]);
+  });
+
+  test("is tried again less and less often", () => {
+    connected();
+    const tries = () => FakeSocket.all.length;
+    for (let seconds = 0; seconds < 60; seconds++) {
+      vi.advanceTimersByTime(1000);
+      if (FakeSocket.latest().readyState === 1) FakeSocket.latest().fail();
+    }
+    expect(tries()).toBeGreaterThan(10);
+    expect(tries()).toBeLessThan(25);
+  });
+
+  test("is replaced after five seconds without a message, then less often", () => {
+    const { connection, socket } = connected();
+    /** @param {number} seconds */
+    const silent = (seconds) => {
+      for (let beat = 0; beat < 2 * seconds; beat++) {
+        vi.advanceTimersByTime(500);
+        connection.watch(true);
+      }
+    };
+    socket.state("running");
+    silent(0.5);
+    expect(connection.link).toBe("open");
+    silent(1);
+    expect(connection.link).toBe("lost");
+    socket.receive({ type: "beat" });
+    expect(connection.link).toBe("open");
+    silent(5);
+    expect([FakeSocket.all.length, socket.readyState]).toEqual([2, 3]);
+    silent(30);
+    expect(FakeSocket.all.length).toBeLessThan(5);
+    FakeSocket.latest().state("paused");
+    expect(connection.link).toBe("open");
+    silent(5);
+    expect(connection.link).toBe("lost");
+  });
+
+  test.each([["occupied", "occupied"], ["replaced", "replaced"]])("stays silent without being replaced: %s", (type, link) => {
+    const { connection, socket } = connected();
+    socket.receive({ type });
+    vi.advanceTimersByTime(60_000);
+    connection.watch(true);
+    expect([connection.link, FakeSocket.all.length]).toEqual([link, 1]);
   });
 
   test("ignores an old socket", () => {

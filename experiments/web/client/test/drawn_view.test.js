@@ -32,7 +32,7 @@ describe("a view that this browser draws", () => {
     vi.clearAllMocks();
     vi.stubGlobal("fetch", async () => new Response(JSON.stringify(EMPTY)));
     sent = [];
-    view = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), (until) => sent.push(until), () => {});
+    view = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), (until) => sent.push(until));
     await view.load(SCENE);
   });
 
@@ -44,13 +44,13 @@ describe("a view that this browser draws", () => {
 
   test("loads a house once, also where it is told again meanwhile", async () => {
     world.load.mockClear();
-    const other = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {}, () => {});
+    const other = new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {});
     await Promise.all([other.load(SCENE), other.load(SCENE)]);
     expect(world.load).toHaveBeenCalledTimes(1);
   });
 
   test("loads another house after the one that was expected", async () => {
-    const [other, order] = [new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {}, () => {}), /** @type {string[]} */ ([])];
+    const [other, order] = [new DrawnView(/** @type {HTMLCanvasElement} */ ({}), () => {}), /** @type {string[]} */ ([])];
     world.load.mockImplementation(/** @param {any} resolve */ async (...resolve) => {
       const path = /** @type {any} */ (resolve[0])("");
       order.push(path);

@@ -6,6 +6,7 @@ import { Group } from "../static/vendor/three.js";
 
 export const world = {
   onLost: () => {},
+  onRestored: () => {},
   load: vi.fn(async () => ({ objects: { mug: {} } })),
   loadModels: vi.fn(), resize: vi.fn(), setFieldOfView: vi.fn(), setObjects: vi.fn(), setPose: vi.fn(), setPerson: vi.fn(),
   setEye: vi.fn(), setCamera: vi.fn(), setMarkers: vi.fn(), setOutline: vi.fn(), showCeilings: vi.fn(), draw: vi.fn(),

@@ -35,7 +35,7 @@ describe("a key is changed", () => {
     change("act");
     expect(report()).toContain("Press the new key for: Pick up");
     key("KeyP");
-    expect([keys("act"), keys("pause"), report()]).toEqual(["P", "none", "Pick up or put into the bin: P"]);
+    expect([keys("act"), keys("pause"), report()]).toEqual(["P", "none", "Pick up or place: P"]);
     expect(bindings.action("KeyP")?.name).toBe("act");
     expect(document.activeElement).toBe(dialog.querySelector("[data-action=act]")); // where a person without mouse was
   });

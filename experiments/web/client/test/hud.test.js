@@ -36,6 +36,13 @@ describe("the display", () => {
     hud = new Hud(() => "E");
   });
 
+  test("counts what is in the hands once nothing is left to find", () => {
+    hud.show(state({ checklist: [item({ done: true }), item({ done: true, carried: true })] }));
+    expect(document.getElementById("list-title")?.textContent).toContain("0 left to find, 1 in your hands");
+    hud.show(state({ checklist: [item({ done: true })] }));
+    expect(document.getElementById("list-title")?.textContent).toContain("none left");
+  });
+
   test("tells what is carried from what is done", () => {
     hud.show(state({ checklist: [item({}), item({ done: true }), item({ done: true, carried: true })] }));
     const rows = [...part("list").children];

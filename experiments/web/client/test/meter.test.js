@@ -20,7 +20,7 @@ test("frames are counted: how many a second, the times between them, those that 
     meter.came(frame(0));
     if (i < 98) meter.shown(frame(0));
   }
-  expect(meter.take()).toEqual({ frames_per_s: 19.6, frame_ms: 40, frame_ms_95: 140, dropped: 2, latency_ms: null, kilobits: 160 });
+  expect(meter.take()).toEqual({ seconds: 5, frames_per_s: 19.6, frame_ms: 40, frame_ms_95: 140, dropped: 2, latency_ms: null, kilobits: 160 });
   expect(meter.take()).toMatchObject({ frames_per_s: 0, dropped: 0, kilobits: 0 });
 });
 

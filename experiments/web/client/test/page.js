@@ -88,6 +88,12 @@ export class FakeSocket {
     this.readyState = 3;
   }
 
+  /** Closes the connection as a network failure does. */
+  fail() {
+    this.readyState = 3;
+    this.onclose({ code: 1006 });
+  }
+
   /** @param {object} message */
   receive(message) {
     this.onmessage({ data: JSON.stringify(message) });

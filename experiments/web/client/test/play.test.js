@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
-import { TOO_MUCH } from "../static/protocol.js";
+import { REPLACED, TOO_MUCH } from "../static/protocol.js";
 import { FakeSocket, frame, showPage, watchListeners } from "./page.js";
 import { EMPTY, GAIT, SPEEDS } from "./walks.js";
 
@@ -30,6 +30,13 @@ const choose = (label) => [...part("panel-actions").querySelectorAll("button")].
 /** @param {string} code @param {string} [type] */
 const key = (code, type = "keydown") => document.activeElement?.dispatchEvent(new KeyboardEvent(type, { code, bubbles: true }));
 const socket = () => FakeSocket.latest();
+/** Lets time pass while the server is there. @param {number} seconds */
+const wait = (seconds) => {
+  for (let beat = 0; beat < 2 * seconds; beat++) {
+    vi.advanceTimersByTime(500);
+    socket().receive({ type: "beat" });
+  }
+};
 const settled = () => vi.advanceTimersByTimeAsync(0);
 
 /** Opens the page of a trial. @param {Record<string, string>} [data] */
@@ -102,9 +109,10 @@ describe("a trial", () => {
     await running({ wait: "60" });
     part("end-button").click();
     expect(part("panel-text").textContent).toContain("in 60 s");
+    socket().state("paused", "asked");
     choose("Continue");
     expect(title()).toBeNull();
-    vi.advanceTimersByTime(60_000);
+    wait(60);
     part("end-button").click();
     choose("End this part");
     expect(socket().all("leave")).toHaveLength(1);
@@ -199,12 +207,6 @@ describe("while the clock runs", () => {
       vi.spyOn(document, "hidden", "get").mockReturnValue(hidden);
       document.dispatchEvent(new Event("visibilitychange"));
     };
-    const wait = (/** @type {number} */ seconds) => {
-      for (let beat = 0; beat < 2 * seconds; beat++) {
-        vi.advanceTimersByTime(500);
-        socket().receive({ type: "beat" });
-      }
-    };
     hide(true);
     wait(4);
     hide(false);
@@ -252,6 +254,86 @@ describe("while the clock runs", () => {
   });
 });
 
+describe("the clock never runs behind a dialog", () => {
+  /** @param {string} reason */
+  const stopped = (reason) => {
+    expect(socket().all("pause")).toEqual([{ type: "pause", reason }]);
+    socket().state("paused", reason);
+  };
+
+  test("help stops it, and closing the help starts it", async () => {
+    await running();
+    part("help-button").click();
+    stopped("asked");
+    wait(5);
+    expect([/** @type {HTMLDialogElement} */ (part("help")).open, title(), part("play").dataset.phase]).toEqual([true, null, "paused"]);
+    part("help-close").click();
+    expect([title(), socket().all("run").length]).toEqual([null, 2]);
+  });
+
+  test("help that is closed before the server has stopped the clock starts it as soon as it has", async () => {
+    await running();
+    part("help-button").click();
+    part("help-close").click();
+    expect(socket().all("run")).toHaveLength(1);
+    stopped("asked");
+    expect([title(), socket().all("run").length]).toEqual([null, 2]);
+  });
+
+  test("a lost picture stops it for as long as it takes to return", async () => {
+    await running({ draw: "browser" });
+    world.onLost();
+    expect(title()).toBe("One moment");
+    stopped("picture lost");
+    wait(4.5);
+    expect(title()).toBe("One moment");
+    world.onRestored();
+    expect([title(), socket().all("run").length]).toEqual([null, 2]);
+    wait(5);
+    expect([title(), socket().all("draw")]).toEqual([null, []]);
+  });
+
+  test("a pause does not count as slow drawing", async () => {
+    await running({ draw: "auto" });
+    key("KeyP");
+    stopped("asked");
+    wait(12);
+    choose("Continue");
+    expect(socket().all("draw")).toEqual([]);
+  });
+
+  test("a state from the server does not hide that the picture is lost", async () => {
+    await running({ draw: "browser" });
+    world.onLost();
+    socket().state("running");
+    expect(title()).toBe("One moment");
+  });
+});
+
+test("a page that was replaced says so for as long as it is open", async () => {
+  await running();
+  socket().receive({ type: "replaced" });
+  socket().onclose({ code: REPLACED });
+  for (let second = 0; second < 5; second++) {
+    vi.advanceTimersByTime(1000);
+    expect(title()).toBe("This session continues on another page");
+  }
+  expect(FakeSocket.all).toHaveLength(1);
+  choose("Continue here");
+  expect(location.reload).toHaveBeenCalledOnce();
+});
+
+test("a key held through a lost connection still walks afterwards", async () => {
+  await running();
+  key("KeyW");
+  socket().onclose({ code: 1006 });
+  vi.advanceTimersByTime(900);
+  socket().state("paused", "disconnected", 1);
+  const types = socket().sent.map(({ type }) => type);
+  expect(types.lastIndexOf("inputs")).toBeGreaterThan(types.indexOf("run")); // earlier ones count as released
+  expect(socket().inputs.at(-1)).toMatchObject({ forward: 1 });
+});
+
 describe("a lost link", () => {
   test("pauses, and the clock runs again by itself when it is back", async () => {
     await running();
@@ -293,6 +375,7 @@ test.each([
   [{ type: "state", phase: "paused", reason: "taken over", input: 0 }, "Paused", "Continue"],
 ])("the page says what it waits for: %o", async (message, expected, label) => {
   await opened();
+  socket().onmessage({ data: frame({ number: 1 }) });
   socket().receive(message);
   expect(title()).toBe(expected);
   expect(part("panel-actions").querySelector("button")?.textContent ?? null).toBe(label);
@@ -359,22 +442,25 @@ describe("a browser that draws", () => {
   });
 
   test.each([
-    ["context lost", () => world.onLost()],
-    ["slow", () => vi.advanceTimersByTime(1)],
+    ["context lost", () => (world.onLost(), wait(5))],
+    ["slow", () => wait(5)],
   ])("lets the server draw where it cannot: %s", async (reason, happens) => {
     await running({ draw: "auto" });
     if (reason === "slow") {
       // The state comes, but there are no pictures.
       vi.stubGlobal("requestAnimationFrame", () => 0);
-      for (let second = 0; second < 5; second += 0.5) {
-        vi.advanceTimersByTime(500);
-        socket().receive({ type: "beat" });
-      }
+      wait(5);
+      expect(socket().all("draw")).toEqual([{ type: "draw", draw: "browser", reason: "slow: 70 % of the resolution" }]);
     }
     happens();
-    expect(socket().all("draw")).toEqual([{ type: "draw", draw: "server", reason }]);
+    expect(socket().all("draw").at(-1)).toEqual({ type: "draw", draw: "server", reason });
     expect(socket().all("view")).toMatchObject([{ codec: "jpeg" }]);
-    expect(part("world").hidden).toBe(true);
+    expect([part("world").hidden, part("redraw-button").hidden]).toEqual([true, false]);
+    expect(title()).toBe("One moment"); // there is no frame yet
+    socket().state("paused", "picture lost");
+    socket().onmessage({ data: frame({ number: 1 }) });
+    await settled();
+    expect([title(), socket().all("run").length]).toEqual([null, 2]);
   });
 
   describe("with a choice of the field of view", () => {
@@ -394,6 +480,7 @@ describe("a browser that draws", () => {
       expect([slider().min, slider().max, slider().value]).toEqual(["69", "114", "86"]);
       expect(socket().all("view")).toEqual([]);
       world.onLost();
+      wait(5);
       expect(part("field-of-view").hidden).toBe(true);
     });
 
@@ -428,7 +515,10 @@ describe("a browser that draws", () => {
   test("is not replaced where the study wants the browser to draw", async () => {
     await running({ draw: "browser" });
     world.onLost();
+    wait(5);
     expect([title(), socket().all("draw")]).toEqual(["This browser cannot draw the apartment", []]);
+    choose("Try again");
+    expect(location.reload).toHaveBeenCalledOnce();
   });
 
   test.each([["browser", 0, "This browser cannot draw the apartment"], ["auto", 1, "One moment"]])(

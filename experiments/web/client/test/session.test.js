@@ -33,31 +33,10 @@ describe("the copy of the state", () => {
   });
 });
 
-describe("a session whose clock ran is interrupted", () => {
-  test("when the connection is lost", () => {
-    const session = after(["ready"], ["running"]);
-    session.lose();
-    session.lose();
-    expect(session).toMatchObject({ phase: "loading", interrupted: true });
-    session.take({ phase: "paused", reason: "disconnected" });
-    expect(session.interrupted).toBe(true);
-    session.run();
-    expect(session).toMatchObject({ phase: "running", interrupted: false });
-  });
-
-  test("when the server heard nothing of this page", () => {
-    expect(after(["running"], ["paused", "silent"]).interrupted).toBe(true);
-  });
-
-  test("when its worker is restored", () => {
-    expect(after(["running"], ["loading"], ["paused", "restarted"]).interrupted).toBe(true);
-  });
-
-  test.each(["asked", "hidden", "taken over"])("but not if it was paused: %s", (reason) => {
-    expect(after(["running"], ["paused", reason], ["loading"], ["paused", "disconnected"]).interrupted).toBe(false);
-  });
-
-  test("but not on a page that was loaded again", () => {
-    expect(after(["loading"], ["paused", "disconnected"]).interrupted).toBe(false);
-  });
+test("a session is wanted from the start of its clock, whatever the server sends", () => {
+  const session = after(["ready"]);
+  expect(session.wanted).toBe(false);
+  session.run();
+  session.take({ phase: "paused", reason: "restarted" });
+  expect(session.wanted).toBe(true);
 });

@@ -22,8 +22,10 @@ import { Things } from "./things.js";
  */
 
 export class World3D {
-  /** Is called when the context is lost: nothing can be drawn any more. */
+  /** Is called when the context is lost, so that nothing can be drawn. */
   onLost = () => {};
+  /** Is called when a lost context is back. */
+  onRestored = () => {};
 
   #canvas;
   #renderer;
@@ -54,6 +56,7 @@ export class World3D {
     this.#house.updateMatrix();
     for (const group of [this.#scene, this.#house, this.#person]) group.matrixAutoUpdate = false;
     canvas.addEventListener("webglcontextlost", () => this.onLost());
+    canvas.addEventListener("webglcontextrestored", () => this.onRestored());
   }
 
   /** Loads all but the models of objects; rejects where a file cannot be read. @param {Resolve} resolve @returns {Promise<SceneFile>} */

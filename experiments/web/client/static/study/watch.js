@@ -28,7 +28,9 @@ function say(text) {
 /** The view drawn by this browser, or null without WebGL 2. */
 function world() {
   try {
-    return new DrawnView(byId("world", HTMLCanvasElement), () => {}, () => say("this browser stopped drawing. Reload the page"));
+    const view = new DrawnView(byId("world", HTMLCanvasElement), () => {});
+    view.world.onLost = () => say("this browser stopped drawing. Reload the page");
+    return view;
   } catch {
     return null;
   }

@@ -1,0 +1,163 @@
+"""Whatever happens to connection, tab or picture, a participant can continue and the clock stops meanwhile."""
+
+import json
+import socket
+import threading
+import time
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+import pytest
+
+from benchmarks.play import FAST
+from benchmarks.support.play_server import TASK_ALONE, PlayProcess
+from tests.experiments.web.browser.pages import Chromium
+
+pytestmark = pytest.mark.slow
+TITLE = "(document.getElementById('panel').open ? document.getElementById('panel-title').textContent : null)"
+PLAYING = (
+    "document.getElementById('play')?.dataset.phase === 'running' && !document.getElementById('panel').open"
+)
+FRAME = "document.getElementById('screen').toDataURL()"
+LOSS = (
+    "window.loss = document.getElementById('world').getContext('webgl2').getExtension('WEBGL_lose_context')"
+)
+
+
+class MutableProxy:
+    """A TCP proxy whose existing connections can be muted: their bytes disappear, and nothing is closed."""
+
+    def __init__(self, url):
+        self._target = (urlsplit(url).hostname, urlsplit(url).port)
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._muted, self._open = set(), set()
+        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}/"
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def mute(self):
+        """Mute all connections of this moment; later ones work."""
+        self._muted |= self._open
+
+    def close(self):
+        self._listener.close()
+
+    def _accept(self):
+        while True:
+            try:
+                browser, _ = self._listener.accept()
+            except OSError:
+                return
+            server = socket.create_connection(self._target)
+            pair = (browser, server)
+            self._open.add(pair)
+            for source, target in (pair, pair[::-1]):
+                threading.Thread(target=self._forward, args=(pair, source, target), daemon=True).start()
+
+    def _forward(self, pair, source, target):
+        try:
+            while data := source.recv(65536):
+                if pair not in self._muted:
+                    target.sendall(data)
+            if pair not in self._muted:
+                target.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass
+
+
+@contextmanager
+def task(tmp_path, draw):
+    """A server of a task with one object, behind a proxy."""
+    with PlayProcess(tmp_path / "visits", "--objects", "1", "--draw", draw, *TASK_ALONE, *FAST) as server:
+        proxy = MutableProxy(server.url)
+        try:
+            yield server, proxy
+        finally:
+            proxy.close()
+
+
+def begin(page, url):
+    """Start the task."""
+    page.goto(url)
+    page.wait_for("document.activeElement?.matches('.button')")
+    page.hold("Enter")
+    page.wait_for(f"document.getElementById('panel') && {TITLE} === 'Your task'")
+    page.click("#panel-actions .button")
+    page.wait_for(PLAYING)
+
+
+def remains(page, expression, seconds=5.0):
+    """Assert that an expression stays true, not only at one moment."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        assert page.evaluate(expression), page.evaluate(TITLE)
+        time.sleep(0.2)
+
+
+@pytest.mark.parametrize(("browser", "draw"), [("chromium", "auto"), ("firefox", "server")])
+def test_a_mute_connection_is_replaced_and_a_held_key_still_walks(tmp_path, request, browser, draw):
+    page = request.getfixturevalue(f"{browser}_page")
+    with task(tmp_path, draw) as (_, proxy):
+        begin(page, proxy.url)
+        page.down("ArrowLeft")
+        proxy.mute()
+        page.wait_for(f"{TITLE} === 'No connection'")
+        page.wait_for(PLAYING)
+        remains(page, PLAYING, 3.0)
+        if draw == "server":
+            before = page.evaluate(FRAME)
+            page.wait_for(f"{FRAME} !== {json.dumps(before)}")  # the view still turns
+        page.up("ArrowLeft")
+
+
+def test_a_page_that_was_taken_over_says_so_and_takes_back(tmp_path, chromium):
+    with task(tmp_path, "server") as (server, _):
+        context = chromium.new_context()
+        first, second = Chromium(context.new_page()), Chromium(context.new_page())
+        begin(first, server.url)
+        second.goto(first.evaluate("location.href"))
+        second.wait_for(f"{TITLE} === 'This session is open on another page'")
+        second.click("#panel-actions .button")
+        replaced = f"{TITLE} === 'This session continues on another page'"
+        first.wait_for(replaced)
+        second.wait_for(f"{TITLE} === 'Paused'")
+        second.click("#panel-actions .button")
+        second.wait_for(PLAYING)
+        remains(first, replaced)
+        first.click("#panel-actions .button")
+        first.wait_for(
+            f"document.getElementById('panel') && {TITLE} === 'This session is open on another page'"
+        )
+        first.click("#panel-actions .button")
+        first.wait_for(f"{TITLE} === 'Paused'")
+        first.click("#panel-actions .button")
+        first.wait_for(PLAYING)
+        remains(first, PLAYING, 2.0)
+
+
+@pytest.mark.parametrize("draw", ["auto", "browser"])
+def test_a_lost_picture_stops_the_clock_until_it_is_back(tmp_path, chromium_page, draw):
+    page = chromium_page
+    with task(tmp_path, draw) as (server, _):
+        begin(page, server.url)
+        journal = server.journal(page.evaluate("location.href"), "task")
+        page.evaluate(f"({LOSS}, loss.loseContext())")
+        page.wait_for(f"{TITLE} === 'One moment'")
+        page.evaluate("loss.restoreContext()")
+        page.wait_for(PLAYING)
+        remains(page, PLAYING)
+        shown = "document.getElementById('world').hidden"
+        assert not page.evaluate(shown)
+        page.evaluate("loss.loseContext()")
+        if draw == "auto":
+            page.wait_for(f"{shown} && {PLAYING}")
+            remains(page, f"{shown} && {PLAYING}")
+            assert page.evaluate("!document.getElementById('redraw-button').hidden")
+        else:
+            undrawable = f"{TITLE} === 'This browser cannot draw the apartment'"
+            page.wait_for(undrawable)
+            remains(page, undrawable)
+            page.click("#panel-actions .button")
+            page.wait_for(f"document.getElementById('panel') && {TITLE} === 'Paused'")
+            page.click("#panel-actions .button")
+            page.wait_for(PLAYING)
+        assert journal.read_bytes().count(b"picture lost") == 2
