@@ -1,4 +1,4 @@
-"""`mjsim bench`: run a benchmark, one of the modules in this folder."""
+"""The command `mjsim bench`, which runs one of the benchmarks in this folder."""
 
 import argparse
 import importlib.util
@@ -15,7 +15,7 @@ from experiments.cli.options import add_command, add_force, int_list
 from experiments.errors import ConfigError
 
 FOLDER = Path(__file__).resolve().parent
-BUSY = 0.5  # load average per core above which wall times are unreliable
+BUSY = 0.5  # load average per core above which wall-clock times are unreliable
 
 DESCRIPTION = """\
 Run a benchmark of the source checkout and print the results, as ratios where possible, so that they hold on other
@@ -29,10 +29,10 @@ def benchmark_names(folder: Path = FOLDER) -> tuple[str, ...]:
 
 
 def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
-    """Load the benchmark called `name`.
+    """Import the benchmark called `name`.
 
     Raises:
-        ConfigError: There is no such benchmark, or the module is not a benchmark.
+        ConfigError: There is no such benchmark, or the module does not define a benchmark.
     """
     names = benchmark_names(folder)
     if name not in names:
@@ -44,7 +44,7 @@ def benchmark(name: str, folder: Path = FOLDER) -> ModuleType:
 
 
 def load(path: Path) -> ModuleType:
-    """Load a module from a file outside of any package. Raises a `ConfigError` if the file is not a Python module."""
+    """Import a module from a file outside any package. Raise a `ConfigError` if it is not a Python file."""
     spec = importlib.util.spec_from_file_location(f"{path.parent.name}.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ConfigError(f"cannot load {path} as a module")
@@ -104,10 +104,10 @@ OPTIONS = (
 
 
 def options(module: ModuleType, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the given options as keywords of the benchmark's `measure`.
+    """Return the options given on the command line as keyword arguments for the benchmark's `measure`.
 
     Raises:
-        ConfigError: The benchmark has no such option.
+        ConfigError: The benchmark does not support an option.
     """
     values = {name: getattr(arguments, name) for name in ("quick", *(name for name, *_ in OPTIONS))}
     given = {name: value for name, value in values.items() if value is not None and value is not False}

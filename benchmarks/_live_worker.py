@@ -1,7 +1,7 @@
-"""Measures replans for a person who ignores the plan: the first plan, its quality, and its proof.
+"""A worker process that measures how fast the planner replans for a person who ignores the plan.
 
-The planner benchmark calls it with numbers of objects and houses, and reads one JSON object. Run it with `python -P`,
-because this folder has a module named like a package that it measures.
+The planner benchmark starts it with a number of objects and a number of houses, and reads a JSON object from
+it. Run it with `python -P`, because a module in this folder has the same name as a package that is measured.
 """
 
 import contextlib
@@ -21,8 +21,8 @@ from planner.service import Mode, Planner
 from planner.solver_source import SolverSource
 from planner.solvers import solver
 
-REACH = 0.3  # standard deviation of the person's distance from a visited place, m
-LARGE = 15  # from this many objects on, the first plan comes from a search instead of a small table
+REACH = 0.3  # standard deviation of the distance between the person and a visited place, in metres
+LARGE = 15  # smallest number of objects for which the first plan comes from a search instead of a table
 
 
 def main() -> None:
@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
-    """Run a task in which every visit is drawn at random from the possible ones. Yield a record of each replan."""
+    """Run a task in which the person makes random visits. Yield measurements of each replan."""
     rng = np.random.default_rng([objects, seed])
     episode = house.sample_episode(objects=objects, seed=seed)
     approach = {key: xy(r.approach) for key, r in house.receptacles.items()}
@@ -60,7 +60,7 @@ def task(house: House, objects: int, seed: int) -> Iterator[dict[str, Any]]:
 
 
 def replan(guide: Planner, state: TaskState) -> dict[str, Any]:
-    """Measure the call for which the caller waits, and the search in the background."""
+    """Measure how long the caller waits for a plan, and how long the search continues in the background."""
     wall, own, cpu = time.perf_counter(), time.thread_time(), time.process_time()
     first = route(guide, state).plan.cost
     record = {"wall": time.perf_counter() - wall, "cpu": time.thread_time() - own}
@@ -86,7 +86,7 @@ def possible(loose: dict[str, XY], carried: list[str]) -> list[Visit]:
 
 
 def figures(replans: list[dict[str, Any]]) -> dict[str, Any]:
-    """Summarize replans: times in s, gaps in %."""
+    """Summarize measurements of replans. Times are in seconds and optimality gaps in per cent."""
     columns = {name: [float(r[name]) for r in replans] for name in ("wall", "cpu", "proof_wall", "proof_cpu")}
     gaps = [r["gap"] for r in replans]
     return {

@@ -1,4 +1,4 @@
-"""Report of the planner benchmark: a table, lines of text and a figure."""
+"""The report of the planner benchmark as a table, lines of text and a figure."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from rich.table import Table
 
 
 def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row per planner, size and state, with the gaps of the problems that the planner solved."""
+    """Return a table row for each planner, problem size and task state, including the optimality gaps."""
     best: dict[tuple[int, int, str], float] = {}
     groups: dict[tuple[int, str, str], list[dict[str, Any]]] = {}
     for r in records:
@@ -27,10 +27,10 @@ def summary(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def figures(group: Sequence[dict[str, Any]], best: dict[tuple[int, int, str], float]) -> dict[str, Any]:
-    """Summarize one planner on the problems of one size and state. A figure is None if it does not apply."""
+    """Summarize the results of one planner for one problem size and task state. Missing values are None."""
     solved = [r for r in group if r["cost"] is not None]
     gaps = [100 * (r["cost"] / best[r["objects"], r["seed"], r["state"]] - 1) for r in solved]
-    # A tour of length 0 is optimal.
+    # The gap of a tour of length 0 is 0.
     bounds = [100 * (r["cost"] - r["bound"]) / (r["cost"] or 1.0) for r in solved if r["bound"] is not None]
     cpu, wall = [r["cpu"] for r in group], [r["wall"] for r in group]
     return {
@@ -109,7 +109,6 @@ def _live_lines(beside: dict[str, Any]) -> Iterator[str]:
 
 
 def cells(row: dict[str, Any]) -> list[str]:
-    """Format the figures of a row."""
     failed = row["problems"] - row["solved"]
     counts = [
         f"{row['problems']}" + (f", {failed} failed" if failed else ""),
@@ -125,7 +124,7 @@ def cells(row: dict[str, Any]) -> list[str]:
 
 
 def picture(result: dict[str, Any], path: Path) -> None:
-    """Draw mean gap over CPU time at 24 objects (or the largest size below), and CPU time to proof by size."""
+    """Draw the mean gap over CPU time at 24 objects or fewer, and the CPU time of proofs by problem size."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4), layout="constrained")
@@ -138,7 +137,7 @@ def picture(result: dict[str, Any], path: Path) -> None:
 
 
 def draw_gaps(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw a labelled point per planner. The label of the exact planner is below the point, where there is room."""
+    """Draw a labelled point per planner, with the exact planner's label below its point to avoid overlaps."""
     shown = max(row["objects"] for row in rows if row["objects"] <= 24)
     for row in rows:
         if row["objects"] != shown or row["state"] != "start" or row["gap_mean"] is None:

@@ -1,7 +1,7 @@
-"""Solves routing problems with one planner in its own process, which isolates its memory and CPU time.
+"""A worker process that solves routing problems with one planner, to isolate its memory and CPU time.
 
-The planner benchmark passes a pickled list of problems and reads a line of JSON per problem. Run it with `python -P`,
-because this folder has a module named like a package that it measures.
+The planner benchmark passes a pickled list of problems and reads a line of JSON for each problem. Run it with
+`python -P`, because a module in this folder has the same name as a package that is measured.
 """
 
 import json
@@ -19,19 +19,19 @@ import numpy as np
 from planner.problem import RoutingProblem
 from planner.solvers import PATIENT_WORK, SolveLimit, solver
 
-# Length of a tour in m or None if none was found, its lower bound in m or None, and whether it is proven optimal
+# Length of a tour in m or None, lower bound in m or None, and whether the tour is proven to be optimal
 Answer = tuple[float | None, float | None, bool]
 Method = Callable[[RoutingProblem], Answer]
 
 
 def main() -> None:
-    """Read the arguments: a planner, its time limit in seconds (0 for none), and the file of problems."""
+    """Solve all problems, given a planner, its time limit in seconds (0 for none), and the problem file."""
     name, limit, path = sys.argv[1], float(sys.argv[2]), sys.argv[3]
     solve = method(name, limit)
     problems: list[RoutingProblem] = pickle.loads(Path(path).read_bytes())
     if name == "exact":
         import planner.exact.table_kernels  # noqa: F401 - otherwise small problems are solved without kernels
-    solve(problems[0])  # loads the compiled kernels and the libraries
+    solve(problems[0])  # compile the kernels and load the libraries before the measurement
     for problem in problems:
         wall, cpu = time.perf_counter(), time.process_time()
         cost, bound, proven = solve(problem)
@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def peak_mb() -> float:
-    """Return the peak memory of this process. getrusage would include the parent's memory before exec."""
+    """Return the peak memory of this process in MB. `getrusage` would also count the parent process."""
     found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(encoding="ascii"))
     return int(found[1]) / 1024 if found else float("nan")
 
@@ -70,7 +70,7 @@ def method(name: str, limit: float) -> Method:
 
 
 def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
-    """Solve with PyVRP: one vehicle, shipments, a depot at distance 0 as the end, and nothing carried at the start."""
+    """Solve a problem with PyVRP. An extra depot at distance 0 from all places lets the tour end anywhere."""
     import pyvrp
     from pyvrp.stop import MaxRuntime
 
@@ -91,7 +91,7 @@ def by_pyvrp(problem: RoutingProblem, seconds: float) -> Answer:
 
 
 def by_vroom(problem: RoutingProblem) -> Answer:
-    """Solve with VROOM at its highest exploration level, with an open route. Nothing may be carried at the start."""
+    """Solve a problem with VROOM at its highest exploration level. The tour may end anywhere."""
     import vroom
 
     task: Any = vroom.Input()

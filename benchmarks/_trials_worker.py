@@ -1,7 +1,7 @@
-"""Runs the trials of a batch in its own process, with timers around parts of the program.
+"""A worker process that runs the trials of a batch and measures how long each part of the program takes.
 
-The trials benchmark passes a JSON list of fidelity, assistance, participant, objects and seeds, and reads one JSON
-object. Run it with `python -P`, because this folder has modules named like packages.
+The trials benchmark passes a JSON list of fidelity, assistance, participant, objects and seeds, and reads a
+JSON object. Run it with `python -P`, because modules in this folder have the same names as packages.
 """
 
 import json
@@ -28,9 +28,9 @@ from mjsim.house.scene.scene import Scene
 from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
 
-# Part -> callables. Time in a callable that another part calls counts for the calling part.
+# Functions that count as a part of the program. Time in nested calls counts for the outermost function.
 PARTS = {
-    "planning": (  # only waiting times, because the rest runs in a thread
+    "planning": (  # only waiting times, because planning runs in another thread
         "planner.service.Planner.ask",
         "concurrent.futures._base.Future.result",
         "concurrent.futures.thread.ThreadPoolExecutor.shutdown",
@@ -56,7 +56,7 @@ REST = "participant and the rest"
 
 
 class Timers:
-    """Wall time of the main thread in the callables of `PARTS`, by part. A context manager that patches them."""
+    """A context manager that measures the wall-clock time that the main thread spends in each of `PARTS`."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = defaultdict(float)
@@ -87,7 +87,7 @@ class Timers:
 
 
 def main() -> None:
-    """Run the trials, then repeat their recorded calls on bare worlds."""
+    """Run the trials, then repeat their recorded calls on worlds without any participant model."""
     fidelity, assistance, user, objects, seeds = json.loads(sys.argv[1])
     started = time.perf_counter()
     house = House.load()

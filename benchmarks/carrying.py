@@ -1,4 +1,4 @@
-"""Stretch and twist of welds, and lost objects, when two objects are carried through the house at 1.4 m/s."""
+"""Measure weld errors and lost objects while two objects are carried through the house at 1.4 m/s."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from benchmarks.support.parallel_sessions import run_sessions
 from benchmarks.support.requirements import Requirement, requirement_lines
 
 COUNT, QUICK = 200, 20
-STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # minimum speed, m/s; maximum and minimum turning speed, rad/s
+STRAIGHT, CORNER = (1.35, 0.2), (1.2, 1.0)  # thresholds for the speed in m/s and the turning speed in rad/s
 REQUIREMENTS = (
     Requirement("objects that arrive, %", "kept_percent", ">=", 99.0),
     Requirement("weld error, 99th percentile at 1.4 m/s, straight on, mm", "straight_p99_mm", "<", 2.0),
@@ -26,13 +26,13 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, count: int | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        quick: Run a few walks.
+        quick: True to run only a few walks.
         count: Number of walks.
         workers: Number of processes (default: one per core).
-        only: Run only this session, to reproduce a failure.
+        only: Number of a single session to run, in order to reproduce a failure.
     """
     sessions = count or (QUICK if quick else COUNT)
     return summarise(run_sessions(run_session, sessions, workers=workers, only=only))

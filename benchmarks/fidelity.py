@@ -1,4 +1,4 @@
-"""Agreement of `event` with `full` on the same trials."""
+"""Measure how well trials at the fidelity `event` agree with the same trials at `full`."""
 
 import os
 import statistics
@@ -15,19 +15,19 @@ OBJECTS = (6, 12, 18, 24)
 QUICK_OBJECTS = (6, 24)
 PARTICIPANTS = (("optimal", "follower"), ("highlight", "nearest"))
 COMPARED = ("completion_time_s", "task_distance_m", "ipl_stand", "nd_feasible")
-SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # targets
+SAME_DELIVERIES, TIME_DIFFERENCE = 1.0, 0.01  # required share of equal deliveries; tolerated time difference
 
 
 def measure(
     *, seeds: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        seeds: Houses per difficulty (default: 50, or 2 when `quick`).
-        objects: Numbers of objects.
+        seeds: Number of houses for each number of objects (default: 50, or 2 if `quick`).
+        objects: Numbers of objects to test.
         workers: Number of processes (default: one per core).
-        quick: Run few trials.
+        quick: True to run only a few trials.
     """
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
     difficulties = tuple(objects) or (QUICK_OBJECTS if quick else OBJECTS)
@@ -48,9 +48,9 @@ def measure(
 
 
 def compare(full: Sequence[TierResult], tier: Sequence[TierResult]) -> dict[str, Any]:
-    """Compare the same trials in two fidelities.
+    """Compare the results of the same trials at two fidelities.
 
-    Differences, of the means and the largest of any trial, are relative to the mean of `full` unless it is 0.
+    Mean and largest differences are relative to the mean of `full`, unless that mean is 0.
     """
     row: dict[str, Any] = {
         "same_deliveries": statistics.fmean(

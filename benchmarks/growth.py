@@ -1,7 +1,8 @@
-"""Time and memory of large work: resuming a batch, analysing it, and collecting a study with many participants.
+"""Measure the time and memory needed to resume a batch, to analyse it, and to collect a large study.
 
-Records of thousands of trials are made from 100 real ones, with other seeds, names, fingerprints and checksums. Results
-are the CPU time of a command with its workers, and the peak memory of its largest process.
+Thousands of trial records are copied from 100 real ones, with changed seeds, names, fingerprints and
+checksums. The benchmark measures the CPU time of a command with its workers, and the peak memory of its
+largest process.
 """
 
 import os
@@ -22,7 +23,7 @@ from experiments.trials.batch_folder import OUTDATED
 from experiments.trials.table import NAME, read_rows
 
 TRIALS, PEOPLE, REAL = 16_000, 10_000, 100
-QUICK = 40  # factor by which the quick run has fewer records
+QUICK = 40  # factor by which a quick run reduces the number of records
 BATCH = "batch"
 REQUIREMENTS = {
     "resume": (Requirement("processor time, s", "processor_s", "<", 10.0),),
@@ -42,14 +43,14 @@ def measure(
     workers: int = 1,
     out: Path | None = None,
 ) -> dict[str, Any]:
-    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
+    """Run all or some parts of the benchmark and return a JSON-serializable result.
 
     Args:
-        parts: Names of the parts to run (default: all).
-        quick: Run 400 trials, 250 people and 10 real trials.
-        count: Number of trials and of people, in place of 16,000 and 10,000; an even number.
+        parts: Names of the parts to run (all by default).
+        quick: True to use only 400 trials, 250 participants and 10 real trials.
+        count: Even number of trials and participants that replaces the defaults of 16,000 and 10,000.
         workers: Number of processes of a batch.
-        out: Folder that keeps the real trials for the next call.
+        out: Folder in which the real trials are kept for later runs.
 
     Raises:
         ConfigError: There is no such part, or the number is odd.
@@ -67,7 +68,7 @@ def measure(
         nullcontext(out) if out is not None else tempfile.TemporaryDirectory(prefix="mjsim-growth-") as folder
     ):
         work = Path(folder)
-        _fresh(work / BATCH)  # an earlier call may have used other code
+        _fresh(work / BATCH)  # an earlier run may have used other code
         real = real_trials(REAL // 10 if quick else REAL, work / "real", workers)
         for name in parts or measures:
             print(f"{name}: begins", file=sys.stderr, flush=True)
@@ -120,7 +121,7 @@ def _collect(work: Path, real: Any, sizes: Mapping[str, int], _: int) -> dict[st
 
 
 def _batch(work: Path, real: Any, sizes: Mapping[str, int]) -> Path:
-    """Return the folder of all trials, which the first part that needs it makes."""
+    """Return the folder of the batch. Create the batch on the first call."""
     batch = work / BATCH
     if not batch.is_dir():
         grow_batch(real, sizes["trials"], batch)
@@ -133,7 +134,7 @@ def _fresh(folder: Path) -> Path:
 
 
 def _run(words: Sequence[str]) -> dict[str, float]:
-    """Run a command of mjsim. Return its CPU time and the peak memory of its largest process."""
+    """Run an mjsim command. Return its total CPU time and the peak memory of its largest process."""
     process = subprocess.Popen([sys.executable, "-m", "mjsim", *words], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -1,4 +1,4 @@
-"""Quality, cost and variety of generated homes, for seeds that were not chosen."""
+"""Measure the quality, cost and variety of many generated homes."""
 
 import itertools
 import json
@@ -21,11 +21,11 @@ from mjsim.support.files import ROOT, digest_of
 
 T = TypeVar("T")
 Rows = Sequence[dict[str, Any]]
-COUNT, QUICK = 100, 2  # homes of each size
+COUNT, QUICK = 100, 2  # number of homes of each size
 FIRST_SEED = 50_000
 OUT = Path("runs/bench-houses")
-AGAIN = 10  # every tenth home is made again in another process
-FURNISHED = (0.25, 0.45)  # limits of the furnished share of the floor
+AGAIN = 10  # every tenth home is generated again in another process
+FURNISHED = (0.25, 0.45)  # smallest and largest permitted share of the floor that furniture covers
 FAULTS = (
     "failure",
     "errors",
@@ -60,7 +60,7 @@ def _percentile(values: Sequence[float]) -> float:
 
 
 def _overlap(key: str) -> Callable[[Rows], float]:
-    """Return the mean overlap of furniture over pairs of homes: pieces in both over pieces in either."""
+    """Return the mean share of furniture that two homes have in common, over all pairs of homes."""
 
     def mean(rows: Rows) -> float:
         bags: list[Counter[str]] = [Counter(row[key]) for row in rows]
@@ -85,7 +85,7 @@ def _by_size(rows: Rows) -> dict[int, Rows]:
     }
 
 
-COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # columns of the table, for homes of one size
+COLUMNS: Mapping[str, Callable[[Rows], float]] = {  # columns of the table
     "homes": len,
     "m2": _of("area", statistics.median),
     "made in s": _of("make_s", statistics.median),
@@ -150,15 +150,15 @@ def measure(
     workers: int = 1,
     out: Path = OUT,
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        quick: Run two homes of each size.
-        count: Homes of each size.
-        rooms: Sizes.
-        first_seed: Seed of the first home; later ones count up.
+        quick: True to generate only two homes of each size.
+        count: Number of homes of each size.
+        rooms: Numbers of rooms of the homes.
+        first_seed: Seed of the first home. The next homes have consecutive seeds.
         workers: Number of processes.
-        out: Folder that caches the figures of every home for the same version of the generator.
+        out: Cache folder for the results of every home. A changed generator invalidates them.
     """
     each = count or (QUICK if quick else COUNT)
     homes = [(size, first_seed + each * (size - ROOMS[0]) + i) for i in range(each) for size in rooms]
@@ -200,14 +200,14 @@ def _kept(out: Path) -> Iterator[dict[str, Any]]:
     path = out / "homes.jsonl"
     if path.is_file():
         for line in path.read_text(encoding="utf-8").splitlines():
-            if line.endswith("}"):  # the last line may be truncated
+            if line.endswith("}"):  # an interrupted run may have left a truncated last line
                 yield json.loads(line)
 
 
 def _in_workers(
     run: Callable[[tuple[int, int]], T], homes: Sequence[tuple[int, int]], workers: int, what: str
 ) -> Iterator[T]:
-    """Run in fresh processes, which first compile their kernels with a home that does not count."""
+    """Call `run` for every home in new processes, which first compile their kernels with an extra home."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, initializer=figures, initargs=((ROOMS[0], 0),)) as pool:
         yield from track(pool.map(run, homes), what, total=len(homes), console=Console(stderr=True))

@@ -1,6 +1,7 @@
-"""Agreement of all tests of the study for the same simulated participants in `event` and in `full`.
+"""Check whether a study's statistical tests give the same results at fidelity `event` as at `full`.
 
-Orders of means are also compared. Close means may differ in order even for two draws of the same people.
+Both fidelities simulate the same participants. Orders of means are also compared, although means that are
+close together may change their order by chance.
 """
 
 import os
@@ -24,7 +25,7 @@ from experiments.trials.trial_config import TrialConfig
 from studies.published import Published, read_published
 from studies.score_rules import points, published_cells, tests_of
 
-PEOPLE = 40  # per cell
+PEOPLE = 40  # number of participants per cell
 QUICK_PEOPLE = 2
 QUICK_OBJECTS = (6,)
 TIERS = ("full", "event")
@@ -34,13 +35,13 @@ INFERENCE, ORDER = "inferences", "orders of means"
 def measure(
     *, count: int = 0, objects: Sequence[int] = (), workers: int = 0, quick: bool = False
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        count: People per cell of the published study (default: 40 or as many as there are, or 2 when `quick`).
-        objects: Numbers of objects (default: all, or 6 when `quick`).
+        count: Largest number of participants per cell (default: 40, or 2 if `quick`).
+        objects: Numbers of objects (default: all, or 6 if `quick`).
         workers: Number of processes (default: one per core).
-        quick: Run few people.
+        quick: True to simulate only a few participants.
     """
     levels = tuple(objects) or (QUICK_OBJECTS if quick else (6, 12, 18, 24))
     chosen = people(count or (QUICK_PEOPLE if quick else PEOPLE), levels)
@@ -54,7 +55,7 @@ def measure(
 
 
 def people(count: int, objects: Sequence[int]) -> list[TrialConfig]:
-    """Return the first `count` people of every cell of the published design with these numbers of objects."""
+    """Return the first `count` participants of each published cell with one of these numbers of objects."""
     taken: Counter[Any] = Counter()
     chosen = []
     for trial in study.read_study(study.study_path("paper")).trials:
@@ -73,7 +74,7 @@ def _simulated(trials: Sequence[TrialConfig], tier: str, workers: int) -> StudyT
 
 
 def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tuple[str, str], dict[str, str]]:
-    """Return the decisions of each tier by kind and test. Tests that cannot be computed are left out."""
+    """Return the results of all tests at each fidelity. Tests that cannot be computed are left out."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for tier, table in tables.items():
         for test in published.tests:
@@ -95,7 +96,7 @@ def _decisions(tables: dict[str, StudyTable], published: Published) -> dict[tupl
 
 
 def _gaps(tables: dict[str, StudyTable]) -> dict[str, dict[str, float]]:
-    """Compare each person's measures between tiers, in standard deviations between people in `full`."""
+    """Compare each participant's measures between fidelities, in standard deviations of `full`."""
     full, event = (tables[tier] for tier in TIERS)
     there = {_person(row): k for k, row in enumerate(full.rows)}
     order = [there[_person(row)] for row in event.rows]

@@ -1,8 +1,9 @@
-"""Simulated seconds per core-second at each fidelity, and the overhead over the raw engine.
+"""Measure the simulated seconds per core-second at each fidelity, and the overhead over raw MuJoCo.
 
-The workload is recorded trials: all calls to the world in trials of the follower under optimal assistance. The raw
-engine takes the same steps of the same model with the same controls. Both are timed in chunks of a hundred calls. The
-best of several repetitions of each chunk counts, in CPU time, so that the ratios hold on a busy machine.
+The workload consists of all calls to the world in recorded trials of the follower under optimal assistance.
+Raw MuJoCo takes the same steps with the same controls. Both are timed in chunks of a hundred calls. The
+smallest CPU time of each chunk over several repetitions counts, so that the ratios are reliable on a busy
+machine.
 """
 
 import ctypes
@@ -28,11 +29,11 @@ from mjsim.world.world import World
 
 OBJECTS = (6, 12, 18, 24, 48)
 DEFAULT_OBJECTS = 24
-CHUNK = 100  # calls that are timed together
+CHUNK = 100  # number of calls that are timed together
 REPEATS = 3
-PROFILED_S = 60.0  # simulated time of the profile
-TARGETS = (("full", 120.0), ("event", 3000.0))  # simulated s per core-second
-MAX_OVERHEAD = 1.3  # relative to the raw engine
+PROFILED_S = 60.0  # simulated time of the profiling run, in seconds
+TARGETS = (("full", 120.0), ("event", 3000.0))  # required simulated seconds per core-second
+MAX_OVERHEAD = 1.3  # largest permitted ratio of the step time to that of the raw engine
 
 
 def measure(*, quick: bool = False) -> dict[str, Any]:
@@ -87,7 +88,7 @@ def outcome(met: bool) -> str:
 
 
 def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int) -> dict[str, Any]:
-    """Measure simulated seconds per core-second of a tier, over some trials."""
+    """Measure the simulated seconds per core-second at a fidelity, over several trials."""
     simulated = spent = 0.0
     for seed in seeds:
         trial = record_trial(house, DEFAULT_OBJECTS, seed, fidelity)
@@ -104,7 +105,7 @@ def measure_tier(house: House, fidelity: str, seeds: Sequence[int], repeats: int
 
 @dataclass(frozen=True, eq=False)
 class EngineInput:
-    """Inputs of the engine in one control step, or a physics state to set."""
+    """Inputs of the engine in one control step, or a physics state to restore."""
 
     act: Any = None
     ctrl: Any = None
@@ -114,7 +115,7 @@ class EngineInput:
 
 
 def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float]:
-    """Return inputs of every control step of a trial, the mean number of awake trees, and of contacts."""
+    """Return the inputs of all control steps of a trial, and its mean numbers of awake trees and contacts."""
     world, found, awake, contacts = trial.world(), [], 0, 0
     advance = mujoco.mj_step
 
@@ -140,7 +141,7 @@ def engine_inputs(trial: RecordedTrial) -> tuple[list[EngineInput], float, float
 
 
 def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int) -> float:
-    """Return the CPU time of the engine alone for some control steps, s."""
+    """Return the CPU time in seconds that raw MuJoCo takes for some control steps."""
     act, ctrl, active, asleep = data.act, data.ctrl, data.eq_active, data.tree_asleep
     advance, clock, lost = mujoco.mj_step, time.process_time, 0.0
     start = clock()
@@ -156,7 +157,7 @@ def step_raw(model: Any, data: Any, chunk: Sequence[EngineInput], substeps: int)
 
 
 def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
-    """Measure the time per control step of `World.step` and of the raw engine, in alternating chunks."""
+    """Measure the CPU time per control step of `World.step` and of raw MuJoCo, in alternating chunks."""
     calls = trial.single_steps
     found, awake, contacts = engine_inputs(trial)
     world, model = trial.world(), trial.scene.model
@@ -185,7 +186,7 @@ def measure_overhead(trial: RecordedTrial, repeats: int) -> dict[str, Any]:
 
 
 def measure_memory(scene: Scene, count: int = 20) -> dict[str, Any]:
-    """Measure the resident memory of another world of a scene, and the size of its model, MB."""
+    """Measure the memory of an additional world of the same scene, and the size of its model, in MB."""
     keep = [World(scene)]
     gc.collect()
     before = _resident()
@@ -207,7 +208,7 @@ def _resident() -> int:
 
 
 def measure_set_up(house: House, count: int) -> dict[str, float]:
-    """Measure the CPU time until a new episode can be stepped, ms, the best of some."""
+    """Measure the CPU time in ms that preparing a new episode takes. Return the fastest of several runs."""
     clock, rows = time.process_time, []
     for seed in range(count):
         times = [clock()]
@@ -223,11 +224,11 @@ def measure_set_up(house: House, count: int) -> dict[str, float]:
 
 
 def measure_profile(trial: RecordedTrial) -> dict[str, float]:
-    """Measure the share of each part of a control step by MuJoCo's timers, or nothing without a clock for them."""
+    """Measure the share of each part of a control step with MuJoCo's timers, if they can be used."""
     library = ctypes.util.find_library("gomp")
     if library is None:
         return {}
-    # The clock is a C function, because a Python clock would take longer than the timed steps.
+    # The clock is a C function because a Python clock would take longer than the steps that it measures.
     clock = ctypes.CFUNCTYPE(ctypes.c_double)(("omp_get_wtime", ctypes.CDLL(library)))
     world = trial.world()
     timer, kinds, total = world.data.timer, mujoco.mjtTimer, 0.0

@@ -1,4 +1,4 @@
-"""First-try deliveries and health of the physics over 10,000 placements by the person's hands."""
+"""Measure how often placements by hand succeed or cause physics errors, over 10,000 placements."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -25,13 +25,13 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, count: int | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        quick: Run a few hundred placements.
+        quick: True to run only a few hundred placements.
         count: Number of placements, rounded up to whole sessions.
         workers: Number of processes (default: one per core).
-        only: Run only this session, to reproduce a failure.
+        only: Number of a single session to run, in order to reproduce a failure.
     """
     total = count or (QUICK if quick else COUNT)
     sessions = run_sessions(run_session, math.ceil(total / LEVELS), workers=workers, only=only)

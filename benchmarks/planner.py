@@ -1,7 +1,7 @@
-"""Planners on disorganized houses, from the start and mid-task: gaps, times, proofs and memory.
+"""Compare planners in disorganized houses by their optimality gaps, computation times and memory.
 
-Each planner solves the same problems in its own process. CPU time counts only the planner's computation. Gaps are
-relative to the best tour of any planner, which is the optimum if it is proven.
+Each planner solves the same problems in its own process, from the start of a task and from the middle. CPU
+time includes only the planner's computation. Gaps are relative to the best tour that any planner found.
 """
 
 import importlib.util
@@ -32,11 +32,11 @@ LIVE_WORKER = Path(__file__).with_name("_live_worker.py")
 REPORT = load(Path(__file__).with_name("_planner_report.py"))
 summary, lines, picture = REPORT.summary, REPORT.lines, REPORT.picture
 LIVE_OBJECTS = 24
-FIRST_OBJECTS = (12, 24)  # sizes of the first problem in a fresh process
+FIRST_OBJECTS = (12, 24)  # problem sizes for which the first call in a new process is timed
 SIZES = (6, 12, 18, 24, 30)
 STATES = ("start", "mid-task")
-OTHERS_SHARE = 5  # the other planners, which are slow, solve every fifth house
-LARGEST_SHARE = 3  # only every third house is used with 30 objects
+OTHERS_SHARE = 5  # only every fifth house is solved by the other planners, because they are slow
+LARGEST_SHARE = 3  # only every third house with 30 objects is used
 FIRST_CALL = """
 from pathlib import Path
 import pickle, sys
@@ -48,7 +48,7 @@ solver("exact").solve(problem)
 
 @dataclass(frozen=True)
 class Candidate:
-    """A planner with a time limit (0 for its own budget), and the optional package that it needs."""
+    """A planner with its time limit (0 for its default) and the optional package that it requires."""
 
     name: str
     seconds: float = 0.0
@@ -77,7 +77,7 @@ CANDIDATES = (
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A problem: number of objects, seed of the house, and state of the task."""
+    """A routing problem with its number of objects, house seed, and task state."""
 
     objects: int
     seed: int
@@ -86,11 +86,11 @@ class Case:
 
 
 def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        houses: Houses of each size.
-        quick: Run three houses of 6 and 12 objects, without limits above 0.2 s.
+        houses: Number of houses for each number of objects.
+        quick: True to use only three houses with 6 and 12 objects, and time limits up to 0.2 s.
     """
     sizes = SIZES[:2] if quick else SIZES
     houses = min(houses, 3) if quick else houses
@@ -118,7 +118,7 @@ def measure(*, houses: int = 30, quick: bool = False) -> dict[str, Any]:
 
 
 def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterator[Case]:
-    """Yield problems of disorganized apartments, from the start and from a random feasible state of the same task."""
+    """Yield problems in disorganized apartments, at the start and at a random later state of each task."""
     house = House.load("apartment")
     problems = TaskProblems(house.geodesics)
     counts = {n: max(1, houses // LARGEST_SHARE) if n == SIZES[-1] else houses for n in sizes}
@@ -139,7 +139,7 @@ def make_cases(progress: Progress, sizes: Sequence[int], houses: int) -> Iterato
 
 
 def mid_task(house: House, begin: TaskState, rng: np.random.Generator) -> TaskState:
-    """Return a state with some objects delivered, up to two carried, and the person anywhere on the floor."""
+    """Return a random state in which some objects are delivered and up to two are carried."""
     names = [str(name) for name in rng.permutation(list(begin.loose))]
     carried = int(rng.integers(0, 3))
     left = int(rng.integers(1, len(names) - carried + 1))
@@ -161,7 +161,7 @@ def chosen(candidate: Candidate, cases: Sequence[Case]) -> list[Case]:
 
 
 def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -> list[dict[str, Any]]:
-    """Solve the cases in a worker process. Return a record per case."""
+    """Solve the cases in a worker process. Return a record for each case."""
     bar = progress.add_task(candidate.label, total=len(cases))
     records = []
     with tempfile.NamedTemporaryFile(suffix=".pickle") as file:
@@ -180,7 +180,7 @@ def solve_all(progress: Progress, candidate: Candidate, cases: Sequence[Case]) -
 
 
 def first_call(problem: RoutingProblem) -> dict[str, float]:
-    """Time a fresh process that imports the planner and solves one problem, as the best of three."""
+    """Measure how long a new process takes to import the planner and solve a problem: the best of three."""
     wall, cpu = [], []
     with tempfile.NamedTemporaryFile(suffix=".pickle") as file:
         pickle.dump(problem, file)
@@ -194,7 +194,7 @@ def first_call(problem: RoutingProblem) -> dict[str, float]:
 
 
 def live(objects: int, houses: int) -> dict[str, Any]:
-    """Measure replans for a simulated person who ignores the plan, in a worker process."""
+    """Measure in a worker process how fast the planner replans for a person who ignores the plan."""
     command = [sys.executable, "-P", str(LIVE_WORKER), str(objects), str(houses)]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
     found: dict[str, Any] = json.loads(done.stdout)

@@ -1,4 +1,4 @@
-"""Response times of `mjsim play` over real sockets, and the number of sessions per core."""
+"""Measure the response times of `mjsim play` over real sockets, and the number of sessions per core."""
 
 import os
 import sys
@@ -14,10 +14,10 @@ from benchmarks.support.play_server import ProgressReport
 from benchmarks.support.requirements import Requirement, requirement_lines
 from experiments.errors import ConfigError
 
-SESSIONS, DRAWING_SESSIONS = 3, 25  # per core, with frames and with clients that draw
-SECONDS, QUICK_SECONDS = 15.0, 4.0  # duration of each case
+SESSIONS, DRAWING_SESSIONS = 3, 25  # required sessions per core, with frames and with drawing clients
+SECONDS, QUICK_SECONDS = 15.0, 4.0  # duration of each case in seconds
 OPENINGS, QUICK_OPENINGS = 5, 1  # number of times that a link is opened in each case
-TRIES = 3  # how many numbers of sessions are tried, in descending order
+TRIES = 3  # how many different numbers of sessions are tried, in descending order
 FAST = ("--fidelity", "event")
 REQUIREMENTS = {
     "latency": (
@@ -46,11 +46,11 @@ REQUIREMENTS = {
 
 
 def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
+    """Run all or some parts of the benchmark and return a JSON-serializable result.
 
     Args:
-        parts: Names of the parts to run (default: all).
-        quick: Run a smaller benchmark at the fastest fidelity.
+        parts: Names of the parts to run (all by default).
+        quick: True to run a smaller benchmark at the fastest fidelity.
 
     Raises:
         ConfigError: There is no such part.
@@ -100,7 +100,7 @@ LINES = {"first-frame": _first_frame_line}
 
 
 def _progress(part: str) -> ProgressReport:
-    """Return a function that reports progress on standard error, with the time since the part began."""
+    """Return a function that prints progress messages with the elapsed time to standard error."""
     began = time.monotonic()
 
     def report(line: str) -> None:
@@ -121,7 +121,7 @@ def _capacity(folder: Path, report: ProgressReport, quick: bool) -> dict[str, An
     seconds, words = _size(quick)
     cores = os.cpu_count() or 1
     frames = measure_capacity(folder, seconds, "jpeg", _counts(SESSIONS * cores, quick), report, *words)
-    # The server gets only one core, because the simulated browsers need the others.
+    # The server gets only one core because the simulated browsers need the others.
     drawing = _counts(DRAWING_SESSIONS, quick)
     states = measure_capacity(folder, seconds, "none", drawing, report, *words, core=cores - 1)
     cases = {f"{case['sessions']:.0f} sessions, frames": case for case in frames}
@@ -140,7 +140,7 @@ def _counts(most: int, quick: bool) -> Sequence[int]:
 
 
 def _held(tried: Sequence[Mapping[str, float]]) -> float:
-    """Return the number of sessions of the last try, if they held."""
+    """Return the number of sessions in the last attempt, or 0 if it did not meet the requirements."""
     return tried[-1]["sessions"] if tried[-1]["holds"] else 0.0
 
 

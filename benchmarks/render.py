@@ -1,7 +1,7 @@
-"""Frames per second and core by size and profile, compared with raw `mjr_render` and with MuJoCo's default quality.
+"""Measure frames per second and core by size and profile, compared with MuJoCo's own renderer.
 
-All measurements are interleaved, on the same views of the same disorganized apartment, so that the ratios hold on a
-busy machine. With a software rasterizer, times are CPU times of this process, else wall times.
+All settings draw the same views of an apartment in turn, so that the ratios are reliable on a busy machine.
+Times are CPU times if OpenGL runs in software, otherwise wall-clock times.
 """
 
 import dataclasses
@@ -37,11 +37,11 @@ from mjsim.world.world import World
 
 SIZES = ((320, 240), (640, 480), (1280, 720))
 REPEATS = {"draft": 5, "fast": 7, "quality": 1}
-SLOW_VIEWS = 2  # number of views for slow settings
+SLOW_VIEWS = 2  # number of views with slow settings
 FOVY = 1.2
 SESSION = TrialConfig(objects=6, assistance="optimal", seed=0)
-# In the comparison with MuJoCo's defaults, every light casts shadows, as is the default of MJCF. For speed, only one
-# light of the house casts shadows.
+# MJCF lets every light cast shadows by default, and so does the comparison with MuJoCo's defaults. In the
+# house, only one light casts shadows, for speed.
 TARGETS = (
     ("fast 640x480 with HUD over raw mjr_render", "with_hud_ratio", "<=", 1.15),
     ("MuJoCo's default quality over fast 640x480", "default_over_fast", ">=", 20.0),
@@ -52,7 +52,7 @@ TARGETS = (
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Subject:
-    """A scene to draw, with views of it and a HUD state."""
+    """A scene to draw, together with camera poses and a HUD state."""
 
     scene: Scene
     data: Any
@@ -127,7 +127,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
 
 
 def make_subject(clock: Callable[[], float]) -> Subject:
-    """Prepare twelve objects in the apartment, seen from the start and from the middle of every room."""
+    """Prepare an apartment with twelve objects, seen from the start and from the middle of every room."""
     house = House.load("apartment")
     scene = compose(house.sample_episode(objects=12, seed=7), house.catalogue)
     world = World(scene)
@@ -149,7 +149,7 @@ def make_subject(clock: Callable[[], float]) -> Subject:
 
 
 def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, int]) -> dict[str, Any]:
-    """Measure a frame with markers, and raw `mjr_render` at the same drawn size and settings, ms."""
+    """Measure the time in ms of a frame with markers, and of raw `mjr_render` with the same settings."""
     width, height = size
     poses = subject.poses if profile.name != "quality" else subject.poses[:SLOW_VIEWS]
     own: list[float] = []
@@ -185,7 +185,7 @@ def measure_profile(subject: Subject, profile: RenderProfile, size: tuple[int, i
 def raw_renderer(
     subject: Subject, profile: RenderProfile, size: tuple[int, int]
 ) -> Iterator[Callable[[CameraPose], None]]:
-    """Yield a function that draws the whole scene only by `mjr_render`: no update, no reading, no downsampling."""
+    """Yield a function that draws the scene with `mjr_render`, without updates, readback or downsampling."""
     model = subject.scene.model
     drawn = round(size[0] * profile.supersampling), round(size[1] * profile.supersampling)
     scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1000)
@@ -220,7 +220,7 @@ def raw_renderer(
 
 
 def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[str, Any]:
-    """Measure a frame of 640 x 480 by `mujoco.Renderer` with MuJoCo's defaults, and by profile `fast`."""
+    """Measure the time of a 640 x 480 frame with `mujoco.Renderer` and with the profile `fast`."""
     model = subject.scene.model
     authored = model.light_castshadow.copy()
     if shadows_of_all_lights:
@@ -244,7 +244,7 @@ def measure_default(subject: Subject, *, shadows_of_all_lights: bool) -> dict[st
 
 
 def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any]:
-    """Measure drawing the HUD over a frame of 640 x 480, ms, for every frame of a trial."""
+    """Measure the time in ms for drawing the HUD over each 640 x 480 frame of a trial."""
     states = session_states(subject.house, trial)
     times = hud_milliseconds(
         Compositor(render_pictures(subject.house.catalogue), subject.house.texts), states, clock=subject.clock
@@ -253,17 +253,17 @@ def measure_hud(subject: Subject, trial: TrialConfig = SESSION) -> dict[str, Any
 
 
 def measure_environment(seconds: float = 2.0) -> dict[str, float]:
-    """Measure steps per core-second of the Gymnasium environment without and with pixels."""
+    """Measure the steps per core-second of the Gymnasium environment, with and without images."""
     return {name: steps_per_second(SETTINGS[name], seconds)[0] for name in ("state", "state, rgb 128 x 96")}
 
 
 @contextmanager
 def off_screen() -> Iterator[None]:
-    """Make `mujoco.Renderer` create EGL contexts, whatever MUJOCO_GL was when MuJoCo was imported."""
-    from mujoco import egl  # imported late, when the driver is known to work
+    """Make `mujoco.Renderer` create EGL contexts, even if MuJoCo was imported with another MUJOCO_GL."""
+    from mujoco import egl  # imported late, after the driver has been tested
 
     backend = sys.modules[mujoco.Renderer.__module__].gl_context
-    # The attribute is missing if MuJoCo was imported without rendering.
+    # The attribute does not exist if MuJoCo was imported without rendering.
     with mock.patch.object(backend, "GLContext", egl.GLContext, create=True):
         yield
 

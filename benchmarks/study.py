@@ -1,4 +1,4 @@
-"""A study over real HTTP and sockets, with many participants who arrive at once and many who play at once."""
+"""Measure a study server over real HTTP and sockets while many participants arrive or play at once."""
 
 import asyncio
 import sys
@@ -17,7 +17,7 @@ from benchmarks.support.study_people import arrive_at_once, study_process
 from experiments.errors import ConfigError
 
 PEOPLE, SESSIONS = 500, 50
-SECONDS, QUICK_SECONDS = 30.0, 5.0  # duration of sessions
+SECONDS, QUICK_SECONDS = 30.0, 5.0  # duration of the sessions in seconds
 REQUIREMENTS = {
     "arrivals": (
         Requirement("pages that did not come", "failed", "<=", 0),
@@ -28,13 +28,13 @@ REQUIREMENTS = {
 
 
 def measure(*, parts: Sequence[str] = (), quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark, or only some parts. Everything in the result can be written as JSON.
+    """Run all or some parts of the benchmark and return a JSON-serializable result.
 
-    MJSIM_STUDY_DATABASE may name an empty database of a server to use in place of SQLite.
+    SQLite is used unless the environment variable MJSIM_STUDY_DATABASE names an empty server database.
 
     Args:
-        parts: Names of the parts to run (default: all).
-        quick: Run a tenth of the people.
+        parts: Names of the parts to run (all by default).
+        quick: True to simulate only a tenth of the participants.
 
     Raises:
         ConfigError: There is no such part.
@@ -102,7 +102,7 @@ def _sessions(folder: Path, quick: bool) -> dict[str, Any]:
 
 
 async def _play(addresses: Sequence[str], seconds: float) -> list[float]:
-    """Let all participants turn to and fro. Return the times until inputs were acknowledged, ms."""
+    """Let all participants turn left and right. Return the times until inputs were acknowledged, in ms."""
     browsers = [SimulatedBrowser(address, seed=number) for number, address in enumerate(addresses)]
     await settle(browsers)
     trips = await asyncio.gather(*(turn(browser, seconds) for browser in browsers))

@@ -1,8 +1,8 @@
-"""Whole trials as in `mjsim batch`: simulated seconds per second of wall time, and the share of each part.
+"""Measure the speed of whole trials, as run by `mjsim batch`, and the share of time spent in each part.
 
-Each participant runs one batch in one process. The speed is the sum of `simulated_s` over the sum of `wall_s` of its
-trials. A second run with timers gives the share of each part of the program, and repeats the recorded calls on a bare
-world as a reference for the machine at that moment.
+Each participant model runs one batch in one process. The speed is the simulated time of its trials divided by
+their wall-clock time. A second run measures the share of each part of the program. It also repeats the
+recorded calls on a world without a participant, as a reference for the speed of the machine.
 """
 
 import json
@@ -22,12 +22,12 @@ from experiments.trials.warmup import compile_kernels
 OBJECTS = 24
 SEEDS = 10
 QUICK_SEEDS = 2
-HOUSE_WANTED = 0.5  # target for House.load, s
+HOUSE_WANTED = 0.5  # largest permitted time for `House.load`, in seconds
 WORKER = Path(__file__).with_name("_trials_worker.py")
 
 
 class Setting(NamedTuple):
-    """A batch, and its wanted speed in simulated seconds per second."""
+    """The settings of a batch, and its required speed in simulated seconds per second."""
 
     fidelity: str
     assistance: str
@@ -45,11 +45,11 @@ SETTINGS = (
 
 
 def measure(*, seeds: int = 0, quick: bool = False) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        seeds: Number of houses (default: 10, or 2 when `quick`).
-        quick: Run few houses.
+        seeds: Number of houses (default: 10, or 2 if `quick`).
+        quick: True to run only a few houses.
     """
     compile_kernels()
     count = seeds or (QUICK_SEEDS if quick else SEEDS)
@@ -57,7 +57,7 @@ def measure(*, seeds: int = 0, quick: bool = False) -> dict[str, Any]:
 
 
 def measure_batch(setting: Setting, seeds: int, objects: int = OBJECTS) -> dict[str, Any]:
-    """Measure the speed of one batch, its reference, and the share of each part of its wall time."""
+    """Measure the speed of a batch, a reference speed, and the share of each part of the program."""
     design = factorial(
         objects=(objects,),
         assistance=(setting.assistance,),

@@ -1,4 +1,4 @@
-"""One simulated hour of running into walls, corners, furniture and heaps of objects at 1 to 8 m/s."""
+"""Simulate one hour of running at 1 to 8 m/s into walls, corners, furniture and heaps of objects."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from benchmarks.support.requirements import Requirement, requirement_lines
 from benchmarks.support.walking_sessions import SECONDS, WalkResult, run_session
 
 HOURS, QUICK = 1.0, 0.05
-SLOW = 2.0  # sessions up to this speed are also reported separately, m/s
+SLOW = 2.0  # largest speed in m/s of the sessions that are also reported separately
 REQUIREMENTS = (
     Requirement(
         "control steps at which the body was in or had crossed something solid", "tunnelled", "<=", 0
@@ -29,13 +29,13 @@ REQUIREMENTS = (
 def measure(
     quick: bool = False, hours: float | None = None, workers: int | None = None, only: int | None = None
 ) -> dict[str, Any]:
-    """Run the benchmark. Everything in the result can be written as JSON.
+    """Run the benchmark and return a JSON-serializable result.
 
     Args:
-        quick: Run a few simulated minutes.
-        hours: Simulated time, h.
+        quick: True to run only a few simulated minutes.
+        hours: Simulated time in hours.
         workers: Number of processes (default: one per core).
-        only: Run only this session, to reproduce a failure.
+        only: Number of a single session to run, in order to reproduce a failure.
     """
     total = math.ceil(3600.0 * (hours or (QUICK if quick else HOURS)) / SECONDS)
     return summarise(run_sessions(run_session, total, workers=workers, only=only))

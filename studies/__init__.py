@@ -1,4 +1,4 @@
-"""What reproduces published results: their numbers, the score against them, calibration and worked examples.
+"""Compare studies with the published results: scoring, calibration and worked examples.
 
-Serves maintainers and readers of the paper from a checkout; it is not part of the wheel.
+This package is for maintainers and readers of the paper who work in a checkout. It is not part of the wheel.
 """

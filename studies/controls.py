@@ -1,4 +1,4 @@
-"""The negative controls of a study: without a part of the model, a study must not come out as published."""
+"""Negative controls: studies that lack a part of the model and should not reproduce published results."""
 
 import tomllib
 from dataclasses import dataclass
@@ -27,12 +27,12 @@ class _Control(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Control:
-    """A study that lacks something, and so must fail what depends on it.
+    """A study without one part of the model, which should fail to reproduce some published results.
 
     Attributes:
-        name: Of its folder.
-        about: What it lacks.
-        design: Its people.
+        name: Name of the control and of its output folder.
+        about: Description of the missing part.
+        design: Trials of the control.
     """
 
     name: str
@@ -41,15 +41,15 @@ class Control:
 
 
 def read_controls(design: Design, path: Path = FILE, *, only: str | None = None) -> list[Control]:
-    """The negative controls of a study.
+    """Load the negative controls of a study.
 
     Args:
-        design: Its people.
-        path: What each control changes: user, behaviour, person, and which conditions it leaves.
-        only: Name of the only control to take; None for all.
+        design: The design of the study.
+        path: TOML file that describes how each control changes the user, behaviour, person and conditions.
+        only: Name of the only control to return, or None for all.
 
     Raises:
-        ConfigError: The file is unusable, there is no such control, or no person of the design is left.
+        ConfigError: The file cannot be used, there is no such control, or a control has no participants.
     """
     try:
         tables = msgspec.convert(tomllib.loads(read_text(path)), dict[str, _Control])
@@ -71,7 +71,7 @@ def _changed(design: Design, name: str, control: _Control) -> Design:
     behaviour, person = Distributions.of(control.behaviour), Distributions.of(control.person)
 
     def changed(trial: TrialConfig) -> TrialConfig:
-        if control.user is not None:  # another model has other parameters
+        if control.user is not None:  # another participant model has different parameters
             return replace(trial, user=control.user, behaviour=behaviour, person=person)
         return replace(
             trial, behaviour=trial.behaviour.updated(behaviour), person=trial.person.updated(person)

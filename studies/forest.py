@@ -1,4 +1,4 @@
-"""Forest plot of effect sizes: the published ones and ours, row by row."""
+"""A forest plot that compares published effect sizes with those of another study."""
 
 from matplotlib.figure import Figure
 
@@ -17,7 +17,7 @@ PUBLISHED, TARGET, AGREES, DIFFERS = "#444444", "#DDDDDD", "#0072B2", "#D55E00"
 
 
 def forest(score: Score, published: Published) -> FigureBlock:
-    """A row for each effect size that was judged."""
+    """Draw a forest plot with a row for each effect size that was judged."""
     tests = {(t.measure, str(t.effect), t.objects): t for t in published.tests}
     rows = [r for r in score.rows if r.kind == EFFECT_SIZE and r.target is not None]
     figure = Figure(figsize=(7.5, 0.42 * max(len(rows), 1) + 1.0), layout="constrained")

@@ -1,7 +1,8 @@
-"""What one F test says about another of the same effect: prediction intervals and scores, with the chance of both.
+"""Prediction intervals and scores for an F test, given an earlier test of the same effect.
 
-The first test's noncentrality is not known: it has the confidence distribution that its intervals come from.
-Source: Patil, Peng and Leek 2016, doi:10.1177/1745691616646366 (for differences; here for F).
+Both tests have a sampling error. The noncentrality of the first test is unknown and follows a confidence
+distribution. Source: Patil, Peng and Leek 2016, doi:10.1177/1745691616646366. They treat differences; this
+module treats F tests.
 """
 
 import math
@@ -15,7 +16,7 @@ from scipy.stats import f, ncf
 from experiments.analysis.statistics.effects import ALPHA, FTest, Interval, partial_eta_squared
 from studies.published import PublishedTest
 
-SHARE = 0.9  # of the intervals
+SHARE = 0.9  # coverage of the intervals
 LEVELS = (np.arange(200) + 0.5) / 200
 
 Values = NDArray[np.float64]
@@ -23,16 +24,16 @@ Values = NDArray[np.float64]
 
 @lru_cache(maxsize=64)
 def _confidence(statistic: float, df1: int, df2: float) -> Values:
-    """Quantiles of the confidence distribution of the noncentrality of an F statistic."""
+    """Return quantiles of the confidence distribution of the noncentrality, given an F statistic."""
     grid = np.linspace(0.0, math.sqrt(4.0 * statistic * df1 + 100.0), 1500) ** 2
     above = 1.0 - np.nan_to_num(ncf.cdf(statistic, df1, df2, grid))
     return np.interp(LEVELS, above, grid, left=0.0)
 
 
 def effect_of(test: PublishedTest, people: int) -> Values:
-    """Quantiles of what the published test says about the noncentrality for one person, (n,).
+    """Return quantiles of the noncentrality per participant, given a published test, (n,).
 
-    Where F is not printed, it may be any below the critical one, each as often as without an effect.
+    If F is not printed, it is assumed to be below the critical value and distributed as without an effect.
     """
     if test.statistic is not None:
         return _confidence(test.statistic, *test.df) / people
@@ -41,20 +42,20 @@ def effect_of(test: PublishedTest, people: int) -> Values:
 
 
 def _shares(test: PublishedTest) -> tuple[float, float]:
-    """What lies below an interval's ends: 5 % and 95 %; of tests that are not significant, only what is above."""
+    """Return the probabilities below both ends of an interval. Without significance, the first is 0."""
     outside = (1.0 - SHARE) / 2
     return (outside if test.significant else 0.0), 1.0 - outside
 
 
 def population_interval(test: PublishedTest, people: int) -> Interval:
-    """What partial eta squared may be in the population."""
+    """Return an interval of partial eta squared in the population."""
     low, high = np.quantile(effect_of(test, people), _shares(test))
     return float(low / (1 + low)), float(high / (1 + high))
 
 
 @lru_cache(maxsize=256)
 def prediction_interval(test: PublishedTest, people: int, df2: float, others: int) -> Interval:
-    """What partial eta squared a second study of `others` people may find, if both are of one population."""
+    """Return an interval of partial eta squared in a second sample of `others` from the same population."""
     centers = effect_of(test, people) * others
 
     def excess(statistic: float, share: float) -> float:
@@ -66,9 +67,10 @@ def prediction_interval(test: PublishedTest, people: int, df2: float, others: in
 
 
 def log_score(test: PublishedTest, people: int, effect: Values) -> tuple[float, float]:
-    """Log probability of the published F (its density, or that of no significance) and its two-sided p.
+    """Return the log probability of a published result, and its two-sided p value, for a given effect.
 
-    `effect` holds equally likely noncentralities for one person, (n,).
+    If F is not printed, the result is a test that is not significant. `effect` holds equally likely
+    noncentralities per participant, (n,).
     """
     if test.statistic is None:
         critical = float(f.ppf(1.0 - ALPHA, *test.df))
@@ -80,5 +82,5 @@ def log_score(test: PublishedTest, people: int, effect: Values) -> tuple[float, 
 
 
 def effect_found(test: FTest) -> Values:
-    """Quantiles of what a test of ours says about the noncentrality for one person, (n,)."""
+    """Return quantiles of the noncentrality per participant, given a test of our own data, (n,)."""
     return _confidence(test.statistic, test.df1, test.df2) / test.people

@@ -1,4 +1,4 @@
-"""The published statistics: studies/published.toml."""
+"""The published statistics, which are stored in studies/published.toml."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,16 +14,16 @@ NOT_SIGNIFICANT = "n.s."
 
 
 class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An F test as printed.
+    """An F test as printed in the paper.
 
     Attributes:
         measure: Short name of the measure.
-        effect: What it tests.
-        df: Degrees of freedom, of the effect and of the error.
-        p: As printed: `=.523` or `n.s.`; None where none is.
-        objects: At which number of objects; None over all.
-        statistic: F, or None where it is not printed.
-        p_fits: False where the p printed with F is known not to go with it.
+        effect: The tested effect.
+        df: Degrees of freedom of the effect and of the error.
+        p: The p value as printed, such as `=.523` or `n.s.`, or None if there is none.
+        objects: Number of objects, or None for a test over all numbers.
+        statistic: The F value, or None if it is not printed.
+        p_fits: False if the printed p value is known to contradict F.
     """
 
     measure: str
@@ -36,29 +36,29 @@ class PublishedTest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def fitted(self) -> bool:
-        """Whether it may be fitted: over all numbers of objects, nothing is."""
+        """True if the model may be fitted to this test. Tests over all numbers of objects are excluded."""
         return self.objects is not None
 
     @property
     def significant(self) -> bool:
-        """The decision at .05: by the printed p, else by F."""
+        """True if the test is significant at .05 by its printed p value or, without one, by F."""
         if self.p is None:
             return float(f.sf(self.statistic, *self.df)) < ALPHA
         return self.p != NOT_SIGNIFICANT and float(self.p[1:]) < ALPHA
 
     def test(self, people: int) -> FTest | None:
-        """The test with its effect size; None where F is not printed."""
+        """Return the test with its effect size, or None if F is not printed."""
         return None if self.statistic is None else FTest(self.statistic, *self.df, people)
 
     def interval(self, people: int) -> Interval | None:
-        """What partial eta squared may be: its 90 % confidence interval, or all that stays without significance."""
+        """Return the 90 % interval of partial eta squared, or all nonsignificant values if F is unknown."""
         test = self.test(people)
         if test is not None:
             return test.interval
         return 0.0, partial_eta_squared(float(f.ppf(1.0 - ALPHA, *self.df)), *self.df)
 
     def inconsistency(self) -> str | None:
-        """What is wrong between the printed F and p; None where they go together."""
+        """Describe how the printed F and p values contradict each other. Return None if they agree."""
         if self.statistic is None:
             return None
         implied = float(f.sf(self.statistic, *self.df))
@@ -79,14 +79,14 @@ def _short(p: float) -> str:
 
 
 class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An order of means as printed; `pair` or one of the last four says which.
+    """A published order of means, given by exactly one of `pair`, `same`, `rising`, `lowest` and `falling`.
 
     Attributes:
         measure: Short name of the measure.
-        objects: At which number of objects; None over all.
-        pair: The first is smaller than the second by Tukey's test.
-        p: Of that test, as printed.
-        same: Tukey's test finds no difference.
+        objects: Number of objects, or None for all numbers.
+        pair: Two conditions, of which the first has the smaller mean by Tukey's test.
+        p: The p value of that test, as printed.
+        same: Two conditions between which Tukey's test finds no difference.
         rising: The condition whose means rise with the number of objects.
         lowest: The condition with the lowest mean at every number of objects.
         falling: Conditions by their means over all numbers of objects, the largest first.
@@ -102,7 +102,7 @@ class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     falling: tuple[str, ...] | None = None
 
     def label(self) -> str:
-        """What it says, in words."""
+        """Describe the order in words or symbols."""
         if self.pair is not None:
             return " < ".join(self.pair)
         if self.same is not None:
@@ -113,14 +113,14 @@ class Direction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Variances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The condition in which a measure varies most, at every number of objects."""
+    """The condition in which a measure has the largest variance, at every number of objects."""
 
     measure: str
     largest: str
 
 
 class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """People by condition, for each number of objects."""
+    """Numbers of participants by condition, for each number of objects."""
 
     objects: tuple[int, ...]
     none: tuple[int, ...]
@@ -128,13 +128,13 @@ class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     optimal: tuple[int, ...]
 
     def sizes(self) -> dict[tuple[str, int], int]:
-        """People by cell."""
+        """Return the number of participants by condition and number of objects."""
         rows = {"none": self.none, "highlight": self.highlight, "optimal": self.optimal}
         return {(c, n): k for c, counts in rows.items() for n, k in zip(self.objects, counts, strict=True)}
 
 
 class Published(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All that is scored."""
+    """All published results with which a study is compared."""
 
     people: People
     tests: tuple[PublishedTest, ...]
@@ -142,17 +142,17 @@ class Published(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     variances: Variances
 
     def people_of(self, objects: int | None) -> int:
-        """How many people took part at a number of objects, or in all."""
+        """Return how many people participated with a number of objects, or in total if `objects` is None."""
         return sum(k for (_, n), k in self.people.sizes().items() if objects in (None, n))
 
 
 def read_published(path: Path = FILE) -> Published:
-    """The committed numbers."""
+    """Load the published results from a TOML file."""
     return msgspec.toml.decode(path.read_bytes(), type=Published)
 
 
 def inconsistencies(published: Published) -> Sequence[str]:
-    """What is inconsistent in the published numbers, a line each."""
+    """Return a line about each contradiction between published numbers."""
     return [
         f"{t.measure}, {t.effect}: {line}" for t in published.tests if (line := t.inconsistency()) is not None
     ]

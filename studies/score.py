@@ -1,8 +1,8 @@
-"""A study scored against the published one, row by row.
+"""Compare a study with the published one, result by result.
 
-A study of the usual size is judged by its own tests. A pool of many people in every cell is judged as a population: by
-its effect sizes at the published numbers of people, and by how many of 200 studies that are drawn from it come out as
-published.
+A study of ordinary size is judged by its own tests. A pool, which has many participants in every cell, is
+judged as a population: by its effect sizes at the published numbers of participants, and by the share of 200
+random studies from the pool that reproduce a result.
 """
 
 from collections import Counter
@@ -25,8 +25,8 @@ from studies.score_population import draw, population_eta_squared
 from studies.score_rules import points, published_cells, require_cells, tests_of, varies_most
 from studies.truth import true_studies
 
-POOL = 200  # people in each cell that make a pool
-TRUTHS = 100  # studies of people who are as published on average
+POOL = 200  # smallest number of participants per cell in a pool
+TRUTHS = 100  # number of random studies from a population that has the published effects
 EFFECT_SIZE, INFERENCE, DIRECTION, VARIANCE = "effect size", "inference", "direction", "variance order"
 NOT_SIMULATED = "not simulated"
 
@@ -35,25 +35,26 @@ Rule = Callable[[StudyTable], bool]
 
 @dataclass(frozen=True)
 class Row:
-    """One published result and ours.
+    """A published result and the corresponding result of the study.
 
     Attributes:
         kind: `effect size`, `inference`, `direction` or `variance order`.
         measure: Short name of the measure.
-        what: What is stated of it.
-        objects: At which number of objects; None over all.
-        fitted: Whether it may be fitted.
-        published: As printed.
-        target: Effect sizes of ours that go with it, or None: its prediction interval for a study of as many people,
-            or for a pool its confidence interval.
-        ours: What was found, in words.
-        agrees: Whether that is the same; None where it cannot be said.
-        rate: Share of the studies drawn from a pool in which it is the same; None without a pool.
-        truth: Share of the studies of people who are as published on average in which it is the same.
-        predictive_p: Two-sided p of the published F if people were as ours; of a test without F, the probability
-            that it is not significant; or None.
-        log_score: Logarithm of the probability of the published F (a density) if people were as ours, or None.
-        remark: Why nothing can be said, or what is inconsistent in the published numbers; or None.
+        what: Name of the tested effect or order.
+        objects: Number of objects, or None for all numbers.
+        fitted: True if the model may be fitted to this result.
+        published: The published result as printed.
+        target: Range of agreeing effect sizes, or None: a prediction interval, or for a pool a confidence
+            interval.
+        ours: The result of the study in words.
+        agrees: True if both results agree, or None if this cannot be decided.
+        rate: Share of the random studies from a pool that agree, or None without a pool.
+        truth: Share of the random studies from a population with the published effects that agree.
+        predictive_p: Two-sided p value of the published F if the population were like this study, or None.
+            For a test without F, the probability that it is not significant.
+        log_score: Log probability (density) of the published F if the population were like this study, or
+            None.
+        remark: The reason why no result exists, a contradiction between published numbers, or None.
     """
 
     kind: str
@@ -74,16 +75,16 @@ class Row:
 
 @dataclass(frozen=True)
 class Score:
-    """All rows.
+    """The score of a study: one row for each published result.
 
     Attributes:
-        origin: Whether people were simulated.
-        people: How many of them are in cells of the published study.
-        pool: Whether they are judged as a population.
-        as_published: Whether every cell has as many people as in the published study.
-        rows: The rows in the order of the published numbers.
-        left_out: People of the table who are not judged.
-        truths: How many rows of each line of the summary agree in studies of people who are as published on average.
+        origin: Label that tells whether participants were simulated.
+        people: Number of participants in cells of the published study.
+        pool: True if the study is judged as a population.
+        as_published: True if every cell has as many participants as in the published study.
+        rows: The rows in the order of the published results.
+        left_out: Participants in the table who are not judged.
+        truths: Numbers of agreeing rows in studies with the published effects, by line of the summary.
     """
 
     origin: str
@@ -95,7 +96,7 @@ class Score:
     truths: tuple[tuple[int, ...], ...] = ()
 
     def summary(self) -> Iterator[tuple[str, str, int, int, int, str]]:
-        """What, fitted or not fitted, how many agree, were judged, there are, and agree of the truth (5 to 95 %)."""
+        """Yield name, fitted or not, numbers of agreeing, judged and all rows, and a reference range."""
         for k, (name, fitted, rows) in enumerate(_lines(self.rows)):
             low, high = np.quantile(self.truths[k], [0.05, 0.95], method="nearest")
             judged = [r for r in rows if r.agrees is not None]
@@ -110,13 +111,13 @@ class Score:
             )
 
     def log_score(self) -> float | None:
-        """Sum over all published F of measures that are known; None if there are none. Larger is better."""
+        """Return the sum of all log scores, or None if there are none. Larger values are better."""
         known = [r.log_score for r in self.rows if r.log_score is not None]
         return sum(known) if known else None
 
 
 def _lines(rows: Iterable[Row]) -> list[tuple[str, bool, list[Row]]]:
-    """Rows by line of the summary; answers that are not simulated are in none."""
+    """Group rows by line of the summary. Rows about survey answers that are not simulated are omitted."""
     known = [r for r in rows if r.ours != NOT_SIMULATED]
     kinds = {
         "effect sizes and inferences": (EFFECT_SIZE, INFERENCE),
@@ -131,15 +132,15 @@ def _lines(rows: Iterable[Row]) -> list[tuple[str, bool, list[Row]]]:
 
 
 def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
-    """Judge a study.
+    """Compare a study with the published one.
 
     Args:
-        table: Its people; those in other cells than the published ones are left out.
-        published: The published numbers.
-        seed: Of the studies that are drawn from a pool.
+        table: The participants of the study. Those outside the published cells are left out.
+        published: The published results.
+        seed: Seed for drawing random studies.
 
     Raises:
-        StatisticsError: No cell of the published study has people.
+        StatisticsError: No participant is in a cell of the published study.
     """
     inside = published_cells(table, published)
     sizes = published.people.sizes()
@@ -166,12 +167,12 @@ def score(table: StudyTable, published: Published, *, seed: int = 0) -> Score:
 
 @dataclass(frozen=True)
 class _Judge:
-    """Judges a table, or a pool with the studies that were drawn from it."""
+    """Judges a table of participants, or a pool and the random studies that were drawn from it."""
 
     table: StudyTable
     published: Published
     replicates: tuple[StudyTable, ...]
-    scores: bool = True  # whether to work out log scores
+    scores: bool = True  # whether to compute log scores
     known: dict[tuple[str, int | None], list[dict[str, FTest]]] = field(default_factory=dict)
 
     def rows(self) -> Iterator[Row]:
@@ -246,7 +247,7 @@ class _Judge:
         return replace(row, ours=ours, agrees=rate > 0.5, rate=rate)
 
     def _drawn(self, test: PublishedTest) -> list[FTest]:
-        """The test in the studies of a pool, where it can be computed; all tests of a measure are worked out once."""
+        """Return the test's results in all studies drawn from the pool in which it can be computed."""
         key = test.measure, test.objects
         if key not in self.known:
             self.known[key] = [found for t in self.replicates if (found := _tests(t, *key)) is not None]
@@ -260,7 +261,7 @@ class _Judge:
         )
         if self._is_not_simulated(direction.measure):
             return replace(row, ours=NOT_SIMULATED)
-        # A test's decision depends on how many people there are: studies of the published size decide.
+        # The decision of a test depends on the sample size, so studies of the published size are used.
         return self._judged(row, partial(points, row=direction), by_rate=True)
 
     def _judged(self, row: Row, rule: Rule, *, by_rate: bool = False) -> Row:
@@ -275,7 +276,7 @@ class _Judge:
         return replace(row, ours="the same" if agrees else "not so", agrees=agrees, rate=rate)
 
     def _rate(self, agreeing: Sequence[bool]) -> float | None:
-        """Share of the studies of a pool that agree; those of which nothing can be said do not. None without a pool."""
+        """Return the share of agreeing studies among those drawn from the pool, or None without a pool."""
         return sum(agreeing) / len(self.replicates) if self.replicates else None
 
 

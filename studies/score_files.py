@@ -1,4 +1,4 @@
-"""A score as a page, a table and JSON."""
+"""Write a score as a web page, a table and a JSON file."""
 
 import csv
 import io
@@ -31,7 +31,7 @@ TITLE = "Score against the published study"
 
 
 def write_score(folder: Path, score: Score, published: Published) -> None:
-    """Write all files, each whole or not at all."""
+    """Write the page, the table and the JSON file, each atomically."""
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / JSON, as_json(score, published))
     write_text_atomically(folder / CSV, _csv(score))
@@ -39,7 +39,7 @@ def write_score(folder: Path, score: Score, published: Published) -> None:
 
 
 def as_json(score: Score, published: Published) -> dict[str, Any]:
-    """All of it."""
+    """Return the score as JSON-ready data, with a summary."""
     names = ("what", "rows", "agree", "judged", "of", "truth")
     return {
         **asdict(score),
@@ -50,7 +50,7 @@ def as_json(score: Score, published: Published) -> dict[str, Any]:
 
 
 def score_page(score: Score, published: Published) -> str:
-    """The page: a summary, the forest plot, then rows that may be fitted and others apart."""
+    """Return the web page: a summary, a forest plot, and tables of fitted and other results."""
     return page(TITLE, score.origin, _sections(score, published))
 
 
@@ -67,7 +67,7 @@ def _sections(score: Score, published: Published) -> Iterator[tuple[str, Iterabl
 
 
 def how(score: Score) -> str:
-    """How the study was judged."""
+    """Explain in words how the study was judged."""
     if score.pool:
         judged = (
             f"A pool of {score.people} people, judged as a population; `reproduced` is the share of {REPLICATES} "
@@ -93,7 +93,7 @@ def how(score: Score) -> str:
 
 
 def cells(row: Row) -> tuple[object, ...]:
-    """A row of the table, as COLUMNS."""
+    """Return the cells of a table row, in the order of `COLUMNS`."""
     agrees = {None: None, True: "yes", False: "NO"}[row.agrees]
     rate, truth = (None if share is None else f"{share:.0%}" for share in (row.rate, row.truth))
     p = None if row.predictive_p is None else p_value(row.predictive_p)

@@ -1,4 +1,4 @@
-"""Effect sizes of a population of which a pool is known: what a study without chance would find."""
+"""Effect sizes in a population, estimated from a pool of many participants."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,18 +10,18 @@ from experiments.errors import StatisticsError
 from studies.published import Published, PublishedTest
 
 Cell = tuple[str, int]
-REPLICATES = 200  # studies drawn from a pool
+REPLICATES = 200  # number of random studies drawn from a pool
 
 
 def population_eta_squared(pool: StudyTable, published: Published, test: PublishedTest) -> float:
-    """Partial eta squared in the population, at the published numbers of people.
+    """Return partial eta squared in the population, at the published numbers of participants.
 
-    The means of the pool's cells replace each person of a cell, which gives the noncentrality L of the published test;
-    what the means of a pool differ by chance is taken off. Eta squared is L / (L + people), as in its confidence
-    intervals.
+    The noncentrality L of the published test is computed as if each participant had the mean of their cell in
+    the pool. The expected contribution of sampling error to these means is subtracted. Eta squared is L / (L
+    + participants), as in its confidence intervals.
 
     Raises:
-        StatisticsError: The measure is not known in every cell, or does not vary.
+        StatisticsError: A cell has fewer than two values of the measure, or the measure does not vary.
     """
     sizes = {c: n for c, n in published.people.sizes().items() if test.objects in (None, c[1])}
     cells = (
@@ -43,7 +43,7 @@ def population_eta_squared(pool: StudyTable, published: Published, test: Publish
 
 
 def effect_squares(means: Mapping[Cell, float], sizes: Mapping[Cell, int], test: PublishedTest) -> float:
-    """Sum of squares of the effect if each person were as the mean of the cell."""
+    """Return the sum of squares of an effect if every participant had the mean of their cell."""
     counts = [sizes[cell] for cell in means]
     values = np.repeat(list(means.values()), counts)
     if test.objects is not None:
@@ -54,7 +54,7 @@ def effect_squares(means: Mapping[Cell, float], sizes: Mapping[Cell, int], test:
 
 
 def draw(pool: StudyTable, published: Published, seed: int, count: int = REPLICATES) -> Iterator[StudyTable]:
-    """Studies of the published size: people drawn from the same cell of a pool, with replacement."""
+    """Yield random studies of the published size, drawn from the cells of a pool with replacement."""
     rng = np.random.default_rng(seed)
     cells = [
         (np.flatnonzero((pool.assistance == condition) & (pool.objects == objects)), size)

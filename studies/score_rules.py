@@ -1,4 +1,4 @@
-"""Whether a study comes out as published: each row of studies/published.toml judged on one table."""
+"""Rules that decide whether a study reproduces a published result."""
 
 import itertools
 import math
@@ -15,16 +15,16 @@ from studies.published import Direction, Published
 
 
 def published_cells(table: StudyTable, published: Published) -> StudyTable:
-    """The people of a table who are in cells of the published study."""
+    """Return the participants who are in cells of the published study."""
     cells = zip(table.assistance.tolist(), table.objects.tolist(), strict=True)
     return table.take(np.flatnonzero([cell in published.people.sizes() for cell in cells]))
 
 
 def require_cells(table: StudyTable, published: Published, measure: str, objects: int | None) -> None:
-    """Check that every published cell has people, at a number of objects or at all of them.
+    """Check that every published cell has participants, with `objects` objects or, if None, with any number.
 
     Raises:
-        StatisticsError: The measure is not known, or a cell is empty; the message names it.
+        StatisticsError: The measure is unknown, or a cell is empty. The message names it.
     """
     _known(table, measure)
     for condition, level in published.people.sizes():
@@ -33,10 +33,11 @@ def require_cells(table: StudyTable, published: Published, measure: str, objects
 
 
 def tests_of(table: StudyTable, measure: str, objects: int | None) -> dict[str, FTest]:
-    """Tests of a measure on a table by effect: of assistance at a number of objects, else of both factors (Type II).
+    """Return tests of a measure by effect: of assistance, or, if `objects` is None, of both factors (Type
+    II).
 
     Raises:
-        StatisticsError: They cannot be computed; the message says why.
+        StatisticsError: The tests cannot be computed.
     """
     values = _known(table, measure)
     if objects is None:
@@ -46,10 +47,10 @@ def tests_of(table: StudyTable, measure: str, objects: int | None) -> dict[str, 
 
 
 def points(table: StudyTable, row: Direction) -> bool:
-    """Whether means have the published order.
+    """Return True if the means have the published order.
 
     Raises:
-        StatisticsError: They cannot be compared.
+        StatisticsError: The means cannot be compared.
     """
     _known(table, row.measure)
     if row.pair is not None:
@@ -67,7 +68,7 @@ def points(table: StudyTable, row: Direction) -> bool:
 
 
 def _trend(table: StudyTable, measure: str, condition: str) -> bool:
-    """Whether a measure rises with the number of objects: a linear regression, one-sided at .05."""
+    """Return True if a measure rises with the number of objects, by linear regression, one-sided at .05."""
     levels = _levels(table)
     groups = [table.groups(measure, n).get(condition) for n in levels]
     if any(group is None for group in groups):
@@ -79,7 +80,7 @@ def _trend(table: StudyTable, measure: str, condition: str) -> bool:
 
 
 def _below(table: StudyTable, measure: str, low: str, high: str) -> bool:
-    """Whether Tukey's test of the means over all numbers of objects, each of the same weight, finds low below high."""
+    """Return True if Tukey's test over all numbers of objects, equally weighted, finds `low` below `high`."""
     levels = _levels(table)
     cells = {(c, n): v for n in levels for c, v in table.groups(measure, n).items()}
     conditions = {condition for condition, _ in cells}
@@ -96,10 +97,10 @@ def _below(table: StudyTable, measure: str, low: str, high: str) -> bool:
 
 
 def varies_most(table: StudyTable, measure: str, condition: str, objects: int) -> bool:
-    """Whether a measure has its largest variance in this condition.
+    """Return True if the measure has its largest variance in this condition.
 
     Raises:
-        StatisticsError: A variance is not known.
+        StatisticsError: A variance cannot be computed.
     """
     _known(table, measure)
     found = {name: _variance(values) for name, values in table.groups(measure, objects).items()}

@@ -1,6 +1,7 @@
-"""People whose studies come out as published on average: what the truth itself would score.
+"""Random studies from a population that has the published effects, as a reference for scores.
 
-Normal values with the published directions; an F of the population is the published one without the chance in it.
+Values are normally distributed with the published order of means, and effects are as published but without
+bias.
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,7 +16,7 @@ from studies.published import Published, PublishedTest
 from studies.score_population import effect_squares
 
 Cell = tuple[str, int]
-# Means by condition, up to a factor: their order and distances as published.
+# Relative means by condition, with the published order and distances.
 STEPS: Mapping[str, Mapping[str, float]] = {
     "deviations": {"none": 0.6, "highlight": 0.4, "optimal": -1.0},
     "ipl": {"none": -0.9, "highlight": -0.1, "optimal": 1.0},
@@ -26,11 +27,11 @@ SPREADS = {
     "none": 1.0,
     "highlight": 1.0,
     "optimal": 1.4,
-}  # of measures whose variance is largest under optimal
+}  # standard deviations of the measure that varies most under `optimal`
 
 
 def true_studies(pattern: StudyTable, published: Published, seed: int, count: int) -> Iterator[StudyTable]:
-    """Studies of the published size of such people, as tables like `pattern`."""
+    """Yield random studies of the published size from this population, as tables like `pattern`."""
     rng = np.random.default_rng(seed)
     sizes = published.people.sizes()
     cells = [cell for cell, size in sizes.items() for _ in range(size)]
@@ -50,7 +51,7 @@ def true_studies(pattern: StudyTable, published: Published, seed: int, count: in
 
 
 def _population(published: Published, measure: str) -> dict[Cell, tuple[float, float]]:
-    """Mean and standard deviation in each cell of a measure."""
+    """Return the mean and standard deviation of a measure in each cell."""
     tests = [t for t in published.tests if t.measure == measure]
     wanted = [_noncentrality(t) for t in tests]
 
@@ -65,13 +66,13 @@ def _population(published: Published, measure: str) -> dict[Cell, tuple[float, f
 
 
 def _noncentrality(test: PublishedTest) -> float:
-    """Without bias; 0 where F is not printed."""
+    """Return an unbiased estimate of the noncentrality, or 0 if F is not printed."""
     df1, df2 = test.df
     return max((test.statistic or 0.0) * df1 * (df2 - 2) / df2 - df1, 0.0)
 
 
 def _cells(published: Published, measure: str, parameters: Values) -> dict[Cell, tuple[float, float]]:
-    """By size of the effects of assistance, of objects and of both, and the logarithm of the spread at 6 objects."""
+    """Return means and standard deviations by effect sizes and the logarithm of the spread at 6 objects."""
     assistance, objects, both, tightness = parameters
     spreads = SPREADS if measure == published.variances.measure else dict.fromkeys(SPREADS, 1.0)
     found = {}

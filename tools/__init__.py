@@ -1,1 +1,1 @@
-"""Maintainers' tools: models, pictures and generated pages of the documentation. Not part of the wheel."""
+"""Maintenance tools for models, pictures and generated documentation. They are not in the wheel."""

@@ -1,4 +1,4 @@
-"""Generator of the client's protocol module from the server's types: `make client-protocol`."""
+"""Generate the client's protocol module from the server's message types: `make client-protocol`."""
 
 import enum
 import sys
@@ -64,7 +64,7 @@ def _literals(alias: Any) -> str:
 
 
 def _collect(info: inspect.Type, found: dict[str, str]) -> str:
-    """Convert a type to TypeScript, and add its object types to `found` as typedefs."""
+    """Convert a type to TypeScript. Add the object types that it contains to `found` as typedefs."""
     match info:
         case inspect.StructType(cls=cls, fields=fields, tag=tag):
             return _object(cls, fields, [] if tag is None else [f'type: "{tag}"'], found)
@@ -91,7 +91,7 @@ def _collect(info: inspect.Type, found: dict[str, str]) -> str:
 def _object(cls: type, fields: tuple[inspect.Field, ...], extra: list[str], found: dict[str, str]) -> str:
     name = "HudMessage" if cls.__module__ == "hud.state" and cls.__name__ == "Message" else cls.__name__
     if name not in found:
-        found[name] = ""  # the type may refer to itself
+        found[name] = ""  # prevents endless recursion if the type refers to itself
         sent = issubclass(cls, msgspec.Struct) and cls not in (
             *protocol.ToBrowser.__args__,
             protocol.FrameMessage,

@@ -1,4 +1,4 @@
-"""Generator of the data dictionary docs/data.md from the recorded types: `python -m tools.data_dictionary`."""
+"""Generate the data dictionary docs/data.md from the recorded types: `python -m tools.data_dictionary`."""
 
 import inspect
 import re

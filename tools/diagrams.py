@@ -1,7 +1,7 @@
-"""Sequence diagrams in Markdown, drawn as SVG while the site is built, so that its pages need no script.
+"""Draw sequence diagrams from Markdown as SVG while the site is built, so that its pages need no script.
 
-A fence named `mermaid` holds the part of Mermaid's notation that `Sequence` reads; other hosts of the same page may
-draw it with Mermaid itself.
+Diagrams are code fences named `mermaid`. They use a subset of Mermaid's notation, so other websites such as
+GitHub can draw the same diagrams with Mermaid itself.
 """
 
 import html
@@ -12,7 +12,7 @@ from typing import Any
 
 from pymdownx.superfences import SuperFencesException
 
-COLUMN, ROW, MARGIN = 150, 30, 16  # sizes in px
+COLUMN, ROW, MARGIN = 150, 30, 16  # sizes in pixels
 _PARTICIPANT = re.compile(r"participant (\w+) as (\w+)")
 _ARROW = re.compile(r"(\w+)(--?>>)(\w+): (.+)")
 _NOTE = re.compile(r"Note over (\w+): (.+)")
@@ -27,10 +27,11 @@ _STYLE = (
 
 
 def fence(source: str, *_: Any, **__: Any) -> str:
-    """Draw the diagram of a fence.
+    """Draw the diagram in a code fence.
 
     Raises:
-        SuperFencesException: A line is not in the notation that is drawn here. Any other error would show the source.
+        SuperFencesException: A line is not in the supported notation. Other exceptions would print the source
+            instead.
     """
     try:
         return f'<div class="diagram">{Sequence(source).svg()}</div>'
@@ -39,13 +40,13 @@ def fence(source: str, *_: Any, **__: Any) -> str:
 
 
 class Sequence:
-    """A sequence diagram: participants in columns, messages in rows."""
+    """A sequence diagram with participants in columns and messages in rows."""
 
     def __init__(self, source: str) -> None:
-        """Read a diagram.
+        """Parse a diagram.
 
         Raises:
-            ValueError: A line is not in the notation that is drawn here.
+            ValueError: A line is not in the supported notation.
         """
         first, *self._lines = [line.strip() for line in source.strip().splitlines() if line.strip()]
         if first != "sequenceDiagram":
@@ -57,7 +58,7 @@ class Sequence:
         self._open: list[float] = []
 
     def svg(self) -> str:
-        """The drawing, as inline SVG."""
+        """Return the drawing as inline SVG."""
         width = 2 * MARGIN + COLUMN * len(self._names)
         body = [part for line in self._lines if not _PARTICIPANT.fullmatch(line) for part in self._row(line)]
         if self._open:

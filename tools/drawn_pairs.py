@@ -1,6 +1,7 @@
-"""Pairs of pictures of the same moment, drawn by mjsim and by the browser client, and their difference.
+"""Draw pairs of pictures of the same moment with mjsim and with the browser client, and compare them.
 
-`python -m tools.drawn_pairs docs/pictures/browser.webp` draws 21 pairs and makes a contact sheet.
+`python -m tools.drawn_pairs docs/pictures/browser.webp` draws 21 pairs and combines them into a contact
+sheet.
 """
 
 import argparse
@@ -32,13 +33,13 @@ from mjsim.render import Renderer
 
 Image = NDArray[np.uint8]
 
-SIZE = (640, 480)  # width and height of pictures, pixels
+SIZE = (640, 480)  # width and height of each picture in pixels
 POSES_PER_ROOM = 3
-FREE = 1.0  # free distance straight ahead of the person, so that few pictures show a bare wall, m
-PITCHES = (-0.5, 0.1)  # rad
+FREE = 1.0  # required free distance in front of the person in metres, to avoid pictures of bare walls
+PITCHES = (-0.5, 0.1)  # range of the head's pitch in radians
 SITE = Path(__file__).parents[1] / "experiments" / "web" / "client" / "static"
 CHROMIUM = "/usr/bin/chromium"
-SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # WebGL without a graphics card
+SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # use WebGL without a graphics card
 PAGE = """<!doctype html><title>World</title><link rel="icon" href="data:,">
 <style>body { margin: 0 } canvas { display: block; width: 100vw; height: 100vh }</style>
 <canvas></canvas><script type="module" src="/page.js"></script>"""
@@ -64,31 +65,31 @@ const picture = (person, eye, markers) => {
 Object.assign(window, { world, start, picture, ready: true });
 """
 TYPES = {"": "text/html", ".js": "text/javascript", ".json": "application/json", ".webp": "image/webp"}
-CELL = (240, 180)  # size of a picture on the contact sheet, pixels
+CELL = (240, 180)  # size of a picture on the contact sheet in pixels
 
 
 @dataclass(frozen=True)
 class View:
-    """A person's pose in a house, and the markers in view."""
+    """A person's pose in a house, with the visible markers."""
 
-    room: str  # label of the room
-    x: float  # m
+    room: str  # name of the room
+    x: float  # position in metres
     y: float
-    heading: float  # from +x to +y, rad
-    pitch: float  # pitch of the head, positive upwards, rad
+    heading: float  # angle from +x towards +y in radians
+    pitch: float  # pitch of the head in radians, positive upwards
     markers: tuple[Marker, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """A view that was drawn twice."""
+    """Two drawings of the same view."""
 
     view: View
-    mjsim: Image  # (h, w, 3)
-    browser: Image  # (h, w, 3)
+    mjsim: Image  # picture by mjsim, (h, w, 3)
+    browser: Image  # picture by the browser, (h, w, 3)
     calls: int
     triangles: int
-    milliseconds: float  # shortest time on the main thread of five frames, since other processes interfere
+    milliseconds: float  # shortest of five drawing times on the main thread
 
     @functools.cached_property
     def similarity(self) -> float:
@@ -96,7 +97,7 @@ class Pair:
 
 
 def ssim(a: Image, b: Image) -> float:
-    """Mean structural similarity of two pictures (h, w, 3), in grey (Wang et al., IEEE TIP 13, 2004)."""
+    """Return the mean structural similarity of two pictures in grey (Wang et al., IEEE TIP 13, 2004)."""
     x, y = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY).astype(np.float64) for image in (a, b))
     c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
 
@@ -110,13 +111,13 @@ def ssim(a: Image, b: Image) -> float:
 
 
 def sampled_scene() -> Scene:
-    """Compose an episode of the apartment with visual geoms."""
+    """Return the scene of an episode in the apartment, including visual geoms."""
     catalogue = Catalogue.load("apartment")
     return compose(sample_episode(catalogue, objects=24, seed=0), catalogue)
 
 
 def views(scene: Scene) -> tuple[View, ...]:
-    """Choose three walkable poses per room, one of them with markers."""
+    """Choose three walkable poses in each room. One of them has markers."""
     rng = np.random.default_rng(0)
     floor = navigable_floor(scene.catalogue)
     rooms = compiled_house(scene.catalogue).rooms
@@ -135,7 +136,7 @@ def views(scene: Scene) -> tuple[View, ...]:
 
 
 def _markers(scene: Scene, position: tuple[float, float], heading: float) -> tuple[Marker, ...]:
-    """Make a path straight ahead to a goal, and flagpoles over all objects, every third of them seen through walls."""
+    """Return markers for a path ahead and for all objects. A third of them are visible through walls."""
     ahead = np.array([np.cos(heading), np.sin(heading)])
     path = np.array([np.array(position) + k * ahead for k in (0.0, 3.0)])
     crumbs = breadcrumbs(path, scene.person.eye_height, 0.6)
@@ -148,7 +149,7 @@ def _markers(scene: Scene, position: tuple[float, float], heading: float) -> tup
 
 
 class Moments:
-    """States of a scene for views."""
+    """A scene whose person can be moved to different views."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -179,7 +180,7 @@ class Moments:
 
 
 def draw_pairs(browser: Any, scene: Scene, chosen: Sequence[View]) -> list[Pair]:
-    """Draw views with mjsim and with a Playwright browser that reads the files of a scene export."""
+    """Draw views with mjsim and with a Playwright browser that loads an exported scene."""
     moments = Moments(scene)
     files = export_scene(scene.catalogue)
     width, height = SIZE
@@ -211,7 +212,7 @@ def decoded(png: bytes) -> Image:
 
 @contextmanager
 def served(files: Mapping[str, bytes]) -> Iterator[str]:
-    """Serve a page with a `World3D`, and files by their paths. Yield its URL."""
+    """Serve a page with a `World3D` and the given files by path. Yield the URL of the page."""
 
     class Handler(http.server.SimpleHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -237,7 +238,7 @@ def served(files: Mapping[str, bytes]) -> Iterator[str]:
 
 
 def contact_sheet(pairs: Sequence[Pair]) -> Image:
-    """Arrange all pairs, one row per room: mjsim, browser, and their difference, amplified by four around grey."""
+    """Arrange pairs with one row per room: mjsim, browser, and their difference, amplified fourfold."""
     rows = []
     for room, grouped in itertools.groupby(pairs, lambda pair: pair.view.room):
         group = list(grouped)

@@ -1,6 +1,6 @@
-"""A contact sheet of all kinds of furniture, three pieces of each.
+"""Draw a contact sheet that shows three pieces of each kind of furniture.
 
-`python -m tools.furniture_sheet docs/pictures/furniture.webp` makes the sheet of docs/generated-houses.md.
+`python -m tools.furniture_sheet docs/pictures/furniture.webp` draws the sheet in docs/generated-houses.md.
 """
 
 import argparse
@@ -29,11 +29,11 @@ from mjsim.house.catalogue.model_files import read_model
 from mjsim.render import Renderer
 from mjsim.render.cameras import CameraPose
 
-CELL = (112, 84)  # size of a picture, pixels
+CELL = (112, 84)  # size of a picture in pixels
 COLUMNS = 18
-APART = 12.0  # distance between pieces, m
+APART = 12.0  # distance between pieces in metres
 FOVY = math.radians(38)
-PIECES = 3  # per kind
+PIECES = 3  # number of pieces of each kind
 Image = NDArray[np.uint8]
 
 
@@ -50,11 +50,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def pictures(kind: str) -> Iterator[Image]:
-    """Draw three pieces of a kind of furniture, (height, width, 3), RGB."""
+    """Draw three pieces of a kind of furniture. Yield RGB pictures (height, width, 3)."""
     room = Room("living_room", "living_room", kind, Rectangle(0.0, 0.0, APART * PIECES, 9.0))
     pieces: list[tuple[Piece, PiecePose]] = []
     placements: list[Placement] = []
-    seed = sum(map(ord, kind))  # the pieces of a kind have the materials of one home
+    seed = sum(map(ord, kind))  # all pieces of a kind get the materials of the same home
     look = draw_appearance(draw_palette(seed), stream(seed, "look"))
     for i in range(PIECES):
         piece = KINDS[kind].make(stream(seed, "sheet", kind, str(i)), look)
@@ -84,7 +84,7 @@ def pictures(kind: str) -> Iterator[Image]:
 
 
 def _camera(piece: Piece, place: PiecePose) -> CameraPose:
-    """Look from above the right side of a piece."""
+    """Return a camera that looks at a piece from above and from its right side."""
     w, d, h = piece.size
     low = max(0.0, h - 1.3) if piece.stands in ("hangs", "ceiling", "recess") else 0.0
     middle = np.array([place.x, place.y + (d / 2 if piece.stands != "ceiling" else 0.0), (low + h) / 2])
@@ -92,7 +92,7 @@ def _camera(piece: Piece, place: PiecePose) -> CameraPose:
     rise = -0.35 if piece.stands == "ceiling" else 0.4
     side = np.array([0.45, 1.0, rise])
     eye = middle + away * side / np.linalg.norm(side)
-    eye[2] = min(eye[2], 2.45)  # below the ceiling
+    eye[2] = min(eye[2], 2.45)  # stay below the ceiling
     return CameraPose.looking_at(eye, middle, FOVY)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of the documentation: a person's view under each assistance condition, taken from real trials."""
+"""Take the pictures of the documentation: a person's view under each assistance condition in real trials."""
 
 import contextlib
 import math
@@ -35,24 +35,24 @@ from mjsim.world.world import World
 
 Image = NDArray[np.uint8]
 
-# Distances to an object, m. Nearer objects are below the view of a person who looks straight ahead.
+# Range of distances to an object in metres. Nearer objects are not visible when looking straight ahead.
 APPROACHING = (2.3, 3.3)
-AT_A_BIN = (0.0, 2.2)  # distances to the middle of a bin, m
-MIN_WALK = 1.0  # time after which objects near the start have been approached, s
+AT_A_BIN = (0.0, 2.2)  # range of distances to the middle of a bin, in metres
+MIN_WALK = 1.0  # time in seconds after which the person must have walked to reach an object
 FACING = math.radians(20.0)
-MAX_TIME = 240.0  # simulated time within which every picture must be taken, s
+MAX_TIME = 240.0  # simulated time in seconds within which all pictures must be taken
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A moment of a trial."""
+    """The world at one moment of a trial, with the person's observation."""
 
     world: World
     observation: Observation
-    targets: Mapping[str, NDArray[np.float64]]  # object name -> middle of its bin, m, (3,)
+    targets: Mapping[str, NDArray[np.float64]]  # centre (3,) in metres of each object's bin, by object name
 
     def ahead(self, place: NDArray[np.float64], distance: tuple[float, float]) -> bool:
-        """Return True if the person faces a place (2,) or (3,), m, at a distance within a range, m."""
+        """Return True if the person faces a place within a range of distances, in metres."""
         offset = place[:2] - self.observation.position
         turn = math.remainder(math.atan2(offset[1], offset[0]) - self.observation.heading, math.tau)
         return distance[0] < float(np.hypot(*offset)) < distance[1] and abs(turn) < FACING
@@ -70,7 +70,7 @@ Trigger = Callable[[Snapshot], bool]
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture of a trial, taken at the first snapshot for which `trigger` is true."""
+    """A picture of a trial, which is taken at the first snapshot for which `trigger` returns True."""
 
     name: str
     trial: TrialConfig
@@ -78,11 +78,11 @@ class Shot:
 
 
 class _Done(LeaveSession):
-    """Raised when all pictures are taken."""
+    """Raised when all pictures have been taken."""
 
 
 class _ShotTaker:
-    """Viewer that takes pictures when their triggers are true."""
+    """A viewer that takes each picture when its trigger returns True."""
 
     def __init__(
         self, renderer: FirstPersonRenderer, shots: Sequence[Shot], targets: Mapping[str, NDArray[np.float64]]
@@ -107,12 +107,12 @@ class _ShotTaker:
 
 
 def after(seconds: float) -> Trigger:
-    """Trigger from a simulated time on, s."""
+    """Return a trigger that is true from a simulated time in seconds onwards."""
     return lambda snapshot: snapshot.observation.time >= seconds
 
 
 def approaching(snapshot: Snapshot) -> bool:
-    """Trigger if a hand is free, and an object in view is ahead."""
+    """Return True if a hand is free and a visible object is straight ahead."""
     seen = snapshot.observation
     if len(seen.carried) > 1 or seen.busy or seen.time < MIN_WALK:
         return False
@@ -122,12 +122,12 @@ def approaching(snapshot: Snapshot) -> bool:
 
 
 def carrying_two(snapshot: Snapshot) -> bool:
-    """Trigger if the person walks with both hands full."""
+    """Return True if the person walks with an object in each hand."""
     return len(snapshot.observation.carried) == 2 and not snapshot.observation.busy and snapshot.walking()
 
 
 def at_a_bin(snapshot: Snapshot) -> bool:
-    """Trigger if the bin of a carried object is close ahead."""
+    """Return True if the bin of a carried object is straight ahead and nearby."""
     return any(snapshot.ahead(snapshot.targets[name], AT_A_BIN) for name in snapshot.observation.carried)
 
 
@@ -140,14 +140,14 @@ SITUATIONS: Mapping[str, tuple[str, Trigger]] = {
 
 
 def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
-    """Run trials until all pictures are taken.
+    """Run trials until all pictures have been taken.
 
     Returns:
-        Frames by the names of the shots, uint8 RGB, (height, width, 3).
+        RGB frames (height, width, 3) as uint8, by the name of the shot.
 
     Raises:
-        RecordError: A picture could not be taken within four simulated minutes.
-        ExperimentError, MjsimError: A trial cannot be run, or nothing can be rendered.
+        RecordError: A trigger was not true within four simulated minutes.
+        ExperimentError, MjsimError: A trial or the rendering has failed.
     """
     taken: dict[str, Image] = {}
     for trial in dict.fromkeys(shot.trial for shot in shots):
@@ -171,12 +171,12 @@ def take_pictures(shots: Sequence[Shot], film: FilmConfig) -> dict[str, Image]:
 def contact_sheet(
     conditions: Sequence[str], frames: Mapping[tuple[str, str], Image], width: int = 480
 ) -> Image:
-    """Arrange frames by condition (rows) and situation (columns), with captions, as RGB, uint8, (height, width, 3).
+    """Arrange frames by condition (rows) and situation (columns), with captions. Return an RGB image.
 
     Args:
         conditions: Names of the conditions, from top to bottom.
         frames: Frames by condition and situation.
-        width: Width of a picture on the sheet, pixels.
+        width: Width of a picture on the sheet in pixels.
     """
     margin, caption = width // 40, width // 12
     height = round(width * 3 / 4)
@@ -204,7 +204,7 @@ def save_png(path: Path, rgb: Image) -> None:
 
 
 def _write(image: Image, text: str, x: int, y: int, size: int) -> None:
-    """Draw dark text centred at column `x` and row `y`."""
+    """Draw dark text with its centre at column `x` and row `y`."""
     face = cv2.FontFace("sans")
     left, _, width, _ = cv2.getTextSize((0, 0), text, (0, 0), face, size, 600)
     cv2.putText(image, text, (x - (left + width) // 2, y + size // 3), (30, 34, 40), face, size, 600)
@@ -225,18 +225,18 @@ WALK = TrialConfig(objects=6, assistance="optimal", seed=0, fidelity="event")  #
 def make_gallery(
     out: Path, film: FilmConfig, *, replace: bool, sheet_only: bool, frames: bool
 ) -> Iterator[Path]:
-    """Write the pictures of the documentation, and yield their paths.
+    """Write the pictures of the documentation and yield their paths.
 
     Args:
-        out: Folder of the pictures.
-        film: Size and profile of the pictures of the conditions.
-        replace: True to replace existing pictures.
+        out: Output folder.
+        film: Size and render profile of the pictures.
+        replace: True to overwrite existing pictures.
         sheet_only: True to make only the contact sheet.
-        frames: True to also write the frames of the contact sheet, in full size.
+        frames: True to also write each frame of the contact sheet in full size.
 
     Raises:
-        RecordError: A picture exists already, or could not be taken within four simulated minutes.
-        RenderError: Nothing can be drawn.
+        RecordError: A picture already exists, or its trigger was not true within four simulated minutes.
+        RenderError: Rendering is not possible.
     """
     shots = () if sheet_only else SHOTS
     names = [*(f"{shot.name}.png" for shot in shots), SHEET, *(() if sheet_only else (records.TOPDOWN,))]
@@ -266,5 +266,5 @@ def make_gallery(
 
 
 def _fail(warning: str) -> None:
-    # A warning is an error, because the gallery needs the floor plan of the trial.
+    # Warnings are treated as errors, because the gallery needs the floor plan of the trial.
     raise RenderError(warning)

@@ -1,4 +1,4 @@
-"""`mjsim gallery`: the pictures of the documentation."""
+"""The command `mjsim gallery`, which makes the pictures of the documentation."""
 
 import argparse
 from pathlib import Path

@@ -1,6 +1,6 @@
-"""A contact sheet of ten generated homes, of 1 to 10 rooms.
+"""Draw a contact sheet of ten generated homes, with 1 to 10 rooms.
 
-`python -m tools.homes_sheet docs/pictures/homes.webp` makes the sheet of docs/generated-houses.md.
+`python -m tools.homes_sheet docs/pictures/homes.webp` draws the sheet in docs/generated-houses.md.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Figure of the paper's four levels of difficulty."""
+"""Draw a figure of the four levels of difficulty in the paper."""
 
 import contextlib
 from pathlib import Path
@@ -16,10 +16,10 @@ LEVELS, LEVEL_OBJECTS = "levels.png", (6, 12, 18, 24)
 
 
 def make_levels(out: Path, seed: int, *, replace: bool) -> Path:
-    """Draw the four levels of a house, with the shortest route in the first. Return the path of the picture.
+    """Draw a house at the four levels, with the shortest route at the first one. Return the picture's path.
 
     Raises:
-        RecordError: The picture exists already.
+        RecordError: The picture already exists.
     """
     path = out / LEVELS
     check_file(path, replace=replace)

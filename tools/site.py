@@ -1,4 +1,4 @@
-"""Hooks of mkdocs.yml: a run on the front page, diagrams without scripts, and links that also work on GitHub."""
+"""Hooks for MkDocs: add a demo to the front page, and adapt links that also have to work on GitHub."""
 
 import re
 import subprocess
@@ -10,11 +10,11 @@ from typing import Any
 from mkdocs.structure.files import File
 
 RUN = ["run", "--assistance", "guided", "--fidelity", "event", "--no-video", "--no-floor-plan"]
-PAGE = "demo.html"  # page of the run; docs/index.md embeds it
+PAGE = "demo.html"  # page with the demo, which docs/index.md embeds
 
 
 def on_files(files: Any, config: Any, **_: Any) -> Any:
-    """Add the page of a run, unless the tutorial is not run either."""
+    """Add the demo page, unless the execution of notebooks is disabled."""
     if not config.plugins["mkdocs-jupyter"].config["execute"]:
         return files
     with tempfile.TemporaryDirectory() as folder:
@@ -28,12 +28,12 @@ def on_files(files: Any, config: Any, **_: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Keep the text of links that lead out of docs/."""
+    """Replace links to files outside docs/ by their text."""
     return re.sub(r"\[([^\]]*)\]\(\.\./[^)]*\)", r"\1", markdown)
 
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
-    """Let the links of a notebook lead to pages; MkDocs does that for Markdown alone."""
+    """Convert a notebook's links to Markdown files into links to pages, which MkDocs does not do itself."""
     if not page.file.src_uri.endswith(".ipynb"):
         return html
     return re.sub(r'href="([\w-]+)\.md(#[^"]*)?"', r'href="../\1/\2"', html)

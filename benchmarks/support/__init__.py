@@ -1,1 +1,1 @@
-"""Code shared by benchmarks and their tests."""
+"""Code that is shared by the benchmarks and their tests."""

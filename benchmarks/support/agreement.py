@@ -1,4 +1,4 @@
-"""The same trials at every fidelity: delivered objects and metrics."""
+"""Run the same trials at every fidelity and compare the delivered objects and the metrics."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,7 @@ from mjsim.values.options import FIDELITIES
 
 @dataclass(frozen=True)
 class TierResult:
-    """Result of a trial at one fidelity. `delivered` names the objects in their receptacles at the end."""
+    """The result of a trial at one fidelity. `delivered` contains the names of the delivered objects."""
 
     config: TrialConfig
     delivered: frozenset[str]
@@ -30,7 +30,7 @@ class TierResult:
 
 
 def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
-    """Run a trial at every fidelity, without a record on disk. Its own fidelity is ignored."""
+    """Run a trial at every fidelity, without writing a record. The fidelity in its settings is ignored."""
     scene = compose(trial_episode(config, house), house.catalogue)
     results = {}
     for fidelity in FIDELITIES:
@@ -45,7 +45,7 @@ def run_in_tiers(config: TrialConfig, house: House) -> dict[str, TierResult]:
 
 
 def run_all_in_tiers(configs: Sequence[TrialConfig], *, workers: int = 1) -> Iterator[dict[str, TierResult]]:
-    """Run trials at every fidelity in several processes. Yield results by fidelity, trial by trial."""
+    """Run trials at every fidelity in several processes. Yield each trial's results by fidelity."""
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(_run_one, configs)
 
@@ -54,4 +54,4 @@ def _run_one(config: TrialConfig) -> dict[str, TierResult]:
     return run_in_tiers(config, _house(config.house))
 
 
-_house = cache(House.load)  # one per process
+_house = cache(House.load)  # every process loads the house only once

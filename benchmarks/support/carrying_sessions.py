@@ -1,7 +1,7 @@
-"""Sessions in which two objects are carried through the house at full speed, with the errors of their welds.
+"""Sessions in which the person carries two objects through the house at full speed, to measure weld errors.
 
-The person picks up two objects nearby and walks to another point of the house by the shortest path, at 1.4 m/s even
-around corners.
+The person picks up two nearby objects and walks to another point of the house along the shortest path. The
+speed is 1.4 m/s, even around corners.
 """
 
 import math
@@ -20,28 +20,28 @@ from mjsim.world.walking.polyline import path_length, point_along, project
 from mjsim.world.world import World
 
 SEED = 2027
-SPEED = 1.4  # m/s
-LOOK_AHEAD = 0.3  # m
-BRAKING = 1.5  # m/s^2
-PICK_DISTANCE = 0.55  # m
-MIN_LENGTH = 6.0  # m of the path
-MAX_STEPS = 900  # control steps of a walk
-ARRIVED = 0.1  # m
+SPEED = 1.4  # walking speed in m/s
+LOOK_AHEAD = 0.3  # look-ahead distance along the path, in metres
+BRAKING = 1.5  # deceleration at the end of the path, in m/s^2
+PICK_DISTANCE = 0.55  # distance from the person to objects that can be picked up, in metres
+MIN_LENGTH = 6.0  # minimum length of a path in metres
+MAX_STEPS = 900  # maximum number of control steps per walk
+ARRIVED = 0.1  # distance from the goal at which a walk ends, in metres
 
 
 @dataclass(frozen=True)
 class CarryResult:
-    """Result of a walk with two objects, for T control steps.
+    """The result of a walk with two objects that takes T control steps.
 
     Attributes:
-        session: Number of the session, by which `run_session` repeats it.
+        session: Number of the session, with which `run_session` can repeat it.
         lost: Number of objects that slipped out of a hand.
         length: Length of the path, m.
         speed: Speed of the body, m/s, (T,).
         turn: Yaw rate of the body, rad/s, (T,).
-        stretch: Weld errors, m, (T, 2), NaN if nothing is held.
-        twist: Weld errors, rad, (T, 2).
-        penetration: Deepest penetration, m, (T,).
+        stretch: Translational weld error of each hand, m, (T, 2), or NaN if the hand is empty.
+        twist: Rotational weld error of each hand, rad, (T, 2).
+        penetration: Depth of the deepest penetration, m, (T,).
     """
 
     session: int
@@ -57,7 +57,7 @@ class CarryResult:
 
 
 def run_session(house: House, number: int) -> CarryResult:
-    """Run session `number`. Equal numbers give bit-identical sessions."""
+    """Run the session with this number. The same number always gives a bit-identical result."""
     rng = np.random.default_rng([SEED, number])
     path = _path(house, rng)
     episode = _episode(house, number, path[0], rng)
@@ -106,7 +106,7 @@ def _path(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _episode(house: House, number: int, start: NDArray[np.float64], rng: np.random.Generator) -> Episode:
-    """Place the person at a floor point (2,) m with two random objects in front, one on each side."""
+    """Place the person at a floor point (2,) with a random object in front of each hand."""
     heading = float(rng.uniform(-math.pi, math.pi))
     objects = []
     for i, side in enumerate((0.8, -0.8)):
@@ -118,7 +118,7 @@ def _episode(house: House, number: int, start: NDArray[np.float64], rng: np.rand
 
 
 def _towards(path: NDArray[np.float64], position: NDArray[np.float64], heading: float) -> Action:
-    """Return a move at full speed along a path (k, 2) m, turning into its direction and slowing at its end."""
+    """Return a move that follows a path (k, 2) at full speed and slows down at its end."""
     x, y = (float(v) for v in position)
     arc, _ = project(path, x, y)
     to_x, to_y = point_along(path, arc + LOOK_AHEAD)

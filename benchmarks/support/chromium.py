@@ -1,4 +1,4 @@
-"""The system's Chromium, driven by Playwright, headless and with software WebGL."""
+"""Start the system's Chromium with Playwright, in headless mode and with software WebGL."""
 
 import os
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, sync_playwright
 
 CHROMIUM = Path("/usr/bin/chromium")
-# Mesa's software renderer is about four times as fast as the browser's.
+# WebGL is about four times as fast with Mesa's software renderer as with the browser's own renderer.
 WEBGL = ["--use-angle=gles-egl", "--ignore-gpu-blocklist", "--enable-unsafe-swiftshader"]
 FLAGS = ["--no-sandbox", "--disable-background-networking", *WEBGL]
 

@@ -1,4 +1,4 @@
-"""Speed of the environment: steps and resets per core-second, and the speed-up of several processes.
+"""Measure the speed of the environment: steps and resets per core-second, and the speed-up by processes.
 
 python -m benchmarks.support.environment_speed
 """
@@ -23,11 +23,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
 
 
 def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple[float, float]:
-    """Return steps and simulated seconds per second of CPU time, with random actions and 6 objects."""
+    """Return steps and simulated seconds per second of CPU time, for random actions and 6 objects."""
     env = gymnasium.make(ID, episodes=1, disable_env_checker=True, **options)
     env.action_space.seed(0)
     env.reset(seed=0)
-    for _ in range(20):  # numba, caches and the OpenGL context
+    for _ in range(20):  # warm up the compiler, the caches and the OpenGL context
         env.step(env.action_space.sample())
     steps, simulated, spent = 0, 0.0, 0.0
     while spent < seconds:
@@ -43,7 +43,7 @@ def steps_per_second(options: dict[str, Any], seconds: float = SECONDS) -> tuple
 
 
 def seconds_per_reset(episodes: int | None, resets: int) -> float:
-    """Return the mean CPU time of a reset, s, to one of `episodes` houses that repeat, or to new houses if None."""
+    """Return the mean CPU time of a reset in seconds. Without `episodes`, every reset uses a new house."""
     env = gymnasium.make(ID, episodes=episodes, disable_env_checker=True)
     for seed in range(episodes or 1):
         env.reset(seed=seed)
@@ -56,9 +56,10 @@ def seconds_per_reset(episodes: int | None, resets: int) -> float:
 
 
 def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
-    """Return the speed of `processes` environments in as many processes, relative to one environment in this process.
+    """Return the speed of several environments in parallel processes, relative to a single environment.
 
-    Both are measured alternately, in wall time, with images. Cheap steps would be dominated by communication.
+    Both are timed alternately with image observations. Without images, communication between processes would
+    dominate.
     """
     options: dict[str, Any] = {"episodes": 1, "observations": ("state", "rgb")}
     one = gymnasium.make_vec(ID, num_envs=1, vectorization_mode="sync", **options)
@@ -66,11 +67,11 @@ def vector_speedup(processes: int, steps: int = 300, rounds: int = 4) -> float:
         ID,
         num_envs=processes,
         vectorization_mode="async",
-        vector_kwargs={"context": "spawn"},  # OpenGL does not survive a fork
+        vector_kwargs={"context": "spawn"},  # OpenGL contexts cannot be used after a fork
         **options,
     )
     rates = [0.0, 0.0]
-    for number in range(rounds + 1):  # the first round warms up
+    for number in range(rounds + 1):  # the first round only warms up
         for i, envs in enumerate((one, many)):
             envs.reset(seed=0)
             actions = envs.action_space.sample()

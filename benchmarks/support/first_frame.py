@@ -1,4 +1,4 @@
-"""Time from opening the link of a visit until the house is loaded and Start can be pressed."""
+"""Measure the time from opening the link of a visit until the Start button can be pressed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,21 +10,21 @@ from benchmarks.support.chromium import chromium_browser
 from benchmarks.support.play_server import PATIENCE, TASK_ALONE, PlayProcess, ProgressReport
 
 SLOW = {"offline": False, "latency": 80, "downloadThroughput": 10e6 / 8, "uploadThroughput": 10e6 / 8}
-# Time since the link was opened, ms, once Start is shown, which is when the house is loaded and compiled
+# Time in ms until the Start button appears, which is when the house has been loaded and compiled
 PLAYABLE = """() => {
   const start = document.querySelector("#panel[open] button.button:enabled");
   return document.querySelector("#play[data-phase=ready]") && start?.checkVisibility() && performance.now();
 }"""
-WIDTH, HEIGHT = 1280, 720  # px
+WIDTH, HEIGHT = 1280, 720  # size of the browser window in pixels
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A visit that was opened.
+    """Measurements of opening a visit in the browser.
 
     Attributes:
-        seconds: Time from opening the link until Start could be pressed, s.
-        megabytes: Data received, including what loads later, MB.
+        seconds: Time from opening the link until Start can be pressed, s.
+        megabytes: Received data in MB, including data that is loaded later.
     """
 
     seconds: float
@@ -34,9 +34,9 @@ class Opened:
 def measure_first_frame(
     folder: Path, tries: int, report: ProgressReport, *words: str
 ) -> dict[str, dict[str, Any]]:
-    """Measure cases of opening a visit, each as a median of some tries, except for the first visit to a server."""
+    """Measure how long it takes to open a visit in several cases, usually as the median of `tries` runs."""
     cases: dict[str, list[Opened]] = {}
-    slots = "--sessions", str(3 * tries + 1)  # closed pages keep their slots for a while
+    slots = "--sessions", str(3 * tries + 1)  # the server reserves a slot for a while after a page is closed
     with PlayProcess(folder, *TASK_ALONE, *slots, *words) as server, chromium_browser() as browser:
         report("the first visit to a server that has just started")
         cases["server just started"] = [_open(_context(browser), server)]
@@ -70,7 +70,7 @@ def _open(context: BrowserContext, server: PlayProcess, *, slow: bool = False) -
 
 
 def _count(page: Page, slow: bool) -> list[float]:
-    """Count received bytes: responses as transferred, and socket messages before compression."""
+    """Count received bytes: HTTP responses as transferred, and socket messages before compression."""
     came: list[float] = []
     session = page.context.new_cdp_session(page)
     session.send("Network.enable")

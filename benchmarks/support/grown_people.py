@@ -1,4 +1,4 @@
-"""A study whose participants have all finished: its file, database and visits, made without a server."""
+"""Create a study that all participants have finished, with its file, database and visits."""
 
 import asyncio
 import hashlib
@@ -39,7 +39,7 @@ BEGAN = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 def fill_study(folder: Path, real: Mapping[str, Sequence[Source]], people: int) -> Path:
-    """Write the study to a new folder. Return the study file."""
+    """Write the study to a new folder. Return the path of the study file."""
     folder.mkdir(parents=True)
     file = folder / "study.toml"
     file.write_text(STUDY.format(people=people))
@@ -57,7 +57,7 @@ async def _make(url: str, name: str, file_hash: str) -> None:
 
 
 def _fill(engine: Engine, tokens: Sequence[str], phases: Sequence[str]) -> None:
-    """Add all participants in one transaction, because many transactions would take most of the time."""
+    """Add all participants in a single transaction, which is much faster than one transaction each."""
     people, places, passed, given, trials = [], [], [], [], []
     for number, token in enumerate(tokens, start=1):
         began = BEGAN + timedelta(minutes=number)

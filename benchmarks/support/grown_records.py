@@ -1,4 +1,4 @@
-"""Records of many trials, made from a few real ones by changing seeds, names and checksums."""
+"""Create the records of many trials by copying a few real ones with other seeds, names and checksums."""
 
 import hashlib
 import itertools
@@ -25,10 +25,10 @@ CONDITIONS = "none", "optimal"
 
 @dataclass(frozen=True)
 class Source:
-    """A real run directory: its files that depend on the seeds, and all checksums."""
+    """The record of a real trial: the contents of the files that depend on seeds, and all checksums."""
 
     path: Path
-    events: tuple[str, str]  # the line of the start event, and all others
+    events: tuple[str, str]  # the line of the start event, and the lines of all other events
     episode: Mapping[str, Any]
     metrics: Mapping[str, Any]
     sums: Mapping[str, str]
@@ -42,7 +42,7 @@ class Source:
         return cls(path, (start, others), episode, metrics, read_checksums(path))
 
     def grow(self, trial: TrialConfig, inputs: Inputs, folder: Path) -> None:
-        """Write the record of a trial as if it went like this one. Large files are linked."""
+        """Write a copy of this record for another trial with other seeds. Large files are linked."""
         changed = {name: getattr(trial, name) for name in SEEDS}
         episode = json.dumps({**self.episode, "seed": trial.house_seed})
         changed["fingerprint"] = fingerprint(trial, inputs)
@@ -68,14 +68,14 @@ class Source:
 
 
 def design_of(trials: int) -> Design:
-    """Return a design with half of the trials without assistance and half with it, paired by seed."""
+    """Return a design with pairs of trials, one without and one with assistance, that share a seed."""
     return factorial(
         assistance=CONDITIONS, users=("follower",), seeds=range(trials // 2), objects=(1,), **_same()
     )
 
 
 def batch_words(trials: int, out: Path) -> list[str]:
-    """Return the command line that runs this design."""
+    """Return the command-line arguments that run this design."""
     return [
         *("batch", "--objects", "1", "--fidelity", "event", "--no-regret"),
         *("--assistance", ",".join(CONDITIONS), "--seeds", f"0:{trials // 2}", "--out", str(out)),
@@ -83,7 +83,7 @@ def batch_words(trials: int, out: Path) -> list[str]:
 
 
 def real_trials(trials: int, out: Path, workers: int) -> dict[str, list[Source]]:
-    """Run the real trials that `out` does not hold yet. Return them by assistance."""
+    """Run the real trials that are missing in `out`. Return all real trials by assistance."""
     run_batch(design_of(trials), out, workers=workers)
     found: dict[str, list[Source]] = {}
     for path in sorted((out / TRIALS).iterdir()):
@@ -93,7 +93,7 @@ def real_trials(trials: int, out: Path, workers: int) -> dict[str, list[Source]]
 
 
 def grow_batch(real: Mapping[str, Sequence[Source]], trials: int, out: Path) -> None:
-    """Write the folder of a batch whose trials are all finished, without its tables.
+    """Write the folder of a batch in which all trials are finished but the tables are missing.
 
     Raises:
         RuntimeError: A record does not match the design.
@@ -110,7 +110,7 @@ def grow_batch(real: Mapping[str, Sequence[Source]], trials: int, out: Path) -> 
 
 
 def grow_visits(real: Mapping[str, Sequence[Source]], places: Iterable[Path]) -> None:
-    """Write a record to each place, each for another person."""
+    """Write a record for a different participant to each path."""
     sources = itertools.cycle(source for some in real.values() for source in some)
     for number, place in enumerate(places):
         source = next(sources)

@@ -1,4 +1,4 @@
-"""Figures of a generated home: its files, the geometry of its model, rooms and openings of its recipe."""
+"""Measure a generated home: its files, the geometry of its model, and the rooms and doors in its recipe."""
 
 import hashlib
 import itertools
@@ -30,21 +30,21 @@ from mjsim.house.check import check_house_name
 from mjsim.house.compiled.footprint import ClearanceField
 from mjsim.house.compiled.house import CompiledHouse, compiled_house
 
-DRAWN = 10  # every tenth home is exported for the browser, to count draw calls
-CELL = 0.0125  # m
-BAND = (0.05, 1.8)  # heights of obstacles for a person, m
-WAY = 0.70  # width of a way to furniture, m
+DRAWN = 10  # every tenth home is exported for the browser to count its draw calls
+CELL = 0.0125  # size of a grid cell in metres
+BAND = (0.05, 1.8)  # heights between which furniture is an obstacle for a person, in metres
+WAY = 0.70  # required width of the way to furniture, in metres
 USUAL, LARGE = (
     0.50,
     0.58,
-)  # widths of default and large people (radius 0.20 and 0.24 m) with 0.05 m clearance, m
-POCKET = 0.01  # smallest pocket that counts, m2 of floor for the middle of a body
-REACH = 0.60  # largest distance from the middle of a person to furniture in use, m
-BEFORE_WINDOW = 0.5  # depth of the zone in front of a window, m
-HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # of rays in doorways, m
-SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)  # groups of geoms that rays hit
+)  # body widths of default and large people (radii 0.20 and 0.24 m) plus 0.05 m clearance, in metres
+POCKET = 0.01  # pockets of the floor up to this area in m2 are ignored
+REACH = 0.60  # largest distance at which a person can use furniture, in metres
+BEFORE_WINDOW = 0.5  # depth of the zone in front of a window, in metres
+HEIGHTS, ACROSS = (0.1, 0.5, 1.0, 1.5, 1.9), (-0.15, -0.05, 0.0, 0.05, 0.15)  # positions of rays in metres
+SOLID = np.array([1, 0, 0, 1, 0, 0], np.uint8)  # geom groups that rays can hit
 UNUSED = ("radiator", "floor_lamp", "bush", "tree", "snake_plant", "palm", "cactus", "fern_stand")
-KITCHENS = ("straight_kitchen", "corner_kitchen")  # each has a sink, a cooker and a fridge
+KITCHENS = ("straight_kitchen", "corner_kitchen")  # kitchens with a sink, a cooker and a fridge
 SEATS = {"sofa": 2, "corner_sofa": 4, "bench": 2} | dict.fromkeys(
     ("armchair", "dining_chair", "stool", "bar_stool", "office_chair", "pouf"), 1
 )
@@ -60,7 +60,7 @@ THINGS: Mapping[str, tuple[str, ...]] = {
 
 
 def figures(home: tuple[int, int]) -> dict[str, Any]:
-    """Return all figures of the home of (rooms, seed), JSON-ready."""
+    """Return all measurements of the home with the given (rooms, seed), as JSON-ready data."""
     about: dict[str, Any] = {"rooms": home[0], "seed": home[1], "draws": None}
     try:
         files, about["make_s"] = _made(home)
@@ -77,7 +77,7 @@ def figures(home: tuple[int, int]) -> dict[str, Any]:
                 scene = json.loads(export_scene(catalogue)[SCENE])
                 about["draws"] = scene["sizes"][HOUSE]["draw_calls"]
             measured = _Home(compiled_house(catalogue), plan).figures()
-    except Exception as error:  # with any error, the home cannot be used
+    except Exception as error:  # any error makes the home unusable
         return {**about, "failure": f"{type(error).__name__}: {error}"}
     return {
         **about,
@@ -93,7 +93,7 @@ def remade(home: tuple[int, int]) -> str:
 
 
 def _made(home: tuple[int, int]) -> tuple[Mapping[str, bytes], float]:
-    """Return the files of a home, and the CPU time of plan and furniture, s."""
+    """Return the files of a home, and the CPU time in seconds for its plan and furniture."""
     start = time.process_time()
     recipe, furnishing = generate(home[1], home[0])
     seconds = time.process_time() - start
@@ -107,13 +107,13 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A piece of furniture with the bounding boxes of its geoms, in rows of x0, y0, z0, x1, y1, z1, m."""
+    """A piece of furniture. Bounding boxes are rows of x0, y0, z0, x1, y1, z1 in metres."""
 
     room: str
     kind: str
-    shown: NDArray[np.float64]  # boxes of all geoms, (n, 6)
-    solid: NDArray[np.float64]  # boxes of obstacles for a person, (k, 6)
-    form: str  # hash of shapes, places and colours
+    shown: NDArray[np.float64]  # bounding boxes of all geoms, (n, 6)
+    solid: NDArray[np.float64]  # bounding boxes of the geoms that are obstacles for a person, (k, 6)
+    form: str  # hash of the shapes, positions and colours of all geoms
 
     @property
     def stands(self) -> bool:
@@ -121,13 +121,13 @@ class _Piece:
 
     @property
     def size(self) -> tuple[float, ...]:
-        """Size to 0.1 m, the longer side first."""
+        """The size rounded to 0.1 m, with the longer horizontal side first."""
         x, y, z = np.round(self.shown[:, 3:].max(axis=0) - self.shown[:, :3].min(axis=0), 1).tolist()
         return max(x, y), min(x, y), z
 
 
 class _Home:
-    """A compiled home with a grid of distances from its floor to the nearest obstacle."""
+    """A compiled home with a grid that contains the distance from each floor cell to the nearest obstacle."""
 
     def __init__(self, house: CompiledHouse, plan: HomePlan) -> None:
         self._model, self._data, self._plan = house.model, house.data, plan
@@ -161,7 +161,7 @@ class _Home:
         }
 
     def _all_pieces(self) -> Iterator[_Piece]:
-        """Yield furniture and decoration: bodies named `room/kind_number`."""
+        """Yield all furniture and decoration, whose bodies are named `room/kind_number`."""
         model, data = self._model, self._data
         for body in range(1, model.nbody):
             room, _, name = model.body(body).name.partition("/")
@@ -171,7 +171,7 @@ class _Home:
                 continue
             looks = (model.geom_type, model.geom_pos, model.geom_size, model.mat_rgba[model.geom_matid])
             form = np.round(np.column_stack([of[geoms] for of in looks]), 3)
-            geoms = geoms[model.geom_type[geoms] != mujoco.mjtGeom.mjGEOM_PLANE]  # drawn shadows
+            geoms = geoms[model.geom_type[geoms] != mujoco.mjtGeom.mjGEOM_PLANE]  # drawn shadows do not count
             turns, boxes = data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms]
             middles = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, boxes[:, :3])
             halves = np.einsum("gij,gj->gi", np.abs(turns), boxes[:, 3:])
@@ -185,13 +185,13 @@ class _Home:
         return slice(max(i, 0), u + 1), slice(max(j, 0), v + 1)
 
     def _free(self, width: float) -> NDArray[np.bool_]:
-        """Return cells from which a disc of this diameter reaches all rooms. There are none if it cannot."""
+        """Return the cells from which a disc of diameter `width` can reach all rooms."""
         islands, _ = label(self._field.distance >= width / 2)
         seen = [set(np.unique(islands[cells]).tolist()) for cells in self._rooms.values()]
         return np.isin(islands, list(set.intersection(*seen) - {0}))
 
     def _way(self) -> float:
-        """Return the diameter of the widest disc that reaches all rooms, m, to a cell, up to 1.2 m."""
+        """Return the diameter in metres of the widest disc that can reach all rooms, up to 1.2 m."""
         low, high = 0, round(1.2 / CELL)
         while low < high:
             middle = (low + high + 1) // 2
@@ -199,13 +199,13 @@ class _Home:
         return low * CELL
 
     def _pockets(self) -> int:
-        """Count areas of the floor that default people reach and large people do not."""
+        """Count the areas of the floor that default people can reach but large people cannot."""
         usual, _ = label(self._free(USUAL))
         islands, _ = label((self._field.distance >= LARGE / 2) & (usual > 0))
         return int((np.bincount(islands[islands > 0]) * CELL**2 > POCKET).sum()) - 1
 
     def _unusable(self, pieces: list[_Piece]) -> Iterator[str]:
-        """Yield furniture that is not reachable from within its room by ways of `WAY`. Plants and lamps are ignored."""
+        """Yield furniture that is not reachable on a way of width `WAY`, except plants and lamps."""
         free = self._free(WAY - CELL)
         for room, cells in self._rooms.items():
             away = np.full(free.shape, math.inf)
@@ -216,7 +216,7 @@ class _Home:
                     yield f"{room}: {piece.kind}"
 
     def _clear(self, door: Door) -> float:
-        """Return the clear width of a doorway, m, by rays from its middle to both sides."""
+        """Return the clear width of a doorway in metres, measured with rays from its middle to both sides."""
         floor = self._plan.room(door.rooms[0]).floor
         middle = floor.along(door.side, door.center, door.center, -WALL / 2, -WALL / 2).center
         along, across = np.eye(3)[[0, 1] if door.side in ("south", "north") else [1, 0]]
@@ -243,7 +243,7 @@ class _Home:
 
 
 def _door_graph(plan: HomePlan) -> str:
-    """Return the doors between rooms by use. Plans that differ only in the names of bedrooms have equal graphs."""
+    """Describe which rooms have doors between them, independently of the numbering of bedrooms."""
     uses = {room.key: room.use for room in plan.rooms} | {"outside": "outside"}
     bedrooms = [key for key, use in uses.items() if use == "bedroom"]
     forms = []

@@ -1,4 +1,4 @@
-"""Time for drawing the HUD in a real session: every HUD state of a trial is drawn in turn.
+"""Measure the time for drawing the HUD, with all HUD states of a real trial.
 
 python -m benchmarks.support.hud_speed --assistance optimal --objects 6
 """
@@ -25,12 +25,12 @@ from mjsim.values.observation import Observation
 from mjsim.world.world import World
 
 SIZE = (640, 480)
-# Bytes written between two frames, as by rendering, to evict the panels from the processor's cache
+# Bytes written between two frames so that the HUD panels leave the processor's cache, as rendering would do
 BETWEEN_FRAMES = 16 << 20
 
 
 class _Recorder:
-    """A viewer that keeps the HUD states and draws nothing."""
+    """A viewer that only records the HUD states."""
 
     def __init__(self) -> None:
         self.states: list[HudState] = []
@@ -57,13 +57,13 @@ def hud_milliseconds(
     size: tuple[int, int] = SIZE,
     clock: Callable[[], float] = time.process_time,
 ) -> NDArray[np.float64]:
-    """Measure the time for composing each HUD state over a frame, ms, shape (states,).
+    """Measure the time in ms for drawing each HUD state over a frame, shape (states,).
 
     Args:
-        compositor: Draws the states. Its caches between frames are part of the measurement.
-        states: States of a session, in order.
-        size: Width and height of the frame, px.
-        clock: Returns seconds.
+        compositor: The compositor that draws the states. Its caches persist from one state to the next.
+        states: HUD states of a session, in order.
+        size: Width and height of the frame in pixels.
+        clock: A function that returns seconds.
     """
     frame = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
     elsewhere = np.zeros(BETWEEN_FRAMES, np.uint8)
@@ -77,7 +77,7 @@ def hud_milliseconds(
 
 
 def summary(times: NDArray[np.float64]) -> dict[str, float]:
-    """Summarize times (frames,), ms. The first is reported separately."""
+    """Summarize times (frames,) in ms. The first frame is reported separately."""
     later = times[1:]
     return {
         "frames": len(times),

@@ -1,4 +1,4 @@
-"""Stress sessions: their episodes, and running them on several cores with a progress bar."""
+"""Run stress sessions on several cores with a progress bar, and create their episodes."""
 
 import functools
 import math
@@ -27,13 +27,14 @@ def run_sessions(
     only: int | None = None,
     house: str = "apartment",
 ) -> list[T]:
-    """Run sessions 0 to count - 1, or only one of them. Return the results in order.
+    """Run the sessions 0 to count - 1, or only one of them. Return the results in order.
 
     Args:
-        run: Runs the session of a number. It must be a module's function, which can be pickled.
+        run: Function that runs the session with a given number. It must be picklable, and so defined in a
+            module.
         count: Number of sessions.
         workers: Number of processes (default: one per core).
-        only: Number of the only session to run, to reproduce a failure.
+        only: Number of a single session to run, in order to reproduce a failure.
         house: Name of the house, or path of its catalogue.
     """
     numbers = range(count) if only is None else range(only, only + 1)
@@ -46,7 +47,7 @@ def _results(run: Callable[[House, int], T], numbers: Sequence[int], workers: in
         house = House.load(name)
         yield from (run(house, number) for number in numbers)
         return
-    # Processes are spawned because thread pools do not survive a fork.
+    # Processes are spawned, because thread pools do not work after a fork.
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         yield from pool.map(functools.partial(_run_in_worker, run, name), numbers)
 
@@ -63,7 +64,7 @@ def _house(name: str) -> House:
 def upright_object(
     house: House, number: int, model: str, xy: NDArray[np.float64], height: float, yaw: float
 ) -> PlacedObject:
-    """Return object `o<number>` of a session at a floor point (2,) m and a height, m, turned by a yaw, rad."""
+    """Return object `o<number>` of a session, upright at a floor point (2,) and height, turned by `yaw`."""
     x, y = xy.tolist()
     quaternion = (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
     category = house.catalogue.objects[model].category
@@ -73,7 +74,7 @@ def upright_object(
 def session_episode(
     house: House, number: int, start: NDArray[np.float64], heading: float, objects: Sequence[PlacedObject]
 ) -> Episode:
-    """Return the episode of a session, with the person at a floor point (2,) m with a heading, rad."""
+    """Return the episode of a session in which the person starts at a floor point (2,) with a heading."""
     catalogue = house.catalogue
     return Episode(
         house=catalogue.name,

@@ -1,8 +1,8 @@
-"""Seeded placements over all object models, receptacles and fill levels.
+"""Sessions with random placements that cover all object models, receptacles and fill levels.
 
-In a session, the person stands at a random point near a receptacle, with objects of its category on the floor around.
-The person picks up one after another and places it into the receptacle, which fills up. Only the person's hands move
-objects.
+In each session, the person stands at a random point near a receptacle. Objects of its category are on the
+floor around the person, who picks up one after another and places it into the receptacle until it is full.
+Only the person's hands move objects.
 """
 
 import math
@@ -22,13 +22,13 @@ from mjsim.values.options import WorldOptions
 from mjsim.world.world import World
 
 SEED = 2026
-LEVELS = 6  # placements per session, into a receptacle with 0 to 5 objects
-AROUND = (0.4, 0.92)  # distances from the person to the objects on the floor, m
-STRAY = 0.3  # largest distance from the receptacle's approach point in x and in y, m
-REACH = 0.8  # largest distance from the person to the receptacle's volume, m
-SPACING = 0.3  # smallest distance between objects on the floor, m
-DROP = 0.01  # initial height of objects, m
-MAX_STEPS = 400  # most control steps of one motion
+LEVELS = 6  # number of placements per session, into receptacles with 0 to 5 objects
+AROUND = (0.4, 0.92)  # range of distances from the person to the objects on the floor, in metres
+STRAY = 0.3  # largest deviation of the person from the receptacle's approach point in x and y, in metres
+REACH = 0.8  # largest distance from the person to the receptacle's volume, in metres
+SPACING = 0.3  # smallest distance between objects on the floor, in metres
+DROP = 0.01  # initial height of the objects above the floor, in metres
+MAX_STEPS = 400  # maximum number of control steps per motion
 NOT_TRIED = ("pick_failed", "refused")
 _OUTCOMES = (
     EventKind.PICKED, EventKind.PICK_FAILED, EventKind.PLACED, EventKind.PLACE_FAILED, EventKind.GRIP_LOST,
@@ -37,14 +37,14 @@ _OUTCOMES = (
 
 @dataclass(frozen=True)
 class Placement:
-    """An object that was picked up and, unless `outcome` is `pick_failed`, placed.
+    """An attempt to pick up an object and place it into a receptacle.
 
     Attributes:
-        session: Number of the session, by which `run_session` repeats it.
-        fill: Number of objects in the receptacle before.
+        session: Number of the session, with which `run_session` can repeat it.
+        fill: Number of objects that were in the receptacle before.
         outcome: `placed`, `place_failed`, `pick_failed`, `grip_lost`, `refused`, `dislodged` if it pushed another
             object out, or `error` if the physics failed.
-        settle_s: Time from release to rest, s.
+        settle_s: Time from the release until the object is at rest, s.
         weld_m: Largest weld error, m.
         weld_rad: Largest weld error, rad.
         penetration: Deepest penetration in each control step, m.
@@ -64,7 +64,7 @@ class Placement:
 
 
 def run_session(house: House, number: int) -> list[Placement]:
-    """Run session `number`. Equal numbers give bit-identical sessions."""
+    """Run the session with this number. The same number always gives a bit-identical result."""
     return run_episode(house, make_episode(house, number))
 
 
@@ -82,7 +82,7 @@ def run_episode(house: House, episode: Episode, options: WorldOptions | None = N
 
 
 def make_episode(house: House, number: int) -> Episode:
-    """Arrange the person and objects near a receptacle: categories in turn, everything else at random."""
+    """Create an episode near a receptacle. Categories take turns, and everything else is random."""
     rng = np.random.default_rng([SEED, number])
     category = list(house.catalogue.categories.values())[number % len(house.catalogue.categories)]
     return arrange(house, number, category, list(category.objects) * 2, rng)
@@ -91,7 +91,7 @@ def make_episode(house: House, number: int) -> Episode:
 def arrange(
     house: House, number: int, category: Category, models: list[str], rng: np.random.Generator
 ) -> Episode:
-    """Arrange the person near the receptacle of a category, with `LEVELS` of these models around, in any order."""
+    """Place the person near the receptacle of a category, surrounded by `LEVELS` objects of these models."""
     receptacle = house.receptacles[category.receptacle]
     while True:
         stand = _stand(house, category.receptacle, rng)
@@ -108,7 +108,7 @@ def arrange(
 
 
 def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Sample a floor point (2,) m near the approach point of a receptacle, within reach."""
+    """Sample a floor point (2,) near a receptacle's approach point, with the receptacle within reach."""
     receptacle = house.receptacles[key]
     while True:
         point = receptacle.approach + rng.uniform(-STRAY, STRAY, 2)
@@ -117,7 +117,7 @@ def _stand(house: House, key: str, rng: np.random.Generator) -> NDArray[np.float
 
 
 def _spots(house: House, stand: NDArray[np.float64], rng: np.random.Generator) -> list[NDArray[np.float64]]:
-    """Sample floor points (2,) m within reach of the person, apart from each other and from furniture."""
+    """Sample floor points (2,) within reach of the person that are clear of each other and of furniture."""
     spots: list[NDArray[np.float64]] = []
     for _ in range(400):
         angle, radius = rng.uniform(-math.pi, math.pi), rng.uniform(*AROUND)
@@ -161,7 +161,7 @@ def _transport(world: World, session: int, placed: PlacedObject, fill: int) -> P
 
 
 def _motion(world: World, action: Pick | Place, rows: list[tuple[float, ...]]) -> str:
-    """Return the outcome of a pick or place. The health of every control step is added to `rows`."""
+    """Run a pick or place, return its outcome, and append measurements of each control step to `rows`."""
     step = world.step(action)
     if step.result is None or not step.result.applied:
         return "refused"

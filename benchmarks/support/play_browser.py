@@ -1,4 +1,4 @@
-"""A simulated browser of `mjsim play`: its socket, its numbered inputs, and a link that may be slow and lossy."""
+"""A simulated browser for `mjsim play`, whose network connection may be slow and lossy."""
 
 import asyncio
 import json
@@ -18,19 +18,19 @@ from benchmarks.support.play_server import PATIENCE
 from benchmarks.support.simulated_link import CountingConnection, Link
 from experiments.web.protocol import BEAT_PERIOD, FRAME_HEAD, MAX_INPUTS, MAX_STEPS_AHEAD
 
-STEP = 0.04  # duration of a control step, s
-# A text frame of 126 bytes, masked with zeros, that ends early.
+STEP = 0.04  # duration of a control step in seconds
+# An incomplete text frame: it announces 126 bytes, masked with zeros, but ends early.
 HALF_A_MESSAGE = b"\x81\xfe\x00\x7e" + bytes(4) + b'{"type": "inputs", "inputs": [{"num'
 
 
 @dataclass(frozen=True)
 class SeenFrame:
-    """A frame or snapshot that arrived.
+    """A frame or snapshot that was received from the server.
 
     Attributes:
-        at: Time of arrival by `time.perf_counter`.
-        input: Number of the last input that it includes.
-        width: Width of a frame, px, or 0 for a snapshot.
+        at: Time of arrival according to `time.perf_counter`.
+        input: Number of the last input that it reflects.
+        width: Width of a frame in pixels, or 0 for a snapshot.
     """
 
     at: float
@@ -39,22 +39,22 @@ class SeenFrame:
 
 
 class SimulatedBrowser:
-    """Plays through a socket like the page, and keeps unacknowledged inputs to send them again.
+    """A client that plays through a socket like the web page, and resends unacknowledged inputs.
 
     Args:
         address: Address of the visit.
-        codec: `jpeg`, `h264`, or `none` for a client that draws, which stamps its inputs and promises them step by
-            step.
+        codec: `jpeg`, `h264`, or `none` for a client that draws. A drawing client stamps its inputs with
+            control steps and promises that no further inputs will follow for a step.
         link: Properties of the network.
-        size: Size of the view, px.
-        seed: Seed of the network's randomness.
+        size: Size of the view in pixels.
+        seed: Seed of the network's random delays.
 
     Attributes:
         next: Number of the next input.
         acknowledged: Number of the last acknowledged input.
-        frames: Frames and snapshots that arrived.
-        last: Latest message by type.
-        sent_at: Time of sending by number of the input.
+        frames: All received frames and snapshots.
+        last: Latest message of each type.
+        sent_at: Sending time of each input, by number.
         trips: Times from sending an input to its acknowledgement, s.
     """
 
@@ -72,10 +72,10 @@ class SimulatedBrowser:
         self._view = {"type": "view", "width": size[0], "height": size[1], "codec": codec}
         self.draws = codec == "none"
         self._step: int | None = (
-            None  # next control step of a client that draws; None while the clock is paused
+            None  # next control step of a drawing client, or None while the clock is paused
         )
-        self._newest = 0  # step of the last snapshot
-        self._made: list[dict[str, Any]] = []  # inputs for control steps not promised yet
+        self._newest = 0  # control step of the latest snapshot
+        self._made: list[dict[str, Any]] = []  # inputs that are sent with the next control step
         self._link, self._rng = link or Link(), np.random.default_rng(seed)
         self._changed = asyncio.Condition()
         self._tasks: list[asyncio.Task[None]] = []
@@ -89,7 +89,7 @@ class SimulatedBrowser:
         self.sent_at: dict[int, float] = {}
 
     async def open(self, trial: str) -> None:
-        """Connect and send the hello message."""
+        """Connect to the server and send the hello message."""
         parts = urlsplit(self.address)
         self.last.clear()
         self._out = asyncio.Queue()
@@ -108,14 +108,14 @@ class SimulatedBrowser:
         self._tasks = [asyncio.create_task(task) for task in doing]
 
     def lose(self, *, amid_a_message: bool = False) -> None:
-        """Drop the connection without a close message, or in the middle of a message."""
+        """Drop the connection without a close message, optionally in the middle of another message."""
         if self._socket is not None:
             if amid_a_message:
                 self._socket.transport.write(HALF_A_MESSAGE)
             self._socket.transport.abort()
 
     async def cut(self, *, amid_a_message: bool = False) -> None:
-        """Drop the connection and end its tasks."""
+        """Drop the connection and stop its tasks."""
         self.lose(amid_a_message=amid_a_message)
         await self._end()
 
@@ -125,18 +125,18 @@ class SimulatedBrowser:
         await self._end()
 
     def reload(self) -> None:
-        """Forget everything that a page forgets when it is reloaded."""
+        """Discard the state that a page loses when it is reloaded."""
         self._waiting, self._tab = [], secrets.token_hex(8)
 
     def forget(self) -> None:
-        """Forget the frames and times so far."""
+        """Discard the frames and times that have been recorded."""
         self.frames.clear()
         self.sent_at.clear()
         self.trips.clear()
 
     @property
     def arrived(self) -> int:
-        """Number of bytes that arrived on this connection."""
+        """The number of bytes that have been received on this connection."""
         return 0 if self._socket is None else self._socket.received
 
     @property
@@ -148,7 +148,7 @@ class SimulatedBrowser:
         self._out.put_nowait((due, json.dumps(message)))
 
     def press(self, **values: Any) -> int:
-        """Send an input. Return its number."""
+        """Send an input, or queue it for the next control step. Return its number."""
         number, self.next = self.next, self.next + 1
         new = {"number": number, **values}
         self._waiting.append(new)
@@ -162,7 +162,7 @@ class SimulatedBrowser:
         """Wait until a condition holds.
 
         Raises:
-            TimeoutError: The condition does not hold in time.
+            TimeoutError: The condition is still false after `seconds`.
             ConnectionError: The server has closed the connection.
         """
 
@@ -184,10 +184,10 @@ class SimulatedBrowser:
         return str(self.last.get("state", {}).get("phase", ""))
 
     async def run(self) -> int:
-        """Start the clock once the session is open, and send unacknowledged inputs again.
+        """Start the clock when the session is open, and resend unacknowledged inputs.
 
         Returns:
-            Number of the last input that the session had received.
+            Number of the last input that the session has received.
         """
         await self.until(lambda: self.phase in ("ready", "paused", "running"))
         number = int(self.last["state"]["input"])
@@ -219,12 +219,12 @@ class SimulatedBrowser:
         self.say(type="inputs", inputs=inputs, **promise)
 
     async def _take_steps(self) -> None:
-        """Take control steps while the clock runs, and promise their inputs."""
+        """Advance the control steps while the clock runs, and send the inputs of each step."""
         while True:
             await asyncio.sleep(STEP)
             due = time.perf_counter()
             while self._step is not None:
-                if self._step >= self._newest + MAX_STEPS_AHEAD:  # the server would reject the step
+                if self._step >= self._newest + MAX_STEPS_AHEAD:  # the server rejects steps beyond this limit
                     await asyncio.sleep(STEP)
                     due = time.perf_counter()
                     continue
@@ -233,7 +233,7 @@ class SimulatedBrowser:
                 self._send_inputs(made, until=self._step)
                 due += STEP
                 await asyncio.sleep(max(0.0, due - time.perf_counter()))
-            self._made.clear()  # they are sent again when the clock runs
+            self._made.clear()  # unacknowledged inputs are sent again when the clock restarts
 
     async def _beat(self) -> None:
         while True:
@@ -258,7 +258,7 @@ class SimulatedBrowser:
         await self._notify()
 
     async def _take_all(self, arriving: asyncio.Queue[tuple[float, str | bytes]]) -> None:
-        """Handle messages when they are due, in order like TCP."""
+        """Handle messages when their simulated delay is over, in the order of their arrival."""
         while True:
             due, message = await arriving.get()
             await asyncio.sleep(max(0.0, due - time.perf_counter()))

@@ -1,4 +1,4 @@
-"""Latency of `mjsim play`, cost of a session, and the number of sessions that a machine can run."""
+"""Measure the latency of `mjsim play`, the cost of a session, and the number of possible sessions."""
 
 import asyncio
 import math
@@ -22,17 +22,17 @@ from benchmarks.support.play_server import (
 from benchmarks.support.simulated_link import Link
 from experiments.record.phases import TASK
 
-PERIOD = 0.25  # between two inputs, s
+PERIOD = 0.25  # time between two inputs in seconds
 MOBILE = Link(latency=0.04, jitter=0.01, loss=0.01)
-AT_ONCE = 2  # number of sessions that are opened at the same time
-SETTLING = 2.0  # time before a session is measured, s
-SETTLING_TOGETHER = 8.0  # time in which concurrent sessions adapt the size of their frames, s
-MIN_FPS, MAX_MS = 15.0, 150.0  # requirements with frames: fps, 95th percentile from input to frame in ms
+AT_ONCE = 2  # number of sessions that are opened simultaneously
+SETTLING = 2.0  # waiting time before a session is measured, in seconds
+SETTLING_TOGETHER = 8.0  # time for concurrent sessions to adapt the size of their frames, in seconds
+MIN_FPS, MAX_MS = 15.0, 150.0  # required fps, and longest 95th percentile from input to frame in ms
 MIN_STATES, MAX_ACKNOWLEDGED = (
     24.5,
     60.0,
-)  # requirements of drawing clients: states/s, 95 % of acknowledgements in ms
-CASES = {  # codec, link
+)  # for drawing clients: required snapshots per second, and longest 95th percentile of acknowledgements in ms
+CASES = {  # codec and link of each case
     "jpeg": ("jpeg", Link()),
     "h264": ("h264", Link()),
     "states": ("none", Link()),
@@ -43,15 +43,15 @@ CASES = {  # codec, link
 
 
 def measure_latency(folder: Path, seconds: float, report: ProgressReport, *words: str) -> dict[str, Any]:
-    """Measure latency from input to frame, fps and bandwidth, by codec and link.
+    """Measure latency from input to frame, fps and bandwidth for each codec and link.
 
-    For a client that draws, these are the time until its input is acknowledged, and states per second.
+    For a drawing client, measure the time until an input is acknowledged, and snapshots per second.
 
     Args:
         folder: Folder for the visits.
         seconds: Duration of each case.
-        report: Receives lines about the progress.
-        words: Further arguments of the server's command line.
+        report: Called with progress messages.
+        words: Additional command-line arguments of the server.
     """
     found = {}
     with PlayProcess(folder, *TASK_ALONE, "--sessions", "2", *words) as server:
@@ -71,16 +71,16 @@ def measure_capacity(
     *words: str,
     core: int | None = None,
 ) -> list[dict[str, float]]:
-    """Find the number of sessions at once that hold 15 fps and 150 ms, or 25 states per second and 60 ms.
+    """Find how many concurrent sessions keep 15 fps and 150 ms, or 25 snapshots per second and 60 ms.
 
     Args:
         folder: Folder for the visits, with a subfolder for each number of sessions.
-        seconds: Duration for each number.
-        codec: Codec of frames, or `none` for clients that draw.
-        counts: Numbers of sessions to try, descending, until one holds.
-        report: Receives lines about the progress.
-        words: Further arguments of the server's command line.
-        core: The only core that the server may use, or None for all.
+        seconds: Duration for each number of sessions.
+        codec: Codec of frames, or `none` for drawing clients.
+        counts: Descending numbers of sessions, which are tried until one meets the requirements.
+        report: Called with progress messages.
+        words: Additional command-line arguments of the server.
+        core: The only core that the server may use, or None for all cores.
     """
     tried = []
     for count in counts:
@@ -128,12 +128,12 @@ async def _sessions_at_once(
 
 
 def median_width(browsers: Sequence[SimulatedBrowser]) -> float:
-    """Return the median width of the last frames, px, or 0 without frames."""
+    """Return the median width of the last frames in pixels, or 0 if there are no frames."""
     return float(np.median([browser.frames[-1].width if browser.frames else 0 for browser in browsers]))
 
 
 async def settle(browsers: Sequence[SimulatedBrowser], seconds: float = SETTLING_TOGETHER) -> None:
-    """Start the tasks of visits without other phases, and let the clocks of pages and server agree."""
+    """Start the tasks, and wait until the clocks of the clients and the server agree."""
     opening = asyncio.Semaphore(AT_ONCE)
     await asyncio.gather(*(_show_something(browser, opening) for browser in browsers))
     await asyncio.gather(*(turn(browser, seconds) for browser in browsers))
@@ -147,7 +147,7 @@ async def _show_something(browser: SimulatedBrowser, opening: asyncio.Semaphore)
 
 
 async def turn(browser: SimulatedBrowser, seconds: float) -> list[float]:
-    """Turn to and fro. Return the times in ms from each input to its frame or, if the client draws, acknowledgement."""
+    """Turn left and right. Return the times in ms until inputs appear in a frame or are acknowledged."""
     browser.forget()
     first, until = browser.next, time.perf_counter() + seconds
     while time.perf_counter() < until:

@@ -1,4 +1,4 @@
-"""A server of `mjsim play` in its own process, which can be killed, restarted and measured from outside."""
+"""Run an `mjsim play` server in its own process, which can be killed, restarted and measured from outside."""
 
 import os
 import resource
@@ -17,26 +17,26 @@ from experiments.record.journal import JOURNAL
 from experiments.record.run_directory import JOURNALS
 from experiments.visit.tokens import token_hash
 
-PATIENCE = 400.0  # timeout, s; a loaded machine may be slow, and may have to compile all kernels first
-TASK_ALONE = ("--phases", "task")  # arguments of a server whose visits consist only of the task
+PATIENCE = 400.0  # timeout in seconds, which includes compiling all kernels on a busy machine
+TASK_ALONE = ("--phases", "task")  # arguments of a server whose visits contain only the task
 _TICKS = os.sysconf("SC_CLK_TCK")
 
-ProgressReport = Callable[[str], None]  # receives a line about the progress of a benchmark
+ProgressReport = Callable[[str], None]  # function that is called with progress messages of a benchmark
 
 
 class PlayProcess:
-    """A server that runs while the context is active. Its standard error goes to `server.txt` next to its folder.
+    """A server process that runs while the context is active. It logs to `server.txt` next to its folder.
 
     Args:
         folder: Folder for visits.
-        words: Further arguments of its command line.
-        core: The only core that it may use, or None for all.
+        words: Additional command-line arguments.
+        core: The only core that the server may use, or None for all cores.
         command: Subcommand, such as `study serve FILE` for a study.
-        program: Program with its arguments.
+        program: Program to run, with its first arguments.
 
     Attributes:
         url: URL of the server.
-        process: The process.
+        process: The server process.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class PlayProcess:
         self.url = ""
 
     def start(self) -> None:
-        """Start the server, after a kill at the same port, and wait until it listens."""
+        """Start the server and wait until it listens. After a kill, use the same port again."""
         port = urlsplit(self.url).port or 0
         command = [*self._command, "--no-open", "--port", str(port), "--out", str(self._folder), *self._words]
         with self.output.open("ab") as output:
@@ -64,12 +64,12 @@ class PlayProcess:
             raise ChildProcessError(self.output.read_text())
 
     def kill(self) -> None:
-        """Kill the server by SIGKILL, which also ends its workers."""
+        """Kill the server with SIGKILL, which also ends its workers."""
         self.process.kill()
-        self.process.communicate()  # waits for its workers, which have its output open
+        self.process.communicate()  # wait for the workers, which share its output
 
     def begin(self) -> str:
-        """Begin a visit. Return its address."""
+        """Begin a visit. Return its URL."""
         origin = self.url.rstrip("/")
         with httpx.Client(base_url=origin, headers={"Origin": origin}, timeout=PATIENCE) as client:
             path = client.post("/begin").headers["location"]
@@ -98,37 +98,37 @@ class PlayProcess:
 
 
 def fill_disk(worker: int, journal: Path, room: int) -> None:
-    """Limit a worker to `room` more bytes in its journal, which simulates a full disk."""
+    """Limit a worker to `room` more bytes in its journal, in order to simulate a full disk."""
     size = journal.stat().st_size + room
     resource.prlimit(worker, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
 
 
 def memory(pid: int) -> float:
-    """Return the proportional memory of a process, MB, in which shared memory counts in part."""
+    """Return the memory of a process in MB, with shared memory divided among the processes that share it."""
     lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1024.0
 
 
 def resident_memory(pid: int) -> float:
-    """Return the resident memory of a process, MB, including all shared memory."""
+    """Return the resident memory of a process in MB, including all shared memory."""
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024.0
 
 
 def processor_time(pid: int | str) -> float:
-    """Return the CPU time of a process, s."""
+    """Return the CPU time of a process in seconds."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def parent_of(pid: int) -> int:
-    """Return the parent of a process. For a worker, this is the fork server."""
+    """Return the parent of a process. The parent of a worker is the fork server."""
     fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
     return int(fields[1])
 
 
 def worker_of(journal: Path) -> int:
-    """Return the process that has a journal open. Raises a `ChildProcessError` if there is no such process."""
+    """Return the process that has opened a journal. Raise a `ChildProcessError` if there is none."""
     for folder in Path("/proc").glob("[0-9]*/fd"):
         with suppress(OSError):
             if any(entry.readlink() == journal for entry in folder.iterdir()):

@@ -1,10 +1,10 @@
-"""Free ports of this machine, for servers that need a known port."""
+"""Find free ports on this machine for servers that need a fixed port."""
 
 import random
 import socket
 from itertools import islice
 
-BELOW_CLIENTS = range(15_000, 32_000)  # below the ports from 32768 that Linux assigns to clients
+BELOW_CLIENTS = range(15_000, 32_000)  # Linux assigns ports from 32768 to clients
 
 
 def listens(port: int) -> bool:
@@ -13,6 +13,6 @@ def listens(port: int) -> bool:
 
 
 def free_ports(number: int) -> list[int]:
-    """Return ports that are free now and that are not assigned to clients."""
+    """Return ports that are currently free and that the system does not assign to clients."""
     drawn = random.SystemRandom().sample(BELOW_CLIENTS, len(BELOW_CLIENTS))
     return list(islice((port for port in drawn if not listens(port)), number))

@@ -1,4 +1,4 @@
-"""The calls of a session to its world in a trial, recorded to be repeated as a realistic workload."""
+"""Record a session's calls to its world, so that they can be repeated as a realistic workload."""
 
 import time
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ from mjsim.values.options import WorldOptions
 from mjsim.world.state import WorldState
 from mjsim.world.world import MAX_STEPS, StepResult, World
 
-Call = tuple[str, Any]  # `step` with an action and a limit, or `restore`
+Call = tuple[str, Any]  # method name and arguments: an action and a limit for `step`, or None for `restore`
 
 
 class RecordingWorld(World):
     """A world that records calls to `step` and `restore`.
 
     Attributes:
-        calls: The calls.
-        single_steps: The calls, with a separate call for each control step of an action.
+        calls: The recorded calls.
+        single_steps: The recorded calls, with a separate call for each control step of an action.
     """
 
     def __init__(self, scene: Scene, options: WorldOptions | None = None, *, walls: Any = None) -> None:
@@ -53,12 +53,12 @@ class RecordingWorld(World):
 
 @dataclass(frozen=True, eq=False)
 class RecordedTrial:
-    """The calls of a trial to its world.
+    """Recorded calls of a trial to its world.
 
     Attributes:
-        walls: Outline of the navigable floor, as for `World`, m, shape (e, 4).
-        calls: `step` with an action and a limit, and `restore` at every checkpoint.
-        single_steps: The calls, with a separate call for each control step.
+        walls: Outline of the navigable floor in metres, (e, 4), as in `World`.
+        calls: Calls of `step` with an action and a limit, and of `restore` at every checkpoint.
+        single_steps: The same calls, with a separate call for each control step.
     """
 
     scene: Scene
@@ -68,11 +68,11 @@ class RecordedTrial:
     single_steps: tuple[Call, ...]
 
     def world(self) -> World:
-        """Return a new world in which to repeat the calls."""
+        """Return a new world on which the calls can be repeated."""
         return World(self.scene, WorldOptions(fidelity=self.fidelity), walls=self.walls)
 
     def actions(self, seconds: float) -> list[Action]:
-        """Return the actions of the first control steps, for `seconds` of simulated time."""
+        """Return the actions of the first control steps, up to `seconds` of simulated time."""
         steps = [argument[0] for name, argument in self.single_steps if name == "step"]
         return steps[: round(seconds / WorldOptions().control_timestep)]
 
@@ -84,20 +84,20 @@ def record_trial(
 
     Args:
         house: The house.
-        objects: Number of objects. Above 40, the house gets other sampling points.
+        objects: Number of objects. For more than 40 objects, other positions are sampled.
         seed: Seed of the episode.
-        fidelity: The fidelity.
+        fidelity: Fidelity of the simulation.
         seconds: Simulated time after which the trial stops, s, or None to run to the end.
 
     Raises:
-        SamplingError: The house has no room for so many objects.
+        SamplingError: There is not enough room in the house for the objects.
     """
     config = TrialConfig(
         objects=objects, assistance="optimal", seed=seed, fidelity=fidelity, regret=False, time_limit=seconds
     )
     points = max(objects, POINTS)
     episode = sample_episode(house.catalogue, house.navmesh, objects=objects, seed=seed, points=points)
-    scene = compose(episode, house.catalogue, visuals=False)  # as in a trial without a film
+    scene = compose(episode, house.catalogue, visuals=False)  # visual geoms are only needed for films
     world = RecordingWorld(scene, WorldOptions(fidelity=fidelity), walls=house.navmesh.outline)
     session, _ = prepare_session(config, house, scene, EventLog(), world=world)
     session.run()
@@ -107,7 +107,7 @@ def record_trial(
 
 
 def play(world: World, calls: Sequence[Call]) -> float:
-    """Repeat calls on a world. Return the CPU time, s, without the checkpoints."""
+    """Repeat calls on a world. Return the CPU time in seconds, excluding checkpoints."""
     clock, checkpoints = time.process_time, 0.0
     start = clock()
     for name, argument in calls:

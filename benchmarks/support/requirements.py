@@ -1,4 +1,4 @@
-"""Requirements of benchmarks: figures and their bounds."""
+"""Requirements that a benchmark checks: bounds for its measured values."""
 
 import operator
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,7 +8,7 @@ _RELATIONS = {"<": operator.lt, "<=": operator.le, ">=": operator.ge, ">": opera
 
 
 class Requirement(NamedTuple):
-    """A figure (`key`) of a result, its label with unit, and its bound."""
+    """A required bound for the value `key` of a benchmark's result. The label includes the unit."""
 
     label: str
     key: str
@@ -17,7 +17,7 @@ class Requirement(NamedTuple):
 
 
 def requirement_lines(result: Mapping[str, Any], requirements: Sequence[Requirement]) -> Iterator[str]:
-    """Yield a line per requirement, which ends in `pass` or `FAIL`."""
+    """Yield a line of text for each requirement. It ends in `pass` or `FAIL`."""
     for label, key, relation, bound in requirements:
         yield f"{label}: {result[key]:.4g} ({relation} {bound:g}: {outcome(result[key], relation, bound)})"
 

@@ -1,21 +1,21 @@
-"""The network of a simulated browser, which may be slow and lossy and counts bytes."""
+"""Simulate a network connection that may be slow and lossy, and count the received bytes."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from websockets.asyncio.client import ClientConnection
 
-RETRANSMISSION_S = 0.2  # delay until TCP retransmits a lost packet
+RETRANSMISSION_S = 0.2  # delay after which TCP sends a lost packet again
 
 
 @dataclass(frozen=True)
 class Link:
-    """A network between browser and server with the same properties in both directions.
+    """A simulated network between a browser and the server, with the same properties in both directions.
 
     Attributes:
-        latency: Delay of a message, s.
-        jitter: Standard deviation of the additional delay, s.
-        loss: Share of messages that are lost and retransmitted.
+        latency: Delay of a message in seconds.
+        jitter: Standard deviation of an additional delay in seconds.
+        loss: Share of messages that are lost and sent again.
     """
 
     latency: float = 0.0
@@ -28,7 +28,7 @@ class Link:
 
 
 class CountingConnection(ClientConnection):
-    """A connection that counts the bytes that arrive."""
+    """A connection that counts the bytes that it receives."""
 
     received = 0
 

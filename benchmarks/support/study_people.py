@@ -1,4 +1,4 @@
-"""Participants who arrive at a study at the same moment from different addresses, over real HTTP."""
+"""Simulate participants who arrive at a study simultaneously from different addresses, over real HTTP."""
 
 import asyncio
 import json
@@ -11,8 +11,8 @@ from urllib.parse import urlencode, urlsplit
 
 from benchmarks.support.play_server import PATIENCE, PlayProcess
 
-PROXIED = ("--trusted-proxy", "127.0.0.1")  # so that X-Forwarded-For gives each participant an address
-TASK_PAGES = 'data-trial="task"', 'http-equiv="refresh"'  # marks of the task page and of the queue
+PROXIED = ("--trusted-proxy", "127.0.0.1")  # X-Forwarded-For contains the participant's address
+TASK_PAGES = 'data-trial="task"', 'http-equiv="refresh"'  # text that identifies the task page and the queue
 STUDY = """
 [[cells]]
 assistance = "none"
@@ -45,7 +45,7 @@ def study_process(
     fidelity: str = "event",
     phases: Sequence[str] = ("consent", "task", "completion"),
 ) -> PlayProcess:
-    """Return a server of a small study in a folder, with two cells of `people` participants."""
+    """Return a server process for a small study with two cells of `people` participants each."""
     values = {"people": people, "fidelity": fidelity, "phases": json.dumps(phases)}
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "study.toml"
@@ -56,7 +56,7 @@ def study_process(
 
 @dataclass(frozen=True)
 class HttpResponse:
-    """Response of a server."""
+    """A response of the server."""
 
     status: int
     headers: Mapping[str, str]
@@ -65,7 +65,7 @@ class HttpResponse:
 
 @dataclass
 class Times:
-    """Response times by name of the page, s, and failed requests."""
+    """Response times in seconds, by name of the page, and descriptions of failed requests."""
 
     pages: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     failed: list[str] = field(default_factory=list)
@@ -83,10 +83,10 @@ async def ask(
     cookie: str = "",
     patience: float = PATIENCE,
 ) -> HttpResponse:
-    """Request a page as participant `number` on a new connection, or post a form.
+    """Request a page or post a form as participant `number`, on a new connection.
 
     Raises:
-        OSError: No response arrived, or not in time.
+        OSError: No response arrived before the timeout.
     """
     parts, body = urlsplit(url), "" if form is None else urlencode(form)
     head = [f"{'GET' if form is None else 'POST'} {path} HTTP/1.1", f"Host: {parts.netloc}"]
@@ -108,7 +108,7 @@ async def ask(
 
 
 async def arrive_at_once(url: str, people: int) -> tuple[Times, list[str]]:
-    """Let participants arrive at once and go to their task as fast as possible. Return times, and all links."""
+    """Let all participants arrive at once and proceed to their task. Return response times and links."""
     times = Times()
 
     async def timed(name: str, number: int, path: str, form: Mapping[str, str] | None = None) -> HttpResponse:

@@ -1,8 +1,8 @@
-"""Stress sessions of walking: charges at 1 to 8 m/s into walls, corners, furniture and heaps of objects.
+"""Stress tests of walking, in which a person runs at 1 to 8 m/s into walls, corners, furniture and objects.
 
-In a session, the person runs and pushes in random directions, then walks away by the shortest path, and stands for a
-while. Tunnelling, being stuck and drift are judged only from the body's position and the floor plan, independently of
-the code under test.
+In each session, the person runs and pushes in random directions, walks away along the shortest path, and then
+stands for a while. Tunnelling, getting stuck and drift are detected only from the body's position and the
+floor plan, independently of the code under test.
 """
 
 import math
@@ -25,33 +25,34 @@ from mjsim.world.world import World
 from planner.errors import UnreachableError
 
 SEED = 2028
-SPEEDS = (1.0, 8.0)  # m/s
-ACCELERATION = 12.0  # m/s^2, more than the body's servos can reach
-SECONDS = 36.0  # duration of a session
-CHARGE, PUSH, RETREAT, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, 1.0  # durations, s
-HEAPED, LAYER = 6, 0.33  # objects in a heap, and their vertical distance before they fall, m
-ROOM = 0.4  # radius of free floor around a heap, m
-NOT_STUCK = 0.2  # distance covered in `RETREAT` seconds by a body that is not stuck, m
-RETREAT_SPEED = 1.4  # m/s
-LOOK_AHEAD = 0.3  # m
+SPEEDS = (1.0, 8.0)  # range of running speeds in m/s
+ACCELERATION = 12.0  # commanded acceleration in m/s^2, which exceeds the limits of the body's servos
+SECONDS = 36.0  # duration of a session in seconds
+CHARGE, PUSH, RETREAT, STAND = (0.8, 2.5), (0.4, 1.2), 2.0, 1.0  # durations of parts of a session in seconds
+HEAPED, LAYER = 6, 0.33  # objects per heap, and vertical distance between them in metres
+ROOM = 0.4  # radius of the free floor around a heap, in metres
+NOT_STUCK = 0.2  # minimum distance in metres that a body covers in `RETREAT` seconds unless it is stuck
+RETREAT_SPEED = 1.4  # walking speed during a retreat in m/s
+LOOK_AHEAD = 0.3  # look-ahead distance along the path, in metres
 
 
 @dataclass
 class WalkResult:
-    """Result of a session.
+    """The result of a walking session.
 
     Attributes:
-        session: Number of the session, by which `run_session` repeats it.
-        speed: Commanded speed, m/s.
+        session: Number of the session, with which `run_session` can repeat it.
+        speed: Commanded running speed, m/s.
         simulated: Simulated time, s.
-        tunnelled: Control steps at which the body's axis was in something solid or had crossed it.
-        stuck: Retreats in which the body moved less than `NOT_STUCK` m.
-        drift: Movement during the last second of standing, m, by occasion.
-        turned: Rotation during the last second of standing, rad, by occasion.
-        overlap: Penetration of the trunk into walls and furniture at each control step, m.
-        fastest: Speed of the fastest object, m/s.
+        tunnelled: Number of control steps in which the body's axis was inside or had passed through a solid
+            obstacle.
+        stuck: Number of retreats in which the body moved less than `NOT_STUCK` m.
+        drift: Distance moved in the last second of each standing period, m.
+        turned: Rotation in the last second of each standing period, rad.
+        overlap: Penetration depth of the trunk into walls and furniture at each control step, m.
+        fastest: Largest speed of any object, m/s.
         lost: Number of objects outside the house at the end.
-        error: Description of a physics error, or None.
+        error: Message of a physics error, or None.
     """
 
     session: int
@@ -71,7 +72,7 @@ class WalkResult:
 
 
 def run_session(house: House, number: int, seconds: float = SECONDS) -> WalkResult:
-    """Run session `number`. Equal numbers give bit-identical sessions."""
+    """Run the session with this number. The same number always gives a bit-identical result."""
     return _Session(house, number).run(seconds)
 
 
@@ -81,7 +82,7 @@ class _Session:
         self._rng = np.random.default_rng([SEED, number])
         self._found = WalkResult(number, float(self._rng.uniform(*SPEEDS)))
         self._heap = _free_place(house, self._rng)
-        # This makes `fastest_walk` equal to the speed of the session.
+        # With this value, the person's `fastest_walk` is equal to the speed of the session.
         person = PersonParameters(
             walking_speed=self._found.speed * 13 / 14, walking_acceleration=ACCELERATION
         )
@@ -108,7 +109,7 @@ class _Session:
         return found
 
     def _charge(self) -> None:
-        """Run in a random direction, every third time at the heap, then push on at another angle while turning."""
+        """Run in a random direction, or every third time at the heap, then push at another angle."""
         rng, o = self._rng, self._world.observation()
         at_heap = rng.random() < 1 / 3
         offset = self._heap - o.position
@@ -119,7 +120,7 @@ class _Session:
                 self._go(course + veer, self._found.speed, turn)
 
     def _retreat(self) -> None:
-        """Walk away towards a distant point by the shortest path."""
+        """Walk away along the shortest path to a distant point."""
         house, start = self._house, self._position
         goal = _far_point(house, house.navmesh.snap(start), self._rng)
         self._found.retreats += 1
@@ -127,7 +128,7 @@ class _Session:
         for _ in range(self._steps(RETREAT)):
             here = house.navmesh.snap(self._position)
             path = np.asarray(house.geodesics.shortest_path(here, goal).points)
-            # The path first leads back onto navigable floor, if the charge has left it.
+            # If the person has left the navigable floor, the path first leads back to it.
             out, ahead = here - self._position, np.array(point_along(path, LOOK_AHEAD)) - here
             course = 4.0 * out + ahead / LOOK_AHEAD
             self._go(math.atan2(course[1], course[0]), RETREAT_SPEED, 0.0)
@@ -135,7 +136,7 @@ class _Session:
         self._found.stuck += farthest < NOT_STUCK
 
     def _stand(self) -> None:
-        """Stop, and measure for a while whether the body stays in place."""
+        """Stop, and then measure for a while whether the body stays in place."""
         for _ in range(self._steps(STAND)):
             self._step(IDLE)
         before = self._world.observation()
@@ -146,7 +147,6 @@ class _Session:
         self._found.turned.append(abs(after.heading - before.heading))
 
     def _go(self, course: float, speed: float, turn: float) -> None:
-        """Walk in a world direction, whichever way the body faces."""
         angle = course - self._world.observation().heading
         self._step(Move(speed * math.cos(angle), speed * math.sin(angle), turn))
 
@@ -166,7 +166,7 @@ class _Session:
 
 
 def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Sample a point of the floor with free space around it."""
+    """Sample a floor point with free space around it."""
     around = [ROOM * np.array([math.cos(a), math.sin(a)]) for a in np.arange(0, 6.2, 0.5)]
     while True:
         point = house.navmesh.sample(rng)
@@ -175,7 +175,7 @@ def _free_place(house: House, rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Sample a point of the floor that is too far away to be reached during a retreat."""
+    """Sample a floor point that is too far away to be reached during a retreat."""
     while True:
         goal = house.navmesh.sample(rng)
         try:
@@ -186,7 +186,7 @@ def _far_point(house: House, here: NDArray[np.float64], rng: np.random.Generator
 
 
 def _episode(house: House, number: int, heap: NDArray[np.float64], rng: np.random.Generator) -> Episode:
-    """Place the person anywhere in the house, and objects that fall onto a heap at a floor point (2,) m."""
+    """Place the person at a random floor point, and objects that fall onto a heap at another point (2,)."""
     start = house.navmesh.sample(rng)
     while np.linalg.norm(start - heap) < 1.0:
         start = house.navmesh.sample(rng)

@@ -1,1 +1,1 @@
-"""Fitting the guest to the published rows at 6 objects, by a surrogate of its trials."""
+"""Fit the `guest` participant model to the published results at 6 objects, using a surrogate model."""

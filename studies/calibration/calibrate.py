@@ -1,4 +1,4 @@
-"""A calibration from a pool of simulated people: surrogates, fit, and the study that follows."""
+"""Calibrate simulated participants: learn surrogate models from a pool, then fit the free parameters."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,22 +18,22 @@ from studies.calibration.population import FreeParameters
 from studies.calibration.surrogate import Surrogate, Values, learn
 from studies.published import Published
 
-IDENTIFIED, WEAKLY = 0.7, 0.3  # contraction from which a parameter counts as identified, or as weakly so
-TRADE_OFF = 0.4  # rank correlation from which two parameters count as exchangeable
+IDENTIFIED, WEAKLY = 0.7, 0.3  # minimum contraction of an identified and of a weakly identified parameter
+TRADE_OFF = 0.4  # minimum absolute rank correlation of interchangeable parameters
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What was fitted, to what, by what.
+    """A fitted population of simulated participants, and the data that it was fitted to.
 
     Attributes:
-        origin: Whether the people of the pool were simulated.
-        free: The free parameters with their priors.
-        rows: The published rows.
-        surrogates: Condition -> surrogate of the measures of `rows`.
-        fit: The draws.
-        seed: Of all chance.
-        left_out: People of the pools from whom nothing is learnt.
+        origin: Label that tells whether the participants in the pool were simulated.
+        free: The free parameters and their priors.
+        rows: The published results that were fitted.
+        surrogates: Surrogate model of the measures in `rows`, by condition.
+        fit: The draws and their distances from the published study.
+        seed: Seed of the random number generator.
+        left_out: Participants in the pools who were excluded.
     """
 
     origin: str
@@ -45,12 +45,12 @@ class Calibration:
     left_out: tuple[LeftOut, ...]
 
     def behaviour(self) -> Distributions:
-        """The best population, its parameters to three digits."""
+        """Return the best population, with its parameters rounded to three significant digits."""
         rounded = [float(f"{value:.3g}") for value in self.fit.draws[self.fit.best]]
         return self.free.behaviour(np.array(rounded))
 
     def identified(self) -> list[str]:
-        """Of each free parameter, whether the published rows say what it is."""
+        """Describe for each free parameter how well the published results identify it."""
         words = ((IDENTIFIED, "identified"), (WEAKLY, "weakly"))
         return [
             next((word for least, word in words if c >= least), "not identified")
@@ -58,7 +58,7 @@ class Calibration:
         ]
 
     def trade_offs(self) -> list[tuple[str, str, float]]:
-        """Pairs of parameters of which one can take the place of the other, with their rank correlation."""
+        """Return pairs of parameters that can compensate for each other, with their rank correlations."""
         names, found = list(self.free.priors), self.fit.trade_offs()
         pairs = [
             (names[i], names[j], float(found[i, j]))
@@ -77,20 +77,21 @@ def calibrate(
     seed: int,
     on_progress: Callable[[int], None] = lambda _: None,
 ) -> Calibration:
-    """Learn surrogates from a pool and fit the free parameters to the published rows at 6 objects.
+    """Learn surrogate models from the pools and fit the free parameters to the published results at 6
+    objects.
 
     Args:
-        pools: People in the cells of 6 objects, of one or more tables, with parameters drawn widely; people in other
-            cells are left out.
-        free: What is fitted.
-        published: The published numbers.
-        draws: How many populations are tried.
-        seed: Of all chance.
-        on_progress: Called with how many draws are done.
+        pools: Tables of simulated participants with widely varied parameters. Only cells with 6 objects are
+            used.
+        free: The parameters to fit.
+        published: The published results.
+        draws: Number of populations to draw.
+        seed: Seed of the random number generator.
+        on_progress: Called with the number of finished draws.
 
     Raises:
-        RecordError: The table lacks a parameter.
-        StatisticsError: A cell of the pool cannot be learnt from; the message names it.
+        RecordError: A parameter is missing in a table.
+        StatisticsError: No surrogate model can be learned for a cell. The message names the cell.
     """
     rows = Rows.of(published)
     cells = {name: _surrogate(pools, rows.measures(), name, free.inputs()) for name in rows.sizes}
@@ -114,7 +115,7 @@ def _surrogate(
 def _people(
     pool: StudyTable, measures: Sequence[str], condition: str, inputs: Sequence[str]
 ) -> tuple[Values, Values]:
-    """Values (n, inputs) and measures (n, measures) of the people of a cell."""
+    """Return the parameters (n, inputs) and measures (n, measures) of the participants in a cell."""
     unknown = [name for name in measures if name not in pool.columns]
     if unknown:
         raise StatisticsError(f"{unknown[0]} is not known of the pool")
@@ -134,10 +135,10 @@ def _value(row: Any, name: str) -> float:
 
 
 def fitted_study(study: Path, behaviour: Distributions, about: str) -> str:
-    """The text of a study file with a population for all its cells; earlier ones must not be there.
+    """Return the text of a study file in which all cells have the given population.
 
     Raises:
-        RecordError: The file has a population of its own.
+        RecordError: The study file already describes a population.
     """
     text = read_text(study)
     if "behaviour]" in text:
@@ -149,7 +150,7 @@ def fitted_study(study: Path, behaviour: Distributions, about: str) -> str:
 
 
 def as_toml(value: Any) -> str:
-    """A number, list or table of one line; numbers to four digits."""
+    """Format a number, list or dictionary as one line of TOML, with four significant digits."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{name} = {as_toml(part)}" for name, part in value.items()) + " }"
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""A calibration as a page, JSON, a table of the parameters that go with the published rows, and a study file."""
+"""Write the results of a calibration as a web page, a JSON file, a table and a study file."""
 
 import csv
 import io
@@ -23,8 +23,8 @@ from studies.calibration.inference import missed_orders
 PAGE, JSON, KEPT, STUDY = "calibration.html", "calibration.json", "kept.csv", "study.toml"
 FILES = (PAGE, JSON, KEPT, STUDY)
 TITLE = "Calibration on the rows at 6 objects"
-INTERVAL = (5, 50, 95)  # percentiles that are shown
-COLUMNS = 4  # panels side by side
+INTERVAL = (5, 50, 95)  # percentiles in tables
+COLUMNS = 4  # number of panels in a row
 PRIOR_AND_KEPT = (
     "Distribution of each free parameter (units in studies/calibration.toml) over the draws from its prior (grey) and "
     "over those that are kept (blue); the best draw (orange)."
@@ -36,15 +36,15 @@ CAUTION = (
 
 
 def write_calibration(folder: Path, found: Calibration, study: Path) -> None:
-    """Write all files, each whole or not at all.
+    """Write the page, the JSON file, the table of kept draws and the study file, each atomically.
 
     Args:
-        folder: Where to.
+        folder: The output folder.
         found: The calibration.
-        study: The study file that the best population is written for.
+        study: The study file to which the best population is added.
 
     Raises:
-        RecordError: That study has a population of its own.
+        RecordError: The study file already describes a population.
     """
     about = (
         f"by `mjsim study calibrate` to the rows at 6 objects: {len(found.fit.draws)} draws, seed {found.seed}, from "
@@ -59,7 +59,7 @@ def write_calibration(folder: Path, found: Calibration, study: Path) -> None:
 
 
 def as_json(found: Calibration) -> dict[str, Any]:
-    """All of it but the draws."""
+    """Return the calibration as JSON-ready data, without its draws."""
     return {
         "origin": found.origin,
         "seed": found.seed,
@@ -82,7 +82,7 @@ def as_json(found: Calibration) -> dict[str, Any]:
 
 
 def parameter_rows(found: Calibration) -> Iterator[tuple[Any, ...]]:
-    """Name, prior and kept percentiles, best value, contraction, verdict."""
+    """Yield each parameter's name, prior and kept percentiles, best value, contraction, and verdict."""
     fit = found.fit
     for k, (name, contraction, verdict) in enumerate(
         zip(found.free.priors, fit.contraction().tolist(), found.identified(), strict=True)
@@ -94,14 +94,14 @@ def parameter_rows(found: Calibration) -> Iterator[tuple[Any, ...]]:
 
 
 def surrogate_rows(found: Calibration) -> Iterator[tuple[Any, ...]]:
-    """Condition, measure, people learnt from, share of the variance that is predicted of people left out."""
+    """Yield each condition and measure with the number of participants and the explained variance."""
     for condition, surrogate in found.surrogates.items():
         for measure, predicted in zip(found.rows.measures(), surrogate.left_out_r2.tolist(), strict=True):
             yield condition, measure, surrogate.people, predicted
 
 
 def effect_rows(found: Calibration) -> Iterator[tuple[Any, ...]]:
-    """Measure, 90 % interval of the published partial eta squared, and that of the best population."""
+    """Yield each measure with its published interval and the best population's partial eta squared."""
     for k, test in enumerate(found.rows.tests):
         yield test.measure, test.interval(found.rows.people), float(found.fit.eta_squared[found.fit.best, k])
 
@@ -163,7 +163,7 @@ def _missed(found: Calibration) -> list[str]:
 
 
 def prior_and_kept(found: Calibration) -> FigureBlock:
-    """A panel per parameter: its prior, what is kept, and the best value."""
+    """Draw a panel for each parameter with its prior, the kept draws and the best value."""
     names, fit = list(found.free.priors), found.fit
     lines = -(-len(names) // COLUMNS)
     figure = Figure(figsize=(2.4 * COLUMNS, 1.5 * lines), layout="constrained")

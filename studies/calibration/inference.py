@@ -1,9 +1,9 @@
-"""Which free parameters go with the published rows at 6 objects: approximate Bayesian computation by rejection.
+"""Fit the free parameters to the published results at 6 objects by approximate Bayesian computation.
 
-Parameters are drawn from their priors. For each draw, the surrogate gives means and variances of the cells, and from
-these come effect sizes of the population and one study of the published size, with its chance. Draws whose study is
-nearest to the published one are kept (Beaumont 2010, doi:10.1146/annurev-ecolsys-102209-144621). No row over several
-numbers of objects is looked at.
+Parameters are drawn from their priors. For each draw, the surrogate models predict the means and variances of
+the cells. These give the effect sizes in the population, and those of one random study of the published size.
+The draws whose study is nearest to the published study are kept (Beaumont 2010,
+doi:10.1146/annurev-ecolsys-102209-144621). Results that combine several numbers of objects are not used.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,23 +19,23 @@ from studies.calibration.surrogate import Surrogate
 from studies.published import Direction, Published, PublishedTest
 
 Values = NDArray[np.float64]
-Cells = Mapping[str, Surrogate]  # condition -> surrogate of the measures
+Cells = Mapping[str, Surrogate]  # surrogate models of the measures, by condition
 
-OBJECTS = 6  # the only rows that may be fitted
-PEOPLE = 128  # simulated by the surrogate for each draw
-KEPT = 0.01  # share of the draws
+OBJECTS = 6  # the number of objects in the results that may be fitted
+PEOPLE = 128  # number of participants that the surrogate model simulates for each draw
+KEPT = 0.01  # share of the draws that are kept
 NORMAL_95 = 1.645
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The published rows that are fitted.
+    """The published results that are fitted.
 
     Attributes:
         tests: F tests of assistance.
-        directions: Orders of two conditions.
-        sizes: People by condition.
-        varies_most: Measure and condition of the variance order.
+        directions: Published orders of two conditions.
+        sizes: Number of participants by condition.
+        varies_most: A measure, and the condition in which it varies most.
     """
 
     tests: Sequence[PublishedTest]
@@ -45,7 +45,7 @@ class Rows:
 
     @classmethod
     def of(cls, published: Published) -> "Rows":
-        """Those at 6 objects, without answers of people."""
+        """Select the published results at 6 objects, except those about survey answers."""
         sizes = {c: n for (c, objects), n in published.people.sizes().items() if objects == OBJECTS}
         tests = [t for t in published.tests if t.objects == OBJECTS and not t.measure.startswith("likert_")]
         directions = [
@@ -55,15 +55,15 @@ class Rows:
 
     @property
     def people(self) -> int:
-        """In all cells."""
+        """The total number of participants."""
         return sum(self.sizes.values())
 
     def measures(self) -> list[str]:
-        """Short names of the measures."""
+        """Return the short names of the measures."""
         return [test.measure for test in self.tests]
 
     def orders(self) -> list[str]:
-        """The orders in words: of two conditions each, then of variances."""
+        """Describe in words the published orders of means, then the published order of variances."""
         measure, condition = self.varies_most
         return [
             *(f"{d.measure}: {d.label()}" for d in self.directions),
@@ -73,34 +73,34 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What studies of one size find, for n draws: means and variances of cells.
+    """Means and variances of the cells, for n draws of the parameters.
 
     Attributes:
-        means: (n, measures, conditions).
-        variances: (n, measures, conditions).
+        means: Means, shape (n, measures, conditions).
+        variances: Variances, shape (n, measures, conditions).
     """
 
     means: Values
     variances: Values
 
     def with_chance(self, sizes: Values, rng: np.random.Generator) -> "Outcome":
-        """Means and variances of samples of these sizes, (conditions,); normal theory."""
+        """Return means and variances of random samples of these sizes, (conditions,), by normal theory."""
         means = self.means + np.sqrt(self.variances / sizes) * rng.standard_normal(self.means.shape)
         return Outcome(means, self.variances * rng.chisquare(sizes - 1, self.variances.shape) / (sizes - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Draws, and how near their studies are.
+    """All draws of the parameters, and their distances from the published study.
 
     Attributes:
         draws: Values of the free parameters, (n, parameters).
-        outcome: Their populations.
+        outcome: Means and variances in the population of each draw.
         eta_squared: Partial eta squared of assistance in the populations, (n, tests).
-        distance: From the published study, of a study with chance, (n,).
-        population_distance: Of the population, without chance, (n,).
-        kept: Numbers of the draws that are kept, the nearest first.
-        best: Number of the draw whose population is nearest.
+        distance: Distance of a random study of each population from the published study, (n,).
+        population_distance: Distance of each population from the published study, (n,).
+        kept: Indices of the kept draws, the nearest first.
+        best: Index of the draw whose population is nearest.
     """
 
     draws: Values
@@ -112,15 +112,15 @@ class Fit:
     best: int
 
     def contraction(self) -> Values:
-        """By how much knowing the rows narrows each parameter: 1 - variance after / variance before, (parameters,)."""
+        """Return the relative reduction of each parameter's variance by the fit, (parameters,)."""
         return np.asarray(1.0 - self.draws[self.kept].var(axis=0) / self.draws.var(axis=0))
 
     def sensitivity(self) -> Values:
-        """Rank correlation of each parameter with each effect size, over the priors, (parameters, tests)."""
+        """Return rank correlations between parameters and effect sizes, (parameters, tests)."""
         return _rank_correlation(self.draws, self.eta_squared)
 
     def trade_offs(self) -> Values:
-        """Rank correlation of the parameters with each other among the kept draws, (parameters, parameters)."""
+        """Return the rank correlations between parameters among the kept draws, (parameters, parameters)."""
         return _rank_correlation(self.draws[self.kept], self.draws[self.kept])
 
 
@@ -133,15 +133,15 @@ def fit(
     seed: int,
     on_progress: Callable[[int], None] = lambda _: None,
 ) -> Fit:
-    """Draw, compare, keep.
+    """Draw parameters from their priors and keep the draws that best reproduce the published study.
 
     Args:
-        free: What is fitted.
-        cells: Surrogates; their inputs are those of `free.inputs()`, their measures those of the rows.
-        rows: The published rows.
-        draws: How many.
-        seed: Of all chance.
-        on_progress: Called with how many draws are done.
+        free: The parameters to fit.
+        cells: Surrogate models with the inputs of `free.inputs()` and the measures of `rows`, by condition.
+        rows: The published results.
+        draws: Number of draws.
+        seed: Seed of the random number generator.
+        on_progress: Called with the number of finished draws.
     """
     rng = np.random.default_rng(seed)
     values = free.draw(draws, rng)
@@ -151,7 +151,7 @@ def fit(
         people = free.people(draw, shares)
         moments.append([cells[condition].moments(people) for condition in rows.sizes])
         on_progress(k + 1)
-    found = np.array(moments).transpose(2, 0, 3, 1)  # mean or variance, draw, measure, condition
+    found = np.array(moments).transpose(2, 0, 3, 1)  # axes: mean or variance, draw, measure, condition
     outcome = Outcome(found[0], found[1])
     sizes = np.array(list(rows.sizes.values()), float)
     study = outcome.with_chance(sizes, rng)
@@ -164,13 +164,13 @@ def fit(
 
 
 def population_effects(outcome: Outcome, sizes: Values) -> Values:
-    """Partial eta squared of populations at these numbers of people, (n, measures)."""
+    """Return partial eta squared in populations, for the given numbers of participants, as (n, measures)."""
     noncentrality = _between(outcome, sizes) / _within(outcome, sizes)
     return np.asarray(noncentrality / (noncentrality + sizes.sum()))
 
 
 def sample_effects(study: Outcome, sizes: Values) -> Values:
-    """Partial eta squared of samples, (n, measures)."""
+    """Return partial eta squared in samples, as (n, measures)."""
     between = _between(study, sizes)
     return np.asarray(between / (between + _within(study, sizes) * (sizes.sum() - len(sizes))))
 
@@ -185,13 +185,13 @@ def _within(outcome: Outcome, sizes: Values) -> Values:
 
 
 def _distance(effects: Values, outcome: Outcome, rows: Rows, target: Values) -> Values:
-    """Root of the sum of squared differences of effect sizes, in standard errors; a wrong order counts as one."""
+    """Return the root of the summed squared errors in standard errors. A missed order adds an error of 1."""
     errors = (_angle(effects) - _angle(target)) / _standard_errors(rows)
     return np.asarray(np.sqrt((errors**2).sum(axis=1) + missed_orders(outcome, rows).sum(axis=1)))
 
 
 def missed_orders(outcome: Outcome, rows: Rows) -> NDArray[np.bool_]:
-    """Which of the published orders studies of these means and variances miss, (n, orders), as `Rows.orders`."""
+    """Return which of the published orders (`Rows.orders`) each study fails to reproduce, as (n, orders)."""
     names, sizes = list(rows.sizes), np.array(list(rows.sizes.values()), float)
     measures, within = rows.measures(), _within(outcome, sizes)
     quantile, missed = tukey_quantile(len(sizes), sizes.sum() - len(sizes)), []
@@ -207,7 +207,7 @@ def missed_orders(outcome: Outcome, rows: Rows) -> NDArray[np.bool_]:
 
 
 def _angle(eta_squared: Values) -> Values:
-    """On this scale, chance is about as large for large effects as for small ones."""
+    """Transform effect sizes so that their sampling error hardly depends on their size."""
     return np.arcsin(np.sqrt(eta_squared))
 
 
@@ -221,19 +221,19 @@ def _standard_errors(rows: Rows) -> Values:
 
 
 def _printed(rows: Rows) -> Values:
-    """Effect sizes of the published study."""
+    """Return the effect sizes in the published study."""
     tests = [test.test(rows.people) for test in rows.tests]
     return np.array([test.eta_squared for test in tests if test is not None])
 
 
 def _middle(rows: Rows) -> Values:
-    """What the published effect sizes are most likely to be in the population: the middle of their intervals."""
+    """Estimate the published effect sizes in the population by the middle of their confidence intervals."""
     low, high = _intervals(rows).T
     return np.asarray(np.sin((_angle(low) + _angle(high)) / 2) ** 2)
 
 
 def _rank_correlation(one: Values, other: Values) -> Values:
-    """Spearman's, of every column of one with every column of the other."""
+    """Return Spearman's rank correlations of all columns of one array with all columns of the other."""
     first, second = (rankdata(x, axis=0) for x in (one, other))
     first, second = (x - x.mean(axis=0) for x in (first, second))
     return np.asarray(first.T @ second / np.sqrt(np.outer((first**2).sum(axis=0), (second**2).sum(axis=0))))

@@ -1,4 +1,4 @@
-"""Populations of simulated people with free parameters: studies/calibration.toml."""
+"""Populations of simulated participants with free parameters, as described in studies/calibration.toml."""
 
 import tomllib
 from collections.abc import Mapping
@@ -19,36 +19,37 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FreeParameters:
-    """What is fitted.
+    """The parameters to fit, with their priors.
 
     Attributes:
-        priors: Prior distribution by name.
-        population: Distributions over people as in a design's table `behaviour`; names stand for free parameters.
+        priors: Prior distribution of each parameter, by name.
+        population: The `behaviour` table of a design, with names of free parameters in place of numbers.
     """
 
     priors: Mapping[str, Distribution]
     population: Mapping[str, Any]
 
     def draw(self, count: int, rng: np.random.Generator) -> Values:
-        """So many draws from the priors, (count, parameters)."""
+        """Return `count` draws from the priors, (count, parameters)."""
         shares = rng.random((count, len(self.priors)))
         columns = [[p.quantile(s) for s in shares[:, k]] for k, p in enumerate(self.priors.values())]
         return np.array(columns, float).T
 
     def behaviour(self, values: Values) -> Distributions:
-        """The population of one draw, (parameters,)."""
+        """Return the population that belongs to one draw (parameters,) of the free parameters."""
         return Distributions.of(_filled(self.population, dict(zip(self.priors, values, strict=True))))
 
     def inputs(self) -> list[str]:
-        """Parameters of the participant model whose distribution is fitted, sorted."""
+        """Return the sorted names of the participant model's parameters whose distributions are fitted."""
         return list(self.behaviour(self._medians()))
 
     def people(self, values: Values, shares: Values) -> Values:
-        """People of one draw: their values of `inputs`, (n, inputs).
+        """Return simulated participants of one draw as their values of `inputs`, (n, inputs).
 
         Args:
-            values: The draw, (parameters,).
-            shares: Random numbers from 0 to 1, the same set for every input in another order, (n, inputs).
+            values: One draw of the free parameters, (parameters,).
+            shares: Random numbers from 0 to 1, (n, inputs). All columns hold the same numbers in different
+                orders.
         """
         levels = np.sort(shares[:, 0])
         found = [_quantiles(d, levels) for d in self.behaviour(values).values()]
@@ -59,10 +60,10 @@ class FreeParameters:
 
 
 def read_free_parameters(path: Path = FILE) -> FreeParameters:
-    """The committed choice.
+    """Load the free parameters from a TOML file.
 
     Raises:
-        ConfigError: The file is unusable; the message names it.
+        ConfigError: The file cannot be used. The message names it.
     """
     try:
         file = tomllib.loads(read_text(path))
@@ -76,7 +77,7 @@ def read_free_parameters(path: Path = FILE) -> FreeParameters:
 
 
 def stratified_shares(people: int, inputs: int, rng: np.random.Generator) -> Values:
-    """Numbers from 0 to 1 that cover each input evenly (a Latin hypercube), (people, inputs)."""
+    """Return a Latin hypercube sample: numbers from 0 to 1 that cover each input evenly, (people, inputs)."""
     levels = (np.arange(people) + 0.5) / people
     return np.array([rng.permutation(levels) for _ in range(inputs)]).T
 
@@ -88,7 +89,7 @@ def _quantiles(described: Distribution, levels: Values) -> Values:
 
 
 def _filled(given: Any, values: Mapping[str, float]) -> Any:
-    """A description with the values of free parameters in the place of their names."""
+    """Replace the names of free parameters in a description by their values."""
     if isinstance(given, dict):
         return {name: _filled(part, values) for name, part in given.items()}
     if isinstance(given, list):

@@ -1,8 +1,8 @@
-"""A surrogate of trials: what a person's values make of the measures, learnt from simulated people of one cell.
+"""A surrogate model that predicts the measures of a trial from the parameters of the simulated participant.
 
-The expectation is a quadratic function of the values, each as the share of the pool that lies below it; the logarithm
-of the variance around it is a linear one. Slopes are shrunk (ridge regression), those of the expectation as generalised
-cross-validation says.
+Each parameter is first converted to the share of the pool with smaller values. The expectation of a measure
+is a quadratic function of these shares, and the logarithm of its variance is a linear function. Both are
+fitted by ridge regression. Generalized cross-validation selects the penalty for the expectation.
 """
 
 from dataclasses import dataclass
@@ -14,21 +14,21 @@ from experiments.errors import StatisticsError
 
 Values = NDArray[np.float64]
 PENALTIES = np.logspace(-3, 4, 29)
-FEWEST = 30  # people from whom anything can be learnt
-ITERATIONS, STEP = 200, 0.2  # of the fit of variances
+FEWEST = 30  # minimum number of participants for learning a surrogate model
+ITERATIONS, STEP = 200, 0.2  # number and size of the steps that fit the variances
 SLOPE_PENALTY = 2.0
-SMALLEST = 1e-4  # of the variance of the pool: no outcome is more certain
+SMALLEST = 1e-4  # smallest variance of an outcome, as a share of the variance in the pool
 
 
 @dataclass(frozen=True, eq=False)
 class Surrogate:
-    """The measures in one cell.
+    """A surrogate model of the measures in one cell.
 
     Attributes:
-        knots: Sorted values of the pool, (n, inputs).
+        knots: Sorted parameter values of the pool, (n, inputs).
         mean: Coefficients of the expectations, (quadratic terms, measures).
         log_variance: Coefficients of the logarithms of the variances around them, (linear terms, measures).
-        left_out_r2: Share of the variance that is predicted of people left out of the fit, (measures,).
+        left_out_r2: Share of the variance explained in leave-one-out cross-validation, (measures,).
     """
 
     knots: Values
@@ -38,25 +38,25 @@ class Surrogate:
 
     @property
     def people(self) -> int:
-        """How many people it was learnt from."""
+        """The number of participants from which the model was learned."""
         return len(self.knots)
 
     def moments(self, people: Values) -> tuple[Values, Values]:
-        """Means and variances of the measures over people, (n, inputs): (measures,) each."""
+        """Return means and variances of the measures, (measures,) each, over participants (n, inputs)."""
         shares = _shares(self.knots, people)
         expected, left = _quadratic(shares) @ self.mean, np.exp(_linear(shares) @ self.log_variance)
         return expected.mean(axis=0), expected.var(axis=0) + left.mean(axis=0)
 
 
 def learn(people: Values, outcomes: Values) -> Surrogate:
-    """Learn the measures from people of one cell.
+    """Learn a surrogate model from the simulated participants in one cell.
 
     Args:
-        people: Their values, (n, inputs).
-        outcomes: Their measures, (n, measures).
+        people: Parameters of the participants, (n, inputs).
+        outcomes: Measures of the participants, (n, measures).
 
     Raises:
-        StatisticsError: There are too few people, or a measure does not vary.
+        StatisticsError: There are too few participants, or a measure does not vary.
     """
     if len(outcomes) < FEWEST:
         raise StatisticsError(f"{len(outcomes)} people are too few to learn from; {FEWEST} are needed")
@@ -76,13 +76,13 @@ def _learn_one(shares: Values, outcome: Values) -> tuple[Values, Values, float]:
 
 
 def log_linear(terms: Values, squares: Values) -> Values:
-    """Coefficients of the logarithm of the expectation of squares, by gamma regression with shrunk slopes.
+    """Fit the logarithm of the expected squares by gamma regression with a ridge penalty.
 
-    The likelihood is that of a normal distribution whose variance differs from person to person.
+    This assumes a normal distribution whose variance differs between participants.
 
     Args:
-        terms: The first one is 1, (n, terms).
-        squares: All positive, (n,).
+        terms: Predictors, of which the first one is constantly 1, (n, terms).
+        squares: Positive squared errors, (n,).
 
     Source: McCullagh and Nelder 1989, Generalized Linear Models, chapter 8.
     """
@@ -96,14 +96,14 @@ def log_linear(terms: Values, squares: Values) -> Values:
 
 
 def ridge(terms: Values, outcome: Values) -> tuple[Values, Values]:
-    """Regression with shrunk coefficients, but for the first term.
+    """Fit a ridge regression in which the first term, the intercept, has no penalty.
 
     Args:
-        terms: The first one is 1, (n, terms).
-        outcome: (n,).
+        terms: Predictors, of which the first one is constantly 1, (n, terms).
+        outcome: Dependent variable, (n,).
 
     Returns:
-        The coefficients, and what is left of each outcome where it is not used itself, (n,).
+        The coefficients, and the leave-one-out residuals, (n,).
 
     Source: Golub, Heath and Wahba 1979, doi:10.1080/00401706.1979.10489751.
     """
@@ -123,7 +123,7 @@ def ridge(terms: Values, outcome: Values) -> tuple[Values, Values]:
 
 
 def _shares(knots: Values, people: Values) -> Values:
-    """For each value, the share of the pool that is not above it, (n, inputs)."""
+    """Convert each parameter value to the share of the pool that is not above it, (n, inputs)."""
     found = [np.searchsorted(k, v, side="right") for k, v in zip(knots.T, people.T, strict=True)]
     return np.array(found).T / len(knots)
 

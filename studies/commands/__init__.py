@@ -1,1 +1,1 @@
-"""The subcommands of `mjsim study` that need the published study. They serve `mjsim` in a checkout."""
+"""Subcommands of `mjsim study` that need the published results. They work only in a checkout."""

@@ -1,4 +1,4 @@
-"""`mjsim study calibrate`: fits the guest to the published rows at 6 objects, and says what they do not tell."""
+"""The command `mjsim study calibrate`, which fits the `guest` model to the published results."""
 
 import argparse
 from pathlib import Path
@@ -29,7 +29,7 @@ What fits is not therefore true; docs/paper.md says what may be concluded."""
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
+    """Add the subcommand `calibrate` to `mjsim study`."""
     parser = add_command(
         commands,
         "calibrate",
@@ -52,11 +52,11 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Learn, fit, write, say where.
+    """Calibrate, write the results, and print their path.
 
     Raises:
-        ConfigError: An option or a file of the package is unusable.
-        RecordError: The pool is none, or files are in the way.
+        ConfigError: An option is invalid, or a file of the package cannot be used.
+        RecordError: The folder is not a pool, or output files already exist.
         StatisticsError: The pool is too small.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn

@@ -1,4 +1,4 @@
-"""`mjsim study controls`: studies that lack something, and so must not come out as the published one."""
+"""The command `mjsim study controls`, which simulates the negative controls of a study."""
 
 import argparse
 from pathlib import Path
@@ -15,7 +15,7 @@ that agrees with the published rows that should depend on what it lacks shows th
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
+    """Add the subcommand `controls` to `mjsim study`."""
     parser = add_command(
         commands, "controls", run, summary="simulate a study's negative controls", description=DESCRIPTION
     )
@@ -25,10 +25,10 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate one control after the other; 1 if a trial failed.
+    """Simulate the controls one after the other. Return 1 if a trial failed, otherwise 0.
 
     Raises:
-        ConfigError: There is no control of that name.
+        ConfigError: There is no control with the given name.
     """
     from experiments.cli.terminal import error_console
     from experiments.trials.designs import read_study, study_path

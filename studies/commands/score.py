@@ -1,4 +1,4 @@
-"""`mjsim study score`: a study against the published statistics, row by row."""
+"""The command `mjsim study score`, which compares a study with the published statistics."""
 
 import argparse
 import sys
@@ -8,7 +8,7 @@ from typing import Any
 from experiments.cli.doctor import require_extra
 from experiments.cli.options import add_command, add_force
 
-WIDTH = 160  # characters, where there is no terminal
+WIDTH = 160  # width of the table in characters if the output is not a terminal
 
 DESCRIPTION = """\
 Score a study against the published one (studies/published.toml): effect sizes within the 90 %
@@ -21,7 +21,7 @@ of the published size are drawn from it, to see how many come out as published."
 
 
 def add_parser(commands: Any) -> None:
-    """Add the subcommand."""
+    """Add the subcommand `score` to `mjsim study`."""
     parser = add_command(
         commands, "score", run, summary="compare a study with the published one", description=DESCRIPTION
     )
@@ -32,11 +32,11 @@ def add_parser(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Score, show, write.
+    """Score the study, print the results, and write them to files.
 
     Raises:
-        ConfigError: statsmodels is missing, or the seed is negative.
-        RecordError: The folder is no study, or files are in the way.
+        ConfigError: statsmodels is not installed, or the seed is negative.
+        RecordError: The folder does not contain a study, or output files already exist.
     """
     require_extra("study")
     from experiments.analysis.study.measures import read_measures

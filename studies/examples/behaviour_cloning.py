@@ -1,12 +1,12 @@
-"""Worked example: an agent learns to fetch and deliver an object by imitation, with Stable-Baselines3.
+"""Worked example: train an agent to fetch and deliver an object by imitation, with Stable-Baselines3.
 
     pip install -e '.[learn]'
     python -m studies.examples.behaviour_cloning
 
-A policy of Stable-Baselines3 is fitted to the actions of a built-in participant: first in episodes in which the
-participant acts, then in rounds in which the policy acts and the participant says what it would have done (DAgger). The
-policy observes the breadcrumbs of the HUD. The share of objects that it delivers in unseen episodes is printed before
-and after training. This takes a few minutes on a CPU.
+A Stable-Baselines3 policy is fitted to the actions of a built-in participant. In the first round, the
+participant acts. In later rounds, the policy acts, and the participant's choice in the same situation is
+recorded (DAgger). The policy observes the breadcrumbs of the HUD. The share of objects that it delivers in
+unseen episodes is printed before and after training. This takes a few minutes on a CPU.
 """
 
 import argparse
@@ -28,21 +28,21 @@ from mjsim.environments import Continuous, ObservationDict, RearrangeEnv, Sensor
 from studies.examples.breadcrumbs import breadcrumb_sensor
 from studies.examples.demonstrations import Demonstrations, demonstrate
 
-UNSEEN = 1_000_000  # first seed of the evaluation; no demonstration has such a seed
-TRIGGER_WEIGHT = 10.0  # picks and places are rare, and everything depends on them
+UNSEEN = 1_000_000  # first seed of the evaluation episodes, which is larger than any training seed
+TRIGGER_WEIGHT = 10.0  # weight of picks and places, which are rare but essential
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Size of the experiment.
+    """Settings of the training and of the evaluation.
 
     Attributes:
-        episodes: Houses to learn in.
-        rounds: Rounds in which the policy acts and is corrected.
-        breadcrumbs: Whether the policy observes the breadcrumbs.
-        epochs: Passes over the data in each round.
-        evaluation: Unseen episodes to measure in.
-        seed: Of everything.
+        episodes: Number of training episodes, each in another house.
+        rounds: Number of rounds in which the policy acts and the participant corrects it.
+        breadcrumbs: True if the policy observes the breadcrumbs.
+        epochs: Number of passes over the data in each round.
+        evaluation: Number of unseen episodes for the evaluation.
+        seed: Seed of the networks and of all random numbers.
     """
 
     episodes: int = 80
@@ -54,10 +54,10 @@ class Settings:
 
 
 def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[Sensor] = ()) -> RearrangeEnv:
-    """An environment with one object and 8 actions per second; `sensors` are added to the state.
+    """Create an environment with one object and 8 actions per second. It observes its state and `sensors`.
 
     Raises:
-        TypeError: Gymnasium made another environment.
+        TypeError: Gymnasium has created an environment of another class.
     """
     made = gymnasium.make(
         "mjsim.environments:mjsim/Rearrange-v0",
@@ -66,7 +66,7 @@ def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[
         actions=Continuous(repeat=3),
         time_limit=time_limit,
         episodes=episodes,
-        physics_errors="truncate",  # an untrained policy may break the physics; training continues
+        physics_errors="truncate",  # an untrained policy may break the physics
     )
     environment = made.unwrapped
     if not isinstance(environment, RearrangeEnv):
@@ -75,13 +75,14 @@ def make_environment(episodes: int | None, time_limit: float, sensors: Sequence[
 
 
 def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
-    """Train a policy.
+    """Train a policy by imitation.
 
     Returns:
-        The Stable-Baselines3 model, and the share of objects that it delivers in unseen episodes before and after.
+        The Stable-Baselines3 model, and the share of objects delivered in unseen episodes before and after
+        training.
     """
     torch.manual_seed(settings.seed)
-    torch.set_num_threads(1)  # the network is too small for more
+    torch.set_num_threads(1)  # more threads do not help, because the network is small
     rng = np.random.default_rng(settings.seed)
     house = House.load()
     sensors = (breadcrumb_sensor(house),) if settings.breadcrumbs else ()
@@ -118,7 +119,7 @@ def learn(settings: Settings, console: Console) -> tuple[Any, float, float]:
 
 
 def fit(model: Any, shown: Sequence[Demonstrations], *, epochs: int, rng: np.random.Generator) -> float:
-    """Fit the policy's mean action to the demonstrated ones; returns the mean loss of the last epoch."""
+    """Fit the policy's mean action to the demonstrated actions. Return the mean loss of the last epoch."""
     observations = {
         name: torch.as_tensor(np.concatenate([d.observations[name] for d in shown]))
         for name in shown[0].observations
@@ -144,7 +145,7 @@ def fit(model: Any, shown: Sequence[Demonstrations], *, epochs: int, rng: np.ran
 
 
 def evaluate(model: Any, environment: RearrangeEnv, episodes: int) -> float:
-    """Share of the objects that the policy delivers in unseen episodes; closes the environment."""
+    """Return the share of objects that the policy delivers in unseen episodes. Close the environment."""
     delivered = total = 0
     for seed in range(UNSEEN, UNSEEN + episodes):
         seen, info = environment.reset(seed=seed)
@@ -160,7 +161,7 @@ def evaluate(model: Any, environment: RearrangeEnv, episodes: int) -> float:
 
 
 def main() -> None:
-    """Run the example from the command line."""
+    """Train and evaluate a policy with the settings given on the command line."""
     parser = argparse.ArgumentParser(description="Train an agent to deliver an object, by imitation.")
     parser.add_argument("--episodes", type=int, default=Settings.episodes, help="houses to learn in")
     parser.add_argument("--rounds", type=int, default=Settings.rounds, help="rounds of correction")

@@ -1,4 +1,4 @@
-"""A custom sensor: the breadcrumbs of the HUD, for agents that should have the same assistance as people."""
+"""A custom sensor through which an agent observes the breadcrumbs of the HUD, as a person does."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +8,15 @@ from experiments.participants import Point
 from mjsim import ObjectStatus, path_length, point_along
 from mjsim.environments import Sensor, SensorInput, unit_spec
 
-LOOK_AHEAD = 1.0  # m along the path
+LOOK_AHEAD = 1.0  # distance of the observed point along the path, in metres
 
 
 def breadcrumb_sensor(house: House) -> Sensor:
-    """The shortest path to the next visit: the point 1 m along it (forward, left, m), and the length of the path.
+    """Return a sensor that observes the shortest path to the next visit.
 
-    The next visit is at the nearest receptacle of a carried object, else at the nearest loose object. All values are 0
-    when nothing is left to do.
+    It observes the point 1 m along the path (forward, left, m) and the path length. The next visit is at the
+    nearest receptacle of a carried object, otherwise at the nearest loose object. Without a next visit, all
+    values are 0.
 
     Args:
         house: House of the episodes.

@@ -1,4 +1,4 @@
-"""Demonstrations for imitation learning: pairs of an observation and the action of a built-in participant."""
+"""Record demonstrations for imitation learning: observations with the actions of an expert."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -30,10 +30,10 @@ Policy = Callable[[ObservationDict], NDArray[np.float32]]
 
 @dataclass(frozen=True, eq=False)
 class Demonstrations:
-    """Observations, and the action that the expert would have taken in each.
+    """Observations, each with the action that the expert would have taken.
 
     Attributes:
-        observations: Sensor name -> array; the first axis counts the samples.
+        observations: Arrays by sensor name, with the samples along the first axis.
         actions: Actions for continuous control, float32, shape (samples, 4).
         delivered: Share of the objects that were delivered.
     """
@@ -44,14 +44,14 @@ class Demonstrations:
 
 
 class Expert:
-    """The participant that goes to the nearest flagpole, in one episode of an environment.
+    """An expert for one episode: the built-in participant that always goes to the nearest flagpole.
 
     Args:
-        house: The house, which the participant knows.
+        house: The house in which the participant walks.
         scene: The scene of the episode.
 
     Attributes:
-        answer: Result of the last pick or place of the episode; to be set by the caller.
+        answer: Result of the last pick or place in the episode, which the caller must set.
     """
 
     def __init__(self, house: House, scene: Scene) -> None:
@@ -61,7 +61,7 @@ class Expert:
         self.answer: ActionResult | None = None
 
     def act(self, observation: Observation) -> StepAction:
-        """What the participant would do now."""
+        """Return the action that the participant would take now."""
         percept = _Omniscient(
             observation,
             self._scene.episode.targets,
@@ -76,22 +76,22 @@ class Expert:
 
 
 class _Omniscient(Percept):
-    """The percept of a person who sees a flagpole over every misplaced object."""
+    """Percept of a participant who sees a flagpole over every misplaced object."""
 
     @property
     def flagpoles(self) -> Mapping[str, Point]:
-        """Object instance name -> floor position, m, shape (2,)."""
+        """Floor positions of misplaced objects by instance name, in metres, each of shape (2,)."""
         return positions_of(self._seen, self._seen.names_with(ObjectStatus.LOOSE))
 
 
 def _without_objects(observation: Observation) -> Observation:
-    """The policy does not observe objects at its feet, so the expert must not walk around them."""
+    """Remove all objects from an observation, because the policy cannot see objects at its feet either."""
     nothing = np.zeros((0, 3))
     return dataclasses.replace(observation, object_names=(), object_status=(), object_positions=nothing)
 
 
 def encode(action: StepAction, person: PersonParameters) -> NDArray[np.float32]:
-    """An action of the world as one of continuous control: (forward, left, turn, trigger), -1 to 1, shape (4,)."""
+    """Convert a world action to continuous control: (forward, left, turn, trigger), -1 to 1, shape (4,)."""
     if isinstance(action, Move):
         speed, turn = person.fastest_walk, person.turning_speed
         values = [action.forward / speed, action.left / speed, action.turn / turn, 0.0]
@@ -109,16 +109,16 @@ def demonstrate(
     driver: Policy | None = None,
     noise: float = 0.0,
 ) -> Demonstrations:
-    """Run episodes and record what the expert would do at every step.
+    """Run episodes and record the expert's action at every step.
 
     Args:
         core: Environment with continuous control.
         house: The house of the environment.
         seeds: Seeds of the episodes.
-        rng: Draws the noise.
-        driver: The policy that acts; None for the expert. If the policy acts and the expert corrects it, the policy
-            learns from the states that its own mistakes lead to (DAgger, Ross et al. 2011).
-        noise: Standard deviation of what is added to the velocities, as a share of the limits.
+        rng: Random generator for the noise.
+        driver: The policy that acts, or None if the expert acts. A policy that acts while the expert corrects
+            it learns from its own mistakes (DAgger, Ross et al. 2011).
+        noise: Standard deviation of the noise that is added to velocities, as a share of their limits.
     """
     rows: list[ObservationDict] = []
     actions: list[NDArray[np.float32]] = []
@@ -130,7 +130,7 @@ def demonstrate(
         while not is_over:
             advice = encode(expert.act(core.state), core.world.scene.person)
             action = advice if driver is None else driver(seen)
-            if not core.world.busy:  # busy hands ignore the action
+            if not core.world.busy:  # actions are ignored during a pick or place
                 rows.append(seen)
                 actions.append(advice)
             taken = core.step(_noisy(action, noise, rng))

@@ -1,12 +1,13 @@
-"""Worked example: do the published directions hold over 200 homes?
+"""Worked example: test whether the published differences between conditions hold in 200 homes.
 
     mjsim study simulate studies/examples/many_homes.toml --out runs/homes
     python -m studies.examples.many_homes runs/homes
 
-300 simulated people tidy four of 200 generated homes each. This prints the differences between conditions, with
-intervals for other homes, in how many homes they have the sign that they have on average, and the shares of the
-variance between people, homes and conditions within homes. It writes homes.png beside the trials: the difference
-between optimal guidance and none in each home, by its number of rooms. All of it is simulated.
+In this example, each of 300 simulated participants tidies four of 200 generated homes. The script prints the
+differences between conditions with intervals that generalize over homes, the share of homes whose difference
+has the same sign as the average, and the shares of the variance between people and between homes. It also
+draws homes.png in the folder of the trials, which shows the difference between optimal guidance and none for
+each home by its number of rooms. All data are simulated.
 """
 
 import argparse
@@ -26,11 +27,11 @@ from experiments.analysis.study.measures import read_measures
 from experiments.analysis.study.table import StudyTable, read_study
 from mjsim.support.files import replacing
 
-FIRST, SECOND = "none", "optimal"  # of the picture
+FIRST, SECOND = "none", "optimal"  # conditions whose difference is drawn
 
 
 def differences(table: StudyTable, name: str, first: str, second: str) -> dict[str, float]:
-    """Mean of the second condition less that of the first, by house where both are known."""
+    """Return the mean difference between two conditions for each house in which both were measured."""
     values, found = table.columns[name], {}
     for house in dict.fromkeys(table.houses.tolist()):
         here = (table.houses == house) & ~np.isnan(values)
@@ -41,7 +42,7 @@ def differences(table: StudyTable, name: str, first: str, second: str) -> dict[s
 
 
 def lines(table: StudyTable, name: str) -> list[str]:
-    """What the trials say of a measure, a line each."""
+    """Return lines of text that report the results for a measure."""
     here = table.take(np.flatnonzero(~np.isnan(table.columns[name])))
     values, said = here.columns[name], []
     of_all = here.assistance, here.objects
@@ -62,7 +63,7 @@ def lines(table: StudyTable, name: str) -> list[str]:
 
 
 def draw(path: Path, table: StudyTable, names: Sequence[str]) -> None:
-    """A dot for each home by its number of rooms, and means."""
+    """Draw a point for each home by its number of rooms, and the mean for each number of rooms."""
     rooms: dict[str, float] = dict(zip(table.houses.tolist(), table.numbers("rooms").tolist(), strict=True))
     figure = Figure(figsize=(3.2 * len(names), 3.2), layout="constrained")
     FigureCanvasAgg(figure)
@@ -88,7 +89,7 @@ def _means(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.f
 
 
 def main() -> None:
-    """Print what the trials of a folder say, and draw it."""
+    """Print the results of the trials in a folder, and draw them."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

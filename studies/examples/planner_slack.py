@@ -1,15 +1,16 @@
-"""Worked example: how much of people's deviations is the slack of the planner that they are compared with?
+"""Worked example: measure how many of the participants' deviations are caused by an imperfect planner.
 
     python -m studies.examples.planner_slack --people 4 --out runs/slack
 
-A deviation is a visit other than the suggested one. If the suggestion is not the best, a person who does better
-deviates, too. Here the same simulated guests do the same tasks four times, each with another planner: the exact one,
-OR-Tools with its usual 200 solutions, OR-Tools in a hurry (10 solutions), and the nearest visit each time. Under `none`
-they see no suggestion, and walk the same whatever is planned: only the yardstick differs. Under `optimal` they see it.
+A deviation is a visit that differs from the planner's suggestion. If the suggestion is not optimal, better
+choices count as deviations, too. In this example, the same simulated guests do the same tasks with four
+planners: the exact one, OR-Tools with 200 solutions (the default), OR-Tools with 10 solutions, and one that
+always chooses the nearest visit. Under `none`, guests see no suggestion and walk the same way with every
+planner. Under `optimal`, they see it.
 
-Writes slack.csv (a row per condition, number of objects and planner) and slack.png. The trials are a batch: the same
-command resumes after an interruption. All of it is simulated: it says what planners do to the measure, and nothing of
-what people do.
+The example writes slack.csv (a row for each condition, number of objects and planner) and slack.png. If it is
+interrupted, the same command resumes it. All data are simulated: they show the effect of planners on the
+measure, not the behaviour of people.
 """
 
 import argparse
@@ -46,39 +47,39 @@ HURRIED = "studies.examples.planner_slack:HurriedOrTools"
 PLANNERS = {"exact": "exact", "ortools": "OR-Tools", HURRIED: "OR-Tools, hurried", "greedy": "nearest"}
 CONDITIONS = ("none", "optimal")
 OBJECTS = (6, 12, 18, 24)
-FIRST_SEED = 500_000  # apart from other studies
-SLACK = 0.01  # m; a suggestion that costs less than that is as good as the best
+FIRST_SEED = 500_000  # first seed of the participants, different from those of other studies
+SLACK = 0.01  # tolerance for the cost of a suggestion that counts as optimal, in metres
 COLOURS = ("#0072B2", "#E69F00", "#D55E00", "#666666")
 
 
 @dataclass(frozen=True)
 class HurriedOrTools(OrToolsSolver):
-    """OR-Tools with 10 solutions instead of 200: what remains of it with little time."""
+    """OR-Tools with 10 solutions instead of 200, as a planner that has little time."""
 
     name: str = "ortools-hurried"
 
     def solve(self, problem: RoutingProblem, *, seed: int = 0, limit: SolveLimit | None = None) -> Plan:
-        """As OR-Tools, with less work by default."""
+        """Solve the problem like OR-Tools, with a smaller default limit."""
         hurried = SolveLimit(work=10) if limit in (None, SolveLimit()) else limit
         return super().solve(problem, seed=seed, limit=hurried)
 
 
 @dataclass(frozen=True)
 class Slack:
-    """What one planner makes of the deviations in one cell.
+    """Deviations from the suggestions of one planner in one cell.
 
     Attributes:
-        origin: Whether people were simulated.
-        assistance: Condition.
+        origin: Label that tells whether participants were simulated.
+        assistance: Name of the condition.
         objects: Number of objects.
-        planner: Who suggested.
-        people: How many.
-        choices: Visits at which another one was feasible, and of which the regret is known.
-        deviations: Share of these that differ from the suggestion.
-        better: Share at which the person deviated to a visit that was better than the suggestion, by more than 1 cm.
-        suggestion_gap_m: Mean regret of a suggestion, m.
-        worse_suggestions: Share of the suggestions that were more than 1 cm worse than the best visit.
-        person_regret_m: Mean regret of what people did, m.
+        planner: Name of the planner.
+        people: Number of participants.
+        choices: Number of visits that have a known regret and at least one alternative.
+        deviations: Share of these visits that differ from the suggestion.
+        better: Share of these visits that differ from the suggestion and are more than 1 cm better.
+        suggestion_gap_m: Mean regret of the suggestions, m.
+        worse_suggestions: Share of the suggestions that are more than 1 cm worse than the best visit.
+        person_regret_m: Mean regret of the participants' visits, m.
     """
 
     origin: str
@@ -95,9 +96,9 @@ class Slack:
 
 
 def design(people: int, objects: Sequence[int], first_seed: int = FIRST_SEED) -> Design:
-    """The same people with every planner, in their cell; the cheap trials first."""
+    """Return a design in which the same participants work with every planner. Small trials come first."""
     cells = [(n, assistance) for n in sorted(objects) for assistance in CONDITIONS]
-    typical = read_study(study_path("paper"), 1).trials[0]  # the population of the published design
+    typical = read_study(study_path("paper"), 1).trials[0]  # has the participants of the published study
     return Design(
         tuple(
             msgspec.structs.replace(
@@ -118,7 +119,7 @@ def design(people: int, objects: Sequence[int], first_seed: int = FIRST_SEED) ->
 
 
 def slacks(folder: Path) -> list[Slack]:
-    """What the trials of a folder say, by condition, number of objects and planner."""
+    """Summarize the trials in a folder by condition, number of objects and planner."""
     cells: dict[tuple[str, int, str], list[Sequence[Event]]] = {}
     for trial in read_trials(folder)[0]:
         settings = trial.settings
@@ -151,7 +152,7 @@ def _slack(assistance: str, objects: int, planner: str, logs: Sequence[Sequence[
 
 
 def walked_differently(folder: Path) -> Iterator[str]:
-    """People who see no suggestion and yet walked otherwise with another planner: there must be none."""
+    """Yield trials without suggestions whose path depends on the planner. No such trial should exist."""
     paths: dict[tuple[int, int], Any] = {}
     for trial in read_trials(folder)[0]:
         if trial.settings["assistance"] == "none":
@@ -162,7 +163,7 @@ def walked_differently(folder: Path) -> Iterator[str]:
 
 
 def draw(path: Path, found: Sequence[Slack]) -> None:
-    """Deviations by number of objects, and how many of them were better than the suggestion (hatched)."""
+    """Draw the share of deviations by number of objects. Deviations to a better visit are hatched."""
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     FigureCanvasAgg(figure)
     names, levels = list(PLANNERS.values()), sorted({cell.objects for cell in found})
@@ -185,7 +186,7 @@ def draw(path: Path, found: Sequence[Slack]) -> None:
 
 
 def as_csv(found: Sequence[Slack]) -> str:
-    """A row per cell and planner."""
+    """Format the results as CSV, with a row for each cell and planner."""
     text = io.StringIO()
     writer = csv.DictWriter(text, [field.name for field in fields(Slack)], lineterminator="\n")
     writer.writeheader()
@@ -195,7 +196,7 @@ def as_csv(found: Sequence[Slack]) -> str:
 
 
 def main() -> None:
-    """Simulate what is missing; then the table and the picture."""
+    """Run the missing trials, then write the table and the figure."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,10 +1,11 @@
-"""Worked example: which of many disorganized houses has the most typical tasks?
+"""Worked example: find the house with the most typical tasks among many disorganized houses.
 
     python -m studies.examples.typical_house --houses 100
 
-Everybody of a study tidies the same house, and each house has its peculiarities: objects that happen to lie near their
-bins, or all in one room. This finds the house whose shortest tours are nearest to the mean of all houses, at 6, 12, 18
-and 24 objects together (root mean square of standard scores). Nobody walks for it: it depends on no participant.
+All participants of a study tidy the same house, but each house has peculiarities: objects may happen to be
+near their bins, or all in one room. This script finds the house whose shortest tours with 6, 12, 18 and 24
+objects are closest to the mean of all houses, by the root mean square of the standard scores. It needs no
+participant.
 """
 
 import argparse
@@ -27,7 +28,7 @@ SHOWN = 5
 
 
 def tour_lengths(houses: int) -> NDArray[np.float64]:
-    """Lengths of the shortest tours of house seeds 0, 1, ..., m, shape (houses, 4)."""
+    """Return the lengths of the shortest tours in houses with seeds 0, 1, ..., m, shape (houses, 4)."""
     house, exact = House.load(), solver("exact")
     problems, lengths = TaskProblems(house.geodesics), np.zeros((houses, len(OBJECTS)))
     console = Console(stderr=True)
@@ -42,13 +43,13 @@ def tour_lengths(houses: int) -> NDArray[np.float64]:
 
 
 def rms_z_scores(lengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far from the mean house each one is, in standard deviations, (n,); lengths (n, 4) are those of `n` houses."""
+    """Return the root mean square of each house's z-scores, (n,), given tour lengths (n, 4)."""
     scores = (lengths - lengths.mean(axis=0)) / lengths.std(axis=0)
     return np.asarray(np.sqrt((scores**2).mean(axis=1)))
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Print the most typical houses, and the first one for comparison."""
+    """Print the most typical houses and, for comparison, the first one."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,4 +1,4 @@
-"""The composed frame: pure, deterministic, legible at every supported size, safe for colour vision."""
+"""Tests of the drawn HUD: determinism, legibility at all supported sizes, and colour-blind safety."""
 
 import dataclasses
 import math
@@ -30,7 +30,7 @@ def plain(size, level):
 
 
 def ink(state, other, size, level=0):
-    """Where two states look clearly different."""
+    """Return a mask of the pixels in which the drawings of two states differ clearly."""
     a, b = (
         compose(plain(size, level), s, sample.pictures(), sample.TEXTS).astype(int) for s in (state, other)
     )
@@ -130,7 +130,7 @@ def test_capitals_are_at_least_nine_pixels_high_at_480_and_grow_with_the_frame(s
 
 
 def luminance(rgb):
-    """Relative luminance of sRGB 0..255 as WCAG 2 defines it."""
+    """Return the relative luminance of an sRGB colour (0 to 255) as defined by WCAG 2."""
     c = np.asarray(rgb, dtype=np.float64) / 255.0
     linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     return np.asarray(linear @ np.array([0.2126, 0.7152, 0.0722]))
@@ -139,7 +139,7 @@ def luminance(rgb):
 @pytest.mark.parametrize("level", [0, 128, 255])
 @pytest.mark.parametrize("done", [False, True])
 def test_text_contrast_holds_over_any_background(level, done):
-    size = (1920, 1080)  # large, so that strokes have fully covered pixels
+    size = (1920, 1080)  # large enough that strokes cover some pixels completely
     for text, detail, rest in (("HHHHHH", "x", "x"), ("", "HHHHHHH", "")):
         blank = HudState("", (ChecklistItem("", rest, done=done),), (), (InventorySlot(), InventorySlot()))
         state = dataclasses.replace(blank, checklist=(ChecklistItem(text, detail, done=done),))
@@ -151,7 +151,7 @@ def test_text_contrast_holds_over_any_background(level, done):
         assert ratio >= 4.5
 
 
-# Simulation of full colour-vision deficiencies on linear RGB (Machado, Oliveira and Fernandes, 2009).
+# Simulate complete colour-vision deficiencies on linear RGB (Machado, Oliveira and Fernandes, 2009).
 DEFICIENCIES = {
     "none": np.eye(3),
     "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
@@ -164,11 +164,11 @@ DEFICIENCIES = {
 
 
 def byte(rgba):
-    """Colour of a marker as 0..255."""
+    """Return a marker's colour with values from 0 to 255."""
     return tuple(255.0 * c for c in rgba[:3])
 
 
-# What has to be told apart from what it touches or could be taken for.
+# Pairs of colours that the participant must be able to tell apart
 PAIRS = {
     "message: success, refusal": (theme.TONES[MessageKind.SUCCESS], theme.TONES[MessageKind.REFUSAL]),
     "message: success, information": (theme.TONES[MessageKind.SUCCESS], theme.TONES[MessageKind.INFO]),

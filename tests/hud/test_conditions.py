@@ -1,4 +1,4 @@
-"""Rules of the assistance conditions (PAPER section 5), their discovery, and the message bar's texts."""
+"""Tests of the assistance conditions (PAPER section 5), their discovery, and the texts of the message bar."""
 
 import dataclasses
 
@@ -24,7 +24,7 @@ def shown(name, view):
 
 
 def with_path(view, *points):
-    """A view in which another path leads to the next step."""
+    """Return a view in which the path to the next step is replaced."""
     ahead = KnownPlan(view.plan, segment=view.segment, path=np.array(points), goal=view.goal)
     return dataclasses.replace(view, ahead=ahead)
 
@@ -84,7 +84,7 @@ def test_who_carries_one_object_has_one_hand_on_show():
 
 @pytest.mark.parametrize("name", ["none", "highlight"])
 def test_lists_are_in_the_participants_order_with_what_was_picked_crossed_out_at_the_bottom(name):
-    """In the order of picking; an object that was dropped returns to its place."""
+    """Picked objects are sorted by the time of picking. A dropped object returns to its original place."""
     view = with_status(sample.task(6), object_04="delivered", object_01="carried")
     picks = ("object_04", "object_02", "object_01")
     steps = (*(("pick", picked) for picked in picks), ("place", "object_04"))
@@ -150,7 +150,7 @@ def test_guided_is_optimal_with_its_options():
     ],
 )
 def test_options_add_nothing_where_there_is_nothing_to_add(name):
-    """No map of the house, no regret that is known, no breadcrumbs."""
+    """The view has no map, no known regrets and no breadcrumbs."""
     view = with_path(sample.task(12, steps=5), [5.0, 5.0], [9.0, 9.0])
     assert shown(name, view) == shown(name.partition("-")[0], view)
 
@@ -185,7 +185,7 @@ def planned(view, **known):
         (lambda view: dataclasses.replace(view, steps_done=(("throw", "object_00"),)), "throw"),
         (lambda view: dataclasses.replace(view, receptacles=()), "dish_bin"),
         (lambda view: with_status(view, object_00="lost"), "lost"),
-        # A plan is looked at when it is asked for.
+        # The plan is validated only when it is accessed.
         (lambda view: planned(view, steps=(TaskStep("pick", "ghost"),)).plan, "ghost"),
         (lambda view: planned(view, path=np.zeros((2, 3))).path, r"path.*\(2, 3\)"),
         (lambda view: planned(view, segment=np.zeros((2, 3))).segment, r"segment.*\(2, 3\)"),
@@ -243,7 +243,7 @@ def test_flagpoles_are_found_by_object_where_they_are_drawn(base):
     view = sample.task(12, steps=6)
     near = dataclasses.replace(
         view, position=view.objects[7].position[:2]
-    )  # one has a low pole without a flag
+    )  # one object is so near that its pole is low and has no flag
     for seen in (view, near):
         loose = {o.name: o.position[:2] for o in seen.objects if o.status == "loose"}
         state = shown(base, seen)
@@ -279,7 +279,7 @@ def details(state):
 
 
 def test_regrets_stand_beside_what_can_be_done_next_and_nowhere_else():
-    plain = sample.task(6, steps=1)  # the mug in one hand; next the toy car, then both are placed
+    plain = sample.task(6, steps=1)  # mug in hand; plan: pick up the car, place both
     mug, car, novel, shirt, stapler = (o.name for o in plain.objects[:5])
     view = knowing(
         plain,
@@ -303,7 +303,7 @@ def test_regrets_stand_beside_what_can_be_done_next_and_nowhere_else():
 
 
 def test_a_step_that_was_done_and_can_be_done_again_is_noted_once():
-    """The mug was dropped: picking it up is a step that is done and one that is possible."""
+    """The mug was dropped, so the plan contains picking it up as a finished and as a possible step."""
     plain = sample.task(6, steps=1)
     mug = dataclasses.replace(plain.objects[0], status="loose")
     again = (TaskStep("pick", plain.objects[1].name), TaskStep("pick", mug.name))
@@ -322,7 +322,7 @@ def test_options_combine_and_follow_outside_conditions():
 
 
 def test_flags_of_near_objects_are_low():
-    """So that no flag fills the view of somebody who stands before the object."""
+    """Flags must not fill the view of a person who stands in front of the object."""
     view = sample.task(6)
     item = view.objects[0]
     x, y, _ = item.position

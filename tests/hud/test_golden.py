@@ -1,4 +1,4 @@
-"""Golden pictures of HUD states, drawn without OpenGL: world-locked markers are projected as discs."""
+"""Compare HUD drawings with stored pictures. OpenGL is not needed, because markers are drawn as discs."""
 
 import dataclasses
 from pathlib import Path
@@ -44,7 +44,7 @@ def states():
 
 
 def with_markers(frame, markers, dots=5):
-    """Draw markers as discs along their height: enough to see where they are, what size and what colour."""
+    """Draw markers as discs along their height, which shows their position, size and colour."""
     camera = sample.camera(*SIZE)
     out = frame.copy()
     for marker in markers:

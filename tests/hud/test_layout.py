@@ -1,4 +1,4 @@
-"""Laws of the layout: whatever is shown, panels stay apart, inside the frame and narrow, and the current row shows."""
+"""Tests of the layout rules: panels never overlap, stay inside the frame, and show the current row."""
 
 import dataclasses
 import itertools
@@ -98,7 +98,7 @@ def test_panels_are_disjoint_inside_the_frame_and_leave_the_view_free(state, siz
         assert rect.width > 0 and rect.height > 0, name
     for (a, left), (b, right) in itertools.combinations(panels.items(), 2):
         assert not overlap(left, right), f"{a} {left} overlaps {b} {right}"
-    # At most: the list 0.3 x 0.78, bins and map 0.25 x 0.89, message 0.37 x 0.13, hands 0.47 x 0.09, chips, pointer.
+    # Shares of the frame: list 0.3 x 0.78, bins and map 0.25 x 0.89, message 0.37 x 0.13, hands 0.47 x 0.09.
     covered = sum(r.width * r.height for r in panels.values())
     assert covered <= 0.55 * size[0] * size[1], "even with twelve bins, a map and a long message"
     assert found.free.width * found.free.height >= 0.28 * size[0] * size[1], "between the lists all is free"

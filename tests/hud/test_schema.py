@@ -1,4 +1,4 @@
-"""The HUD state as JSON: nothing is lost, and the schema describes exactly what is written."""
+"""Tests of the HUD state as JSON: nothing is lost, and the schema matches the written data."""
 
 import copy
 import dataclasses
@@ -42,7 +42,7 @@ def a_state():
     return to_dict(state)
 
 
-MISSING = object()  # refused even where there is a default
+MISSING = object()  # stands for a missing field, which is rejected even if it has a default
 
 DAMAGE = {
     "a number for text": (("checklist", 0, "text"), 3, r"\$\.checklist\[0\]\.text"),

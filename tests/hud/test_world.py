@@ -1,4 +1,4 @@
-"""Breadcrumbs, flagpoles and the projection of the eye camera, against independent geometry."""
+"""Compare breadcrumbs, flagpoles and the projection of the eye camera with independent geometry."""
 
 import math
 
@@ -35,7 +35,7 @@ def test_breadcrumbs_follow_the_path_evenly_from_chest_height_to_the_floor(path,
     count = len(points)
     assert 0.28 * (count - 1) <= line.length - clearance + 1e-6 < 0.28 * count + 2e-6, "as many as fit"
     expected = [line.length - 0.28 * k for k in range(count - 1, -1, -1)]
-    along = [line.interpolate(max(s, 0.0)).coords[0] for s in expected]  # negative: from the end
+    along = [line.interpolate(max(s, 0.0)).coords[0] for s in expected]  # clip positions before the start
     assert np.allclose(points[:, :2], along, atol=1e-6)
     chest = 0.75 * eye_height
     slope = (chest - 0.04) / line.length
@@ -65,7 +65,7 @@ def test_projection_agrees_with_opencv(turn, where, fovy):
     camera = sample.camera(640, 480, yaw=turn[0], pitch=turn[1])
     camera = CameraView(np.array([0.5, -1.0, 1.6]), camera.rotation, fovy, 640, 480)
     pixels, depth = project(camera, where)
-    vision = np.diag([1.0, -1.0, -1.0]) @ camera.rotation.T  # right, down, forward
+    vision = np.diag([1.0, -1.0, -1.0]) @ camera.rotation.T  # camera axes: right, down, forward
     lens = np.array([[camera.focal, 0.0, 320.0], [0.0, camera.focal, 240.0], [0.0, 0.0, 1.0]])
     ahead = depth > 0.05
     expected_depth = (np.asarray(where, dtype=np.float64) - camera.position) @ vision[2]
@@ -82,7 +82,7 @@ def test_projection_agrees_with_opencv(turn, where, fovy):
 def test_the_centre_and_the_edge_of_the_view():
     camera = CameraView(
         np.zeros(3), np.eye(3), math.pi / 2, 640, 480
-    )  # looks along -z, 45 degrees up and down
+    )  # looks along -z, and sees 45 degrees up and down
     pixels, _ = project(camera, [(0, 0, -2), (0, 2, -2), (2, 0, -2)])
     assert np.allclose(pixels, [[320, 240], [320, 0], [560, 240]])
     assert (

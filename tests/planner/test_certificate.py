@@ -1,4 +1,4 @@
-"""What proves a bound can be followed by anybody, and plans only get better while one waits."""
+"""Check that certificates prove lower bounds, and that plans never get worse during a search."""
 
 import dataclasses
 import itertools

@@ -1,4 +1,4 @@
-"""The checker in every configuration: it refuses no true proof, passes no false bound, and says what it left out."""
+"""Check that the plan checker accepts all valid proofs and rejects all false bounds."""
 
 import dataclasses
 
@@ -26,7 +26,7 @@ def problem_of(seed, n, capacity, resolution, onboard=0):
 
 
 def claim(plan, lower_bound):
-    """The tour of a plan with another lower bound, and nothing that proves it."""
+    """Return a plan with another lower bound and no certificate."""
     status = Status.OPTIMAL if lower_bound >= plan.cost else Status.FEASIBLE
     return dataclasses.replace(plan, lower_bound=lower_bound, status=status, certificate=None)
 
@@ -59,7 +59,7 @@ def test_no_true_proof_is_refused_and_no_derived_bound_is_above_the_optimum(
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(6, 7), capacity=CAPACITIES, resolution=RESOLUTIONS)
 def test_a_bound_above_the_optimum_is_refused_up_to_seven_objects(seed, n, capacity, resolution):
-    """By more than rounding explains; less is accepted."""
+    """The bound is rejected only if rounding cannot explain the excess."""
     problem = problem_of(seed, n, capacity, resolution)
     best, longer = optimum(problem), GreedySolver().solve(problem)
     slack = problem.tolerance(longer.cost) + 2 * (resolution or 0.0)

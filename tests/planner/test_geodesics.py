@@ -1,4 +1,4 @@
-"""Shortest paths against a closed form and a brute-force visibility graph, and their laws."""
+"""Compare shortest paths with a closed form and with a brute-force visibility graph."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ def box(x0, y0, x1, y1):
 
 
 def random_field(seed, count=8):
-    """Boxes, rotated boxes and triangles over a floor of 4 x 4 m."""
+    """Return random boxes, rotated boxes and triangles on a floor of 4 x 4 m."""
     rng = np.random.default_rng(seed)
     field = []
     for _ in range(rng.integers(1, count + 1)):
@@ -42,7 +42,7 @@ def sampled(mesh, seed, count):
 
 
 def brute_force(field, radius, points):
-    """All-pairs distances over every vertex of the inflated obstacles, visibility by shapely."""
+    """Return the distances between points, computed with a visibility graph of the inflated obstacles."""
     inflated = shapely.unary_union(
         [shapely.convex_hull(shapely.MultiPoint(p)).buffer(radius, 8) for p in field]
     )

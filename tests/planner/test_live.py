@@ -1,4 +1,4 @@
-"""Live replanning: a plan at once, better ones later, and no change of mind without a reason."""
+"""Tests of live replanning: a first plan appears immediately, and only better plans replace it."""
 
 import argparse
 import contextlib
@@ -44,7 +44,7 @@ def live(geodesics, solver, **options):
 
 
 class Script:
-    """A solver that hands out prepared orders of visits, the later ones only when told to, and notes who waits."""
+    """A solver that yields prepared plans. It waits for a signal before each plan except the first."""
 
     name = "script"
 
@@ -83,7 +83,7 @@ def test_from_any_state_the_shown_route_ends_up_optimal(geodesics, seed):
             guide.wait()
             guide.improve(task.state)
             assert remaining(guide.route.visits, task.state) == guide.route.visits
-            if guide.replans > before:  # else it follows the plan, though from another place
+            if guide.replans > before:  # otherwise the person follows the plan, possibly from another place
                 exact = solver("exact").solve(TaskProblems(geodesics).problem(task.state))
                 assert guide.route.plan.cost == pytest.approx(exact.cost, abs=TIE + 1e-3)
                 check(TaskProblems(geodesics).problem(task.state), guide.route.plan)
@@ -143,7 +143,7 @@ def test_a_proof_that_begins_otherwise_than_what_was_done_is_asked_for_anew(geod
         script.orders = (nearest_first,)
         script.go.set()
         guide.wait()
-        assert guide.improve(left) is None  # it said: first the right one
+        assert guide.improve(left) is None  # the proven plan starts with the right object
         guide.wait()
         guide.improve(left)
         assert len(guide.route.visits) == 3
@@ -185,7 +185,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
     log, planner = EventLog(), Script(in_turn, in_turn)
     config = TrialConfig(objects=6, assistance="highlight", seed=3, live=True, regret=False)
     scene = compose(house.sample_episode(objects=6, seed=3), house.catalogue)
-    planner.go.set()  # the familiarisation may wait
+    planner.go.set()  # let the plan of the familiarisation finish
     monkeypatch.setattr(setup, "planner_named", lambda _: planner)
     with contextlib.closing(prepared_planner(config, house, scene.episode)) as guide:
         session, _ = prepare_session(config, house, scene, log, planner=guide)
@@ -194,7 +194,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
         assert guide.replans >= 2
         planner.go.set()
         guide.wait()
-        assert len(planner.waiting) == guide.replans + 1  # the first one for the familiarisation
+        assert len(planner.waiting) == guide.replans + 1  # one more for the familiarisation
         assert threading.get_ident() not in planner.waiting
     plans = [event for event in log.events if event["event"] == "plan"]
     assert len(plans) == guide.replans + 1
@@ -202,7 +202,7 @@ def test_a_session_continues_while_every_proof_is_stuck(house, monkeypatch):
 
 
 def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_path, monkeypatch):
-    """Not even a planner that would plan otherwise changes what a replay shows."""
+    """The replay must not call the planner, which might plan differently."""
     run = str(tmp_path / "run")
     options = ["--objects", "16", "--seed", "4", "--user", "boltzmann:20", "--time-limit", "14", "--no-video"]
     assert main(["run", "--live", *options, "--assistance", "optimal-regret", "--out", run]) == 0
@@ -221,7 +221,7 @@ def test_the_command_line_runs_live_and_its_replay_shows_the_logged_plans(tmp_pa
 
 @pytest.mark.parametrize(("live", "delivered"), [([], 4), (["--live", "--time-limit", "5"], 0)])
 def test_or_tools_plans_where_it_is_chosen(tmp_path, monkeypatch, live, delivered):
-    """Neither tours nor better ones come from the exact planner; it still finds the regrets."""
+    """The exact planner must not plan, but it still computes the regrets."""
 
     def fail(*_args, **_options):
         pytest.fail("planned by the exact planner")
@@ -282,7 +282,7 @@ def test_a_logged_route_is_followed_live_from_where_the_log_ends(geodesics):
 
 @pytest.fixture
 def slow(monkeypatch):
-    """An evaluator that answers only when told to."""
+    """Make the evaluator wait for a signal before it returns regrets."""
     go, states = threading.Event(), []
 
     class Slow(RegretEvaluator):
@@ -308,7 +308,7 @@ def test_the_caller_never_waits_for_regrets_and_they_are_those_of_a_run_that_rep
             guide.ask(state)
         go.set()
         guide.wait()
-        assert len(states) == 1  # asked often, found once
+        assert len(states) == 1  # computed only once for many requests
         assert guide.regrets() == RegretEvaluator(geodesics).all(state) != {}
 
 

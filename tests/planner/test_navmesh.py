@@ -1,4 +1,4 @@
-"""The navmesh answers exactly: navigability, islands, snapping and sampling against independent geometry."""
+"""Compare navigability, islands, snapping and sampling of the navmesh with independent geometry."""
 
 import math
 
@@ -49,7 +49,7 @@ def test_a_closed_room_is_an_island_of_its_own():
     assert count == 2
     for label in (1, 2):
         assert len(set(mesh.topdown_map[labels == label])) == 1
-    # Snapping leads out of the closet to where people walk, unless that is asked for.
+    # By default, snapping leads out of the closet to the main island.
     out = mesh.snap((2.0, 2.0), max_distance=5.0)
     assert mesh.island_of(out) == 0
     assert np.array_equal(mesh.snap((2.0, 2.0), island=1), (2.0, 2.0))
@@ -83,8 +83,8 @@ def test_nothing_navigable_is_nearer_than_the_snapped_point(field, point):
 
 
 def island_by_polygons(mesh, points):
-    """Island of each point (m, 2) by distances to the polygons alone, and which points are too close to tell."""
-    with np.errstate(divide="ignore"):  # inside GEOS, where a point is almost on an edge
+    """Return the island of each point (m, 2), and which points are too close to an edge to decide."""
+    with np.errstate(divide="ignore"):  # GEOS divides by zero if a point is almost on an edge
         gaps = shapely.distance(np.array(mesh.islands)[:, None], shapely.points(points)[None])
     near = gaps < 0.5 * TOLERANCE
     return np.where(near.any(axis=0), near.argmax(axis=0), -1), (abs(gaps - 0.5 * TOLERANCE) < 4e-5).any(

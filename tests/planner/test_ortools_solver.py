@@ -1,4 +1,4 @@
-"""OR-Tools and the greedy baseline: feasible in every state, optimal where all tours can be listed, repeatable."""
+"""Check that OR-Tools and the greedy solver return feasible and repeatable plans."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Malformed problems and plans are refused with the fault named; integer distances form a metric."""
+"""Check that errors name the fault of an invalid problem or plan, and that integer distances are a metric."""
 
 import dataclasses
 
@@ -18,7 +18,7 @@ PICK, PLACE = VisitKind.PICK, VisitKind.PLACE
 
 
 def problem(**changes):
-    """On a line: start at 0, an object at 1 for 3, one carried for 2."""
+    """Return a problem on a line: start at 0, a shipment from 1 to 3, and a carried object for 2."""
     fields = {"distances": LINE, "start": 0, "shipments": (Shipment(1, 3),), "onboard": (2,), "capacity": 2}
     fields |= {} if changes.keys() & {"shipments", "onboard"} else {"names": ("mug", "sock")}
     return RoutingProblem(**{**fields, **changes})
@@ -92,7 +92,7 @@ def test_integer_distances_are_a_metric_close_to_the_real_one(seed):
     np.testing.assert_array_equal(m, m.T)
     assert (m[:, None, :] <= m[:, :, None] + m[None, :, :]).all()
     assert m[3, 4] == 0
-    # Half a unit of rounding on one leg, and half a unit on each leg of the detour that closes it.
+    # Rounding changes a leg by half a unit, and each of the two legs of a shorter detour by another half.
     assert np.abs(m * 1e-4 - d).max() <= 2e-4
 
 

@@ -1,4 +1,4 @@
-"""Regrets from one table or one pass against a plain recursion and against solving the rest after each visit."""
+"""Compare regrets with a plain recursion and with solving the remaining task after each visit."""
 
 import dataclasses
 import threading
@@ -19,7 +19,7 @@ TABLE, PASS = ExactSolver(), ExactSolver(table_bytes=0)
 
 
 def expected(problem):
-    """Cost of the task by next visit."""
+    """Return the cost of the whole task for each possible next visit."""
     return {
         visit: problem.distances[problem.start, problem.location(visit)] + optimum(after(problem, visit))
         for visit in possible_next(problem)

@@ -1,4 +1,4 @@
-"""Judging the visits of a task: against fresh regrets, against the length of what was done, and beyond the table."""
+"""Compare the regrets of visits with regrets that are computed anew, and with lengths of tours."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def test_a_table_that_was_kept_says_what_a_fresh_one_would(geodesics, seed):
 @settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), planner=st.sampled_from([None, SEARCH]))
 def test_regrets_add_up_to_the_detour_of_the_whole_task(geodesics, seed, planner):
-    """Whatever order things are done in: its length is the optimum's and all regrets together."""
+    """In any order of visits, the length of the tour is the optimum plus the sum of all regrets."""
     task, rng = Task(geodesics, 6, seed), np.random.default_rng(seed)
     evaluator = RegretEvaluator(geodesics, solver=planner)
     shortest = optimum(TaskProblems(geodesics).problem(task.state))

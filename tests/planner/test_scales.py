@@ -1,4 +1,4 @@
-"""Distances of any scale: what is called optimal is, to 1e-9 of the tour, against exact fractions."""
+"""Check with exact fractions that optimal plans are optimal to a relative 1e-9 at any scale of distances."""
 
 import dataclasses
 import itertools
@@ -24,13 +24,13 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def length(problem, plan):
-    """Length of a plan's tour as a fraction."""
+    """Return the length of a plan's tour as a fraction."""
     stops = problem.stops(plan.visits)
     return sum((Fraction(problem.distances[a, b]) for a, b in itertools.pairwise(stops)), Fraction(0))
 
 
 def assert_true(problem, plan):
-    """Cost and bound are true; an optimal tour exceeds the shortest by no more than the tolerance."""
+    """Check the cost, the lower bound and, within the tolerance, the optimality of a plan."""
     best, cost = optimum(problem, Fraction), length(problem, plan)
     assert abs(Fraction(plan.cost) - cost) <= cost * Fraction(1, 10**14)
     assert Fraction(plan.lower_bound) <= best * (1 + Fraction(TOLERANCE))
@@ -43,7 +43,7 @@ def scaled(problem, factor):
 
 
 def no_metric(seed, n, capacity, spread):
-    """Distances of many magnitudes that no place has."""
+    """Return a problem with distances of very different magnitudes that do not form a metric."""
     rng = np.random.default_rng(seed)
     d = np.triu(10 ** rng.uniform(-spread, spread, (n + 3, n + 3)), 1)
     shipments = tuple(Shipment(3 + k, int(rng.integers(1, 3))) for k in range(n))
@@ -88,7 +88,7 @@ def test_plans_in_distances_of_mixed_magnitudes_are_true(seed, n, capacity, spre
 @settings(max_examples=40, deadline=None)
 @given(seed=seeds, gap=st.sampled_from([1e-3, 1e-6, 1e-8]), scale=st.sampled_from(SCALES))
 def test_of_two_tours_that_nearly_tie_the_shorter_is_taken(seed, gap, scale):
-    """An object on each side of the start, one a little nearer: that one first."""
+    """One object is on each side of the start. The slightly nearer one must be picked up first."""
     left, right = (1.0, 1.0 + gap) if seed % 2 else (1.0 + gap, 1.0)
     at = np.array([0.0, -left, right]) * scale
     problem = RoutingProblem(np.abs(np.subtract.outer(at, at)), 0, (Shipment(1, 1), Shipment(2, 2)), (), 2)

@@ -1,4 +1,4 @@
-"""The plan is kept while it is followed and made anew after a deviation; in a thread the answers are the same."""
+"""Check that a plan is kept while it is followed, and replaced after a deviation, in every mode."""
 
 import contextlib
 import itertools
@@ -25,7 +25,7 @@ def guided(geodesics, **options):
 
 
 def length(geodesics, task, visits):
-    """Length of a tour, leg by leg."""
+    """Return the length of a tour as the sum of its legs."""
     stops = [task.position, *map(task.place, visits)]
     return sum(geodesics.shortest_path(a, b).geodesic_distance for a, b in itertools.pairwise(stops))
 
@@ -67,7 +67,7 @@ def test_a_deviation_is_replanned_and_counted(geodesics):
     task.do(VisitKind.PICK, other)
     route = asked(guide, task.state)
     assert guide.replans == 1
-    # The new plan is the best from the new state, as planning afresh finds it.
+    # The new plan is as short as a plan that is computed from scratch.
     assert route.plan.cost == asked(guided(geodesics), task.state).plan.cost
     assert (VisitKind.PICK, other) not in route.visits
     assert (VisitKind.PLACE, other) in route.visits
@@ -93,7 +93,7 @@ def test_a_nudge_moves_the_stop_and_a_long_push_replans(geodesics):
 def test_the_cost_is_the_length_of_the_geodesics_between_the_stops(geodesics):
     task, guide = Task(geodesics, 4), guided(geodesics)
     asked(guide, task.state)
-    # A state seen before, objects moved and back: reused distances must be those of the right places.
+    # Objects are moved and then moved back. Cached distances must belong to the right places.
     moved = dict(list(task.state.loose.items())[::-1])
     moved["object_01"] = (3.3, 3.3)
     for loose in (moved, task.state.loose):
@@ -129,7 +129,7 @@ def test_there_is_no_route_before_the_first_question(geodesics):
 
 
 def answers(guide, geodesics, seed, *, shown):
-    """Everything that a planner answers in a task with deviations."""
+    """Return everything that a planner reports during a task with deviations."""
     task, found = Task(geodesics, 7, seed), []
     guide.prepare(task.state)
     for step in range(8):

@@ -1,4 +1,4 @@
-"""Plans for the successive states of a task: started from earlier ones, and as short as plans from nothing."""
+"""Check that plans for successive states, which reuse earlier results, are as short as plans from scratch."""
 
 import pytest
 from planning_cases import Task, two_rooms
@@ -32,7 +32,7 @@ def test_plans_stay_optimal_through_deviations_and_mishaps(geodesics, solver, se
         )  # distances are rounded to 0.1 mm
         assert (
             again.plan(task.state, None, shown=False).visits == plan.visits
-        )  # the same sequence gives the same plans
+        )  # the same sequence of states gives the same plans
         if step % 3 == 2 or not plan.visits:
             task.misfortune()
         else:
@@ -48,6 +48,6 @@ def test_a_table_is_filled_once_while_nothing_is_moved(geodesics, monkeypatch):
         task.do(*(picks[-1] if picks and len(task.carried) < 2 else plan.visits[0]))
         task.position = task.anywhere()
     assert len(filled) == 1
-    task.loose["object_00"] = task.anywhere()  # it was delivered, and now lies elsewhere
+    task.loose["object_00"] = task.anywhere()  # a delivered object has been moved to another place
     assert planner.plan(task.state, None, shown=False).visits
     assert len(filled) == 2

@@ -1,4 +1,4 @@
-"""Optimality seen by a verifier that shares no code with the solvers: it confirms what is true and nothing else."""
+"""Check that a verifier that shares no code with the solvers confirms exactly the correct proofs."""
 
 import dataclasses
 
@@ -104,7 +104,7 @@ def test_the_bound_of_a_search_that_was_cut_short_is_confirmed():
 @pytest.mark.parametrize("capacity", [3, 4])
 def test_other_capacities_are_verified_by_trying_all(capacity):
     problem = random_problem(2, 8, 2, capacity)
-    plan = ExactSolver().solve(problem)  # its tour is the shortest, as OR-Tools does not know
+    plan = ExactSolver().solve(problem)  # an optimal tour that OR-Tools cannot prove
     proof = Certificate(Proof.EXHAUSTIVE, problem.integers.unit, 0)
     plan = dataclasses.replace(plan, lower_bound=plan.cost, status=Status.OPTIMAL, certificate=proof)
     found = verify_optimal(problem, plan)

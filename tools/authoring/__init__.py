@@ -1,1 +1,1 @@
-"""Scripts that generate the textures and meshes of `models/`. The simulator does not use them."""
+"""Scripts that generate the textures and meshes in `models/`. The simulator does not use them."""

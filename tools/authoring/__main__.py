@@ -1,4 +1,4 @@
-"""Generator of the procedural textures and the meshes of objects: `python -m tools.authoring [models folder]`."""
+"""Generate the procedural textures and the meshes of objects: `python -m tools.authoring [models folder]`."""
 
 import argparse
 import sys
@@ -10,7 +10,7 @@ from tools.authoring.textures import build_textures
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write all generated files and report their number. Return the exit status."""
+    """Write all generated files and print their number. Return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m tools.authoring", description=__doc__)
     default = Path(__file__).resolve().parents[2] / "models"
     parser.add_argument("models", nargs="?", type=Path, default=default, help="models folder (%(default)s)")

@@ -1,6 +1,6 @@
-"""Procedural pictures of the apartment: the view outside, framed art, screens and book spines.
+"""Paint procedural pictures for the apartment: the view outside, framed art, screens and book spines.
 
-Each painter takes a random generator and returns an RGB image of floats in [0, 1].
+Each painter is a function that takes a random generator and returns an RGB image of floats in [0, 1].
 """
 
 import cv2
@@ -10,7 +10,7 @@ from tools.authoring.patterns import Floats, blend, disc, flat, grid, noise, pol
 
 
 def garden(rng: np.random.Generator) -> Floats:
-    """View from a window: sky with clouds, trees, a hedge and a lawn. Periodic along x."""
+    """Paint the view from a window: sky with clouds, trees, a hedge and a lawn. The image repeats along x."""
     shape = (256, 512)
     _, y = grid(shape)
     image = ramp(y, [(0.0, "7fb6e6"), (0.5, "d8ecf7"), (1.0, "e8f3f8")])
@@ -29,7 +29,7 @@ def garden(rng: np.random.Generator) -> Floats:
 
 
 def art_hills(rng: np.random.Generator) -> Floats:
-    """Layered hills under a large sun."""
+    """Paint layered hills under a large sun."""
     shape = (256, 384)
     _, y = grid(shape)
     image = ramp(y, [(0.0, "f4d6a5"), (0.7, "f0a878")])
@@ -41,7 +41,7 @@ def art_hills(rng: np.random.Generator) -> Floats:
 
 
 def art_sea(rng: np.random.Generator) -> Floats:
-    """A sailing boat at sea."""
+    """Paint a sailing boat at sea."""
     shape = (256, 384)
     _, y = grid(shape)
     image = ramp(y, [(0.0, "8cc4e8"), (0.55, "e3f1f2"), (0.551, "2f7fa3"), (1.0, "14425f")])
@@ -54,7 +54,7 @@ def art_sea(rng: np.random.Generator) -> Floats:
 
 
 def art_shapes(rng: np.random.Generator) -> Floats:
-    """Overlapping discs and bars in a few flat colours."""
+    """Paint overlapping discs and bars in a few flat colours."""
     shape = (256, 256)
     image = flat(shape, "f0e9dc") + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     image = disc(image, "d8572a", (0.38, 0.40), 0.24)
@@ -64,7 +64,7 @@ def art_shapes(rng: np.random.Generator) -> Floats:
 
 
 def art_leaf(rng: np.random.Generator) -> Floats:
-    """A botanical print: one stem with paired leaves."""
+    """Paint a botanical print of a stem with paired leaves."""
     shape = (384, 256)
     image = flat(shape, "f3efe4") + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     image = polygon(image, "4d6b45", [(0.49, 0.1), (0.51, 0.1), (0.515, 0.9), (0.485, 0.9)])
@@ -84,7 +84,7 @@ def art_leaf(rng: np.random.Generator) -> Floats:
 
 
 def poster_rocket(rng: np.random.Generator) -> Floats:
-    """A child's poster: a rocket among planets and stars."""
+    """Paint a child's poster of a rocket among planets and stars."""
     shape = (384, 256)
     image = ramp(grid(shape)[1], [(0.0, "1d2a5b"), (1.0, "3b4c93")])
     for _ in range(40):
@@ -103,14 +103,14 @@ def poster_rocket(rng: np.random.Generator) -> Floats:
 
 
 def _panel(image: Floats, box: tuple[float, float, float, float], code: str) -> Floats:
-    """Fill a rectangle (left, top, right, bottom), in fractions of the image."""
+    """Fill a rectangle given by (left, top, right, bottom), as fractions of the image size."""
     left, top, right, bottom = box
     corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
     return polygon(image, code, corners)
 
 
 def screen_desktop(rng: np.random.Generator) -> Floats:
-    """A computer screen: wallpaper, an editor window with lines of text, a chart and a task bar."""
+    """Paint a computer screen with a wallpaper, an editor window, a chart and a task bar."""
     shape = (144, 256)
     x, y = grid(shape)
     image = ramp((x + y) / 2, [(0.0, "1f4e79"), (1.0, "4f9fb5")])
@@ -141,7 +141,7 @@ def keyboard(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painters 
 
 
 def piano_keys(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """Four octaves of a piano's keys seen from above."""
+    """Paint four octaves of a piano keyboard seen from above."""
     image = flat((64, 512), "f4f2ec")
     whites = 28
     for key in range(whites):
@@ -153,7 +153,7 @@ def piano_keys(rng: np.random.Generator) -> Floats:  # noqa: ARG001
 
 
 def book_spines(rng: np.random.Generator) -> Floats:
-    """A row of books: coloured spines of different widths and heights with title bands."""
+    """Paint a row of books with coloured spines of different sizes and title bands."""
     shape = (128, 512)
     image = flat(shape, "2a211b")
     codes = (
@@ -183,7 +183,7 @@ def book_spines(rng: np.random.Generator) -> Floats:
 
 
 def clock_face(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """A wall clock at ten past ten, seen as a square."""
+    """Paint a wall clock that shows ten past ten, on a square image."""
     shape = (192, 192)
     image = disc(flat(shape, "30343a"), "f7f5ef", (0.5, 0.5), 0.45)
     pixels = np.ascontiguousarray((image * 255).astype(np.uint8))
@@ -199,7 +199,7 @@ def clock_face(rng: np.random.Generator) -> Floats:  # noqa: ARG001
 
 
 def mirror(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """A pale gradient with two slanted highlights, which looks like a mirror without reflections."""
+    """Paint a pale gradient with two slanted highlights, which looks like a mirror without reflections."""
     shape = (128, 128)
     x, y = grid(shape)
     image = ramp((x + y) / 2, [(0.0, "cfdde3"), (0.5, "aebfc8"), (1.0, "c7d3d8")])
@@ -210,7 +210,7 @@ def mirror(rng: np.random.Generator) -> Floats:  # noqa: ARG001
 
 
 def pinboard(rng: np.random.Generator) -> Floats:
-    """A cork board with notes, a photograph and a calendar."""
+    """Paint a cork board with notes, a photograph and a calendar."""
     shape = (192, 288)
     image = flat(shape, "b98a58") * (1 + 0.05 * noise(rng, shape, roll_off=0.3))[..., None]
     notes = (

@@ -1,4 +1,4 @@
-"""Small textures for the meshes of objects and receptacles: covers, labels, keys, weave. RGB, top row first."""
+"""Paint small RGB textures for the meshes of objects and receptacles, such as covers and labels."""
 
 import functools
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def object_textures() -> dict[str, Picture]:
 
 
 def receptacle_textures() -> dict[str, Picture]:
-    """Return RGB pictures (128, 128, 3) by texture name, and (64, 128, 3) for wide signs."""
+    """Return RGB textures by name, with shape (128, 128, 3), or (64, 128, 3) for wide signs."""
     return _painted(_wicker, _toys_sign, _office_sign)
 
 
@@ -30,7 +30,7 @@ def _painted(*painters: Callable[[], Picture]) -> dict[str, Picture]:
 def _on(
     colour: Colour, rows: slice | None = None
 ) -> Callable[[Callable[[Picture], None]], Callable[[], Picture]]:
-    """Decorate a painter so that it starts with a uniform colour. With `rows`, keep only these at half the height."""
+    """Make a painter start on a plain colour. With `rows`, crop the picture to them at half the height."""
 
     def decorate(paint: Callable[[Picture], None]) -> Callable[[], Picture]:
         @functools.wraps(paint)
@@ -49,7 +49,7 @@ def _on(
 def _write(
     picture: Picture, text: str, x: int, y: int, scale: float, colour: Colour, weight: int = 2
 ) -> None:
-    """Draw text centred at column `x` with its base line at row `y`."""
+    """Draw text with its centre at column `x` and its baseline at row `y`."""
     (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, weight)
     at = (x - width // 2, y)
     cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, colour, weight, cv2.LINE_AA)
@@ -195,7 +195,7 @@ def _jar(p: Picture) -> None:
 
 
 def _wicker() -> Picture:
-    """A basket weave that tiles, with strands shaded towards their ends."""
+    """Paint a seamless basket weave, with strands that are darker at their ends."""
     t = np.arange(SIDE)
     cell = 32
     across = (np.add.outer(t // cell, t // cell) % 2).astype(bool)

@@ -1,4 +1,4 @@
-"""Meshes of laundry."""
+"""Build the meshes of laundry objects."""
 
 import math
 
@@ -25,7 +25,7 @@ def meshes() -> dict[str, LabelledMesh]:
 
 
 def _socks() -> dict[str, LabelledMesh]:
-    """Two overlapping socks side by side, legs along y."""
+    """Build two overlapping socks that lie side by side, with the legs along y."""
     leg = Polygon(mm("-28 -20, -28 110, 28 110, 28 -50, 0 -85"))
     foot = Polygon(mm("-28 -20, 0 -85, 28 -50, -30 0, -100 -30, -100 -85"))
     sock = leg.union(foot.buffer(0.002)).union(Point(-0.085, -0.058).buffer(0.03, quad_segs=4))
@@ -51,7 +51,7 @@ def _socks() -> dict[str, LabelledMesh]:
 
 
 def _t_shirt() -> dict[str, LabelledMesh]:
-    """A small T-shirt, spread out flat, collar at +y."""
+    """Build a small T-shirt that is spread out flat, with the collar towards +y."""
     half = mm("40 125, 85 112, 152 35, 112 0, 68 52, 74 -130")
     outline = Polygon([*half, *((-x, y) for x, y in reversed(half))])
     shirt = outline.difference(affinity.scale(Point(0, 0.122).buffer(0.036, quad_segs=4), 1.0, 0.7))
@@ -74,7 +74,7 @@ def _t_shirt() -> dict[str, LabelledMesh]:
 
 
 def _rumpled(surface: LabelledMesh, depth: float) -> LabelledMesh:
-    """Add soft waves to the upper side."""
+    """Add soft waves to the upper side of a mesh."""
 
     def rule(v: Floats) -> Floats:
         wave = np.sin(31 * v[:, 0] + 17 * v[:, 1]) + np.sin(43 * v[:, 1] - 13 * v[:, 0] + 1)
@@ -86,9 +86,9 @@ def _rumpled(surface: LabelledMesh, depth: float) -> LabelledMesh:
 
 
 def _towel() -> LabelledMesh:
-    """A dropped towel: a heap with radial folds. The texture follows the cloth."""
+    """Build a dropped towel: a heap with radial folds, whose texture follows the cloth."""
     u, v = np.meshgrid(np.linspace(-1, 1, 23), np.linspace(-1, 1, 23), indexing="ij")
-    # Map the square cloth to a round heap, irregularly so that the hem meanders.
+    # Map the square cloth to a round heap with an irregular outline.
     radius = np.maximum(np.abs(u), np.abs(v))
     angle = np.arctan2(v, u)
     reach = 0.125 * (1 + 0.1 * np.sin(3 * angle + 1) + 0.07 * np.sin(5 * angle))
@@ -105,14 +105,14 @@ def _towel() -> LabelledMesh:
 
 
 def _jeans() -> LabelledMesh:
-    """Jeans, spread out flat, waist at +y."""
+    """Build jeans that are spread out flat, with the waist towards +y."""
     half = mm("80 125, 95 50, 140 -105, 50 -125")
     outline = Polygon([*half, (0.0, 0.02), *((-x, y) for x, y in reversed(half))])
     return _rumpled(cushion(outline, 0.026, 0.006), 0.003)
 
 
 def _cap() -> dict[str, LabelledMesh]:
-    """A baseball cap, brim towards +y."""
+    """Build a baseball cap with the brim towards +y."""
     t = np.linspace(0.0, 0.5 * math.pi, 8)
     dome = np.column_stack([0.088 * np.cos(t) ** 0.8, 0.012 + 0.083 * np.sin(t)])
     crown = lathe(np.vstack([[0, 0.0], [0.086, 0.0], dome, [0.006, 0.097], [0, 0.101]]), 24)

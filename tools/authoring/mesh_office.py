@@ -1,4 +1,4 @@
-"""Meshes of office supplies."""
+"""Build the meshes of office supplies."""
 
 import math
 
@@ -36,7 +36,7 @@ def _stapler() -> dict[str, LabelledMesh]:
 
 
 def _tape() -> dict[str, LabelledMesh]:
-    """A desk dispenser with the roll at -y and the cutter at +y."""
+    """Build a tape dispenser with the roll towards -y and the cutter towards +y."""
     profile = mm("-85 0, 85 0, 88 40, 70 45, 50 22, -0 18, -18 30, -50 30, -85 30")
     cheek = Polygon(mm("-85 0, 0 0, 0 30, -22 55, -55 55, -85 30"))
     cheeks = [side(cheek, 0.009, 0.004).moved((x, 0, 0)) for x in (-0.022, 0.022)]
@@ -71,7 +71,7 @@ def _calculator() -> dict[str, LabelledMesh]:
 
 
 def _notebook() -> dict[str, LabelledMesh]:
-    """A notebook, bound along its long side at -x."""
+    """Build a notebook that is bound along its long side at -x."""
     loops = []
     for y in np.linspace(-0.085, 0.085, 11):
         bow = arc(0.0115, 0, 2 * math.pi, 9)
@@ -83,7 +83,7 @@ def _notebook() -> dict[str, LabelledMesh]:
 
 
 def _hole_punch() -> dict[str, LabelledMesh]:
-    """A hole punch with its lever drawn from the side, handle at +y."""
+    """Build a hole punch from its side view, with the handle towards +y."""
     lever = Polygon(mm("-50 40, -45 62, -20 72, 30 76, 68 72, 72 62, 10 50"))
     bracket = Polygon(mm("-50 12, -5 12, -10 55, -45 55"))
     base = rounded_box(0.13, 0.12, 0.016, 0.006)

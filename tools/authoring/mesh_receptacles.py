@@ -1,4 +1,4 @@
-"""Meshes of receptacles: wires, handles, the recycling symbol, and books on a shelf."""
+"""Build the meshes of receptacles: wires, handles, the recycling symbol, and books on a shelf."""
 
 import math
 
@@ -10,7 +10,7 @@ from shapely.ops import unary_union
 
 from tools.authoring.mesh_tools import LabelledMesh, arc, extrude, join, slab, tube
 
-WIRE = 0.0035  # radius of the dish rack's wires, m
+WIRE = 0.0035  # radius of the dish rack's wires in metres
 
 
 def meshes() -> dict[str, LabelledMesh]:
@@ -26,7 +26,7 @@ def meshes() -> dict[str, LabelledMesh]:
 
 
 def _dish_rack(width: float, depth: float, low: float, high: float) -> LabelledMesh:
-    """Upright wires around a rectangle between two heights, with two rails."""
+    """Build a rectangle of upright wires between two heights, with two rails."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
     bars = []
@@ -41,7 +41,7 @@ def _dish_rack(width: float, depth: float, low: float, high: float) -> LabelledM
 
 
 def _recycling_symbol(size: float) -> LabelledMesh:
-    """Three chasing arrows of a total height `size` around the origin, extruded by 4 mm."""
+    """Build a recycling symbol of three arrows with total height `size`, extruded by 4 mm."""
     path = np.array([[0.16, -0.3], [-0.32, -0.3], [-0.45, -0.1], [-0.3, 0.13]])
     band = LineString(path).buffer(0.085, cap_style="flat", join_style="bevel")
     ahead = (path[-1] - path[-2]) / math.hypot(*(path[-1] - path[-2]))
@@ -50,19 +50,19 @@ def _recycling_symbol(size: float) -> LabelledMesh:
     arrow = unary_union([band, head])
     arrows = [affinity.rotate(arrow, 120 * k, origin=(0, 0)) for k in range(3)]
     gaps = [affinity.rotate(head.buffer(0.035), 120 * k, origin=(0, 0)) for k in range(3)]
-    # Each arrow ends before the head of the arrow behind it.
+    # An arrow ends in front of the head of the next arrow, to leave a gap.
     drawing = [a.difference(gaps[(k + 1) % 3]).difference(gaps[(k + 2) % 3]) for k, a in enumerate(arrows)]
     return join([extrude(affinity.scale(a, size, size, origin=(0, 0)), 0.004) for a in drawing])
 
 
 def _handle() -> LabelledMesh:
-    """A bow handle in the x-z plane, with its ends at z = 0."""
+    """Build a curved handle in the x-z plane, with its ends at z = 0."""
     bow = arc(0.06, math.pi, 2 * math.pi, 9, 0.8)
     return tube(np.column_stack([bow[:, 0], np.zeros(9), bow[:, 1]]), 0.009, 6)
 
 
 def _shelf_books() -> list[LabelledMesh]:
-    """Upright books on two shelves of the bookcase, in four colours, spines towards -y."""
+    """Build upright books in four colours on two shelves of the bookcase, with their spines towards -y."""
     widths = [0.032, 0.024, 0.04, 0.028, 0.036, 0.022, 0.045, 0.03]
     heights = [0.2, 0.215, 0.18, 0.205, 0.19, 0.222]
     colours: list[list[LabelledMesh]] = [[], [], [], []]

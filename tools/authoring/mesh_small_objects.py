@@ -1,4 +1,4 @@
-"""Meshes of dishes, toys, books and recycling."""
+"""Build the meshes of dishes, toys, books and recyclable objects."""
 
 import math
 
@@ -52,7 +52,7 @@ def _mug() -> dict[str, LabelledMesh]:
     lining = lathe(mm("41 100, 40 20, 34 10, 0 10"))
     bow = arc(0.03, -0.62 * math.pi, 0.62 * math.pi, 11)
     handle = tube(np.column_stack([0.052 + bow[:, 0], np.zeros(len(bow)), 0.052 + bow[:, 1]]), 0.0075)
-    shift = (-0.018, 0, 0)  # moves the centre of the footprint, between cup and handle, to the origin
+    shift = (-0.018, 0, 0)  # moves the middle between cup and handle to the origin
     return {"mug_wall": join([wall, handle]).moved(shift), "mug_lining": lining.moved(shift)}
 
 
@@ -97,7 +97,7 @@ def _teapot() -> dict[str, LabelledMesh]:
 
 
 def _car() -> dict[str, LabelledMesh]:
-    """A car, drawn from the side, with its nose at + and its tail at -."""
+    """Build a toy car from its side view, with its front at + and its rear at -."""
     hull = Polygon(mm("-110 22, 110 22, 112 45, 100 56, 55 62, -105 64, -112 50"))
     cabin = Polygon(mm("-85 60, 60 60, 25 97, 15 100, -55 100, -65 97"))
     panes = Polygon(mm("-72 64, 46 64, 18 91, -58 91")).difference(box(-0.016, 0.06, -0.006, 0.1))
@@ -111,7 +111,7 @@ def _car() -> dict[str, LabelledMesh]:
 
 
 def _ball() -> dict[str, LabelledMesh]:
-    """The six gores of a ball, tilted so that its stripes show from above."""
+    """Build a ball from six segments, tilted so that its stripes are visible from above."""
     t = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 11)
     line = np.column_stack([0.08 * np.cos(t), 0.08 * np.sin(t)])
     sixth = math.pi / 3
@@ -138,7 +138,7 @@ def _duck() -> dict[str, LabelledMesh]:
     body = lathe(mm("0 -52, 40 -50, 58 -20, 60 5, 45 35, 20 47, 0 50"), 22)
 
     def stretch(v: np.ndarray) -> np.ndarray:
-        # a long body with a lifted tail (-y)
+        # a long body with a raised tail at -y
         y = v[:, 1] * 1.35
         lift = 0.03 * np.clip(-y / 0.08, 0, None) ** 2
         return np.column_stack(
@@ -149,14 +149,14 @@ def _duck() -> dict[str, LabelledMesh]:
 
 
 def _spine(height: float, length: float, bulge: float) -> LabelledMesh:
-    """A rounded spine: half an ellipse extruded along y, with the flat side towards +x."""
+    """Build a rounded spine: half an ellipse extruded along y, with its flat side towards +x."""
     curve = arc(height / 2, 0.5 * math.pi, 1.5 * math.pi, 9)
     outline = Polygon(np.column_stack([curve[:, 0] * bulge / (height / 2), curve[:, 1]]))
     return ridge(outline, length)
 
 
 def _curled() -> LabelledMesh:
-    """A thin magazine with a slightly lifted free edge."""
+    """Build a thin magazine with a slightly lifted edge."""
     x, y = np.meshgrid(np.linspace(-0.075, 0.075, 9), np.array([-0.105, 0.105]), indexing="ij")
     lift = 0.007 * np.clip((x + 0.02) / 0.095, 0, 1) ** 2
     top = np.stack([x, y, 0.011 + lift], axis=-1)
@@ -165,7 +165,7 @@ def _curled() -> LabelledMesh:
 
 
 def _open_pages() -> LabelledMesh:
-    """Two arched halves on either side of a gutter along x."""
+    """Build an open book with two arched halves on either side of a fold along x."""
     y = np.concatenate([np.linspace(-0.12, -0.004, 9), [0.0], np.linspace(0.004, 0.12, 9)])
     arch = 0.012 + 0.02 * np.sqrt(np.clip(np.abs(y) / 0.03, 0, 1)) * (1.0 - 0.55 * np.abs(y) / 0.12)
     x = np.array([-0.072, 0.072])
@@ -176,7 +176,7 @@ def _open_pages() -> LabelledMesh:
 
 
 def _closed(top: Floats, bottom: Floats) -> LabelledMesh:
-    """Close two grids (rows, columns, 3) into a solid with the texture on the upper one."""
+    """Join two grids (rows, columns, 3) into a closed solid, with the texture on the upper grid."""
     upper, lower = from_above(sheet(top)), sheet(bottom)
     lower = LabelledMesh(lower.vertices, lower.faces[:, ::-1])
 
@@ -208,7 +208,7 @@ def _can() -> dict[str, LabelledMesh]:
 
 
 def _carton() -> dict[str, LabelledMesh]:
-    """A gable-topped carton, ridge along y. Each side has the whole label."""
+    """Build a carton with a gable top and its ridge along y. Each side shows the whole label."""
     w, shoulder, top, fin = 0.046, 0.155, 0.2, 0.222
     sides = []
     for k in range(4):
@@ -236,7 +236,7 @@ def _jar() -> dict[str, LabelledMesh]:
 
 
 def _newspaper() -> LabelledMesh:
-    """A newspaper, folded once: two layers and a round fold at -y."""
+    """Build a newspaper that is folded once, with two layers and a round fold at -y."""
     sheets = [
         slab(0.17, 0.21, 0.011).moved((0.003, 0.004, 0)),
         slab(0.17, 0.21, 0.0105).moved((0, 0, 0.0115)),

@@ -1,4 +1,4 @@
-"""Mesh primitives: lathe, tube, extrusion, cushion, slab, and a compact OBJ writer."""
+"""Primitives for building meshes, such as lathes, tubes and extrusions, and a compact OBJ writer."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,16 +15,16 @@ from mjsim.support.files import write_text_atomically
 from mjsim.values.errors import AssetError
 
 Floats = NDArray[np.float64]
-CREASE = math.radians(40.0)  # faces that meet at a sharper angle have separate normals
+CREASE = math.radians(40.0)  # edges with a larger angle between their faces are drawn sharp
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledMesh:
-    """A triangle mesh.
+    """A triangle mesh with optional texture coordinates.
 
     Attributes:
-        vertices: m, (n, 3).
-        faces: Vertex indices, counter-clockwise from outside, (m, 3).
+        vertices: Vertex positions in metres, (n, 3).
+        faces: Vertex indices, counter-clockwise seen from outside, (m, 3).
         uv: Texture coordinates of each vertex, (n, 2), or None.
     """
 
@@ -33,7 +33,7 @@ class LabelledMesh:
     uv: Floats | None = None
 
     def moved(self, offset: ArrayLike) -> "LabelledMesh":
-        """Shift the surface by an offset (3,), m."""
+        """Return the mesh moved by an offset (3,) in metres."""
         return LabelledMesh(self.vertices + np.asarray(offset, dtype=float), self.faces, self.uv)
 
     def turned(self, angle: float) -> "LabelledMesh":
@@ -43,21 +43,21 @@ class LabelledMesh:
         )
 
     def lengthwise(self) -> "LabelledMesh":
-        """Permute axes x, y, z to y, z, x. An extruded drawing then stands upright, with its thickness along x."""
+        """Return the mesh with axes x, y, z mapped to y, z, x, so that an extruded drawing stands upright."""
         return LabelledMesh(self.vertices[:, [2, 0, 1]], self.faces, self.uv)
 
     def bent(self, rule: Callable[[Floats], Floats]) -> "LabelledMesh":
-        """Map the vertices (n, 3) with a function."""
+        """Return the mesh with a function applied to its vertices (n, 3)."""
         return LabelledMesh(rule(self.vertices), self.faces, self.uv)
 
 
 def mm(points: str) -> Floats:
-    """Parse points in mm, `x y, x y, ...`, to an array in m, (n, 2)."""
+    """Parse a string of points in mm, such as `x y, x y`. Return an array (n, 2) in metres."""
     return np.array([[float(value) / 1000 for value in point.split()] for point in points.split(",")])
 
 
 def join(surfaces: Sequence[LabelledMesh]) -> LabelledMesh:
-    """Join surfaces. The result has UV coordinates only if all surfaces have them."""
+    """Join several meshes into one. It has texture coordinates only if all of them do."""
     offsets = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
     uvs = [s.uv for s in surfaces if s.uv is not None]
     return LabelledMesh(
@@ -68,7 +68,7 @@ def join(surfaces: Sequence[LabelledMesh]) -> LabelledMesh:
 
 
 def sheet(points: Floats) -> LabelledMesh:
-    """Make a surface over a grid of points (rows, columns, 3). Its outside is in the direction rows x columns."""
+    """Build a surface over a grid of points (rows, columns, 3) that faces in the direction rows x columns."""
     rows, columns = points.shape[:2]
     index = np.arange(rows * columns).reshape(rows, columns)
     a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()
@@ -82,7 +82,7 @@ def sheet(points: Floats) -> LabelledMesh:
 def lathe(
     profile: ArrayLike, sections: int = 24, start: float = 0.0, stop: float = 2 * math.pi
 ) -> LabelledMesh:
-    """Rotate a profile of (radius, height) points about z. The outside is to the right of its direction."""
+    """Rotate a profile of (radius, height) points about z. The outside is on the right of its direction."""
     line = np.asarray(profile, dtype=float)
     angles = np.linspace(start, stop, sections + 1)
     points = np.empty((sections + 1, len(line), 3))
@@ -93,16 +93,16 @@ def lathe(
 
 
 def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> LabelledMesh:
-    """Make a round bar with closed ends along a path (k, 3). The radius may vary along it."""
+    """Build a round bar with closed ends along a path (k, 3). The radius may vary along the path."""
     line = np.asarray(path, dtype=float)
     radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(line),))
     tangents = np.gradient(line, axis=0)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     normal = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
-    angles = np.linspace(0.0, -2 * math.pi, sides + 1)  # clockwise, so that the outside is out
+    angles = np.linspace(0.0, -2 * math.pi, sides + 1)  # clockwise, so that the faces point outwards
     rings = []
     for point, tangent, r in zip(line, tangents, radii, strict=True):
-        normal = normal - tangent * (normal @ tangent)  # transported without twist
+        normal = normal - tangent * (normal @ tangent)  # transported along the path without twist
         normal /= np.linalg.norm(normal)
         side = np.cross(tangent, normal)
         rings.append(point + r * (np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * side))
@@ -111,13 +111,13 @@ def tube(path: ArrayLike, radius: float | Sequence[float], sides: int = 8) -> La
 
 
 def arc(radius: float, start: float, stop: float, points: int, squash: float = 1.0) -> Floats:
-    """Return points (points, 2) on a circle around the origin between two angles, with y scaled by `squash`."""
+    """Return `points` points (points, 2) on an arc around the origin, with y scaled by `squash`."""
     t = np.linspace(start, stop, points)
     return np.column_stack([radius * np.cos(t), squash * radius * np.sin(t)])
 
 
 def extrude(polygon: Polygon | MultiPolygon, height: float) -> LabelledMesh:
-    """Make a prism over polygons in the x-y plane, from z = 0 to `height`."""
+    """Build a prism over polygons in the x-y plane, from z = 0 to `height`."""
     if isinstance(polygon, MultiPolygon):
         return join([extrude(part, height) for part in polygon.geoms])
     mesh = trimesh.creation.extrude_polygon(orient(polygon), height, engine="manifold")
@@ -125,7 +125,7 @@ def extrude(polygon: Polygon | MultiPolygon, height: float) -> LabelledMesh:
 
 
 def side(drawing: Polygon | MultiPolygon, width: float, rounding: float = 0.0) -> LabelledMesh:
-    """Extrude a drawing in the y-z plane to `width` along x, with corners rounded by `rounding`, m."""
+    """Extrude a drawing in the y-z plane to `width` metres along x, and round its corners by `rounding`."""
     if rounding:
         drawing = drawing.buffer(-rounding, quad_segs=3).buffer(rounding, quad_segs=3)
     return extrude(drawing, width).moved((0, 0, -width / 2)).lengthwise()
@@ -138,12 +138,12 @@ def ridge(drawing: Polygon, length: float) -> LabelledMesh:
 
 
 def cushion(polygon: Polygon, height: float, edge: float) -> LabelledMesh:
-    """Make a pillow over a polygon: a prism with upper and lower edges rounded by `edge`, with UV from above.
+    """Build a cushion over a polygon: a prism with rounded edges and texture coordinates from above.
 
     Raises:
-        AssetError: `edge` is wider than the outline's rounded corners allow.
+        AssetError: `edge` is larger than the radius of the outline's corners permits.
     """
-    # Corners with a larger radius than the edge prevent crossings of the inset outlines.
+    # The radius of the corners exceeds the edge radius, so that the inset outlines do not cross themselves.
     solid = orient(polygon.buffer(-1.3 * edge, quad_segs=2).buffer(1.3 * edge, quad_segs=2).simplify(0.0005))
     levels = [
         (edge, 0.0),
@@ -174,13 +174,13 @@ def cushion(polygon: Polygon, height: float, edge: float) -> LabelledMesh:
 
 
 def from_above(surface: LabelledMesh) -> LabelledMesh:
-    """Set UV coordinates by projection from above: u along x, v along y, over the bounding box."""
+    """Set texture coordinates by projection from above, with u along x and v along y of the bounding box."""
     low, high = surface.vertices[:, :2].min(axis=0), surface.vertices[:, :2].max(axis=0)
     return LabelledMesh(surface.vertices, surface.faces, (surface.vertices[:, :2] - low) / (high - low))
 
 
 def slab(width: float, depth: float, height: float) -> LabelledMesh:
-    """Make a box on z = 0 with the texture on its top. Its sides have the colour of the texture's corner."""
+    """Build a box on z = 0 with the texture on its top. Its sides have the colour of the texture's corner."""
     x, y = width / 2, depth / 2
     corners = np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
     top = LabelledMesh(np.column_stack([corners, np.full(4, height)]), np.array([[0, 1, 2], [0, 2, 3]]))
@@ -204,7 +204,7 @@ def rounded_box(width: float, depth: float, height: float, radius: float) -> Lab
 
 
 def write_obj(path: Path, surface: LabelledMesh) -> None:
-    """Write a surface with creased normals as OBJ, rounded to 0.01 mm."""
+    """Write a mesh as an OBJ file with sharp edges kept, rounded to 0.01 mm."""
     normals, normal_of = np.unique(np.round(_corner_normals(surface), 3) + 0.0, axis=0, return_inverse=True)
     corner = normal_of.reshape(-1, 3)
     lines = [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in np.round(surface.vertices, 5) + 0.0]
@@ -218,7 +218,7 @@ def write_obj(path: Path, surface: LabelledMesh) -> None:
 
 
 def _corner_normals(surface: LabelledMesh) -> Floats:
-    """Return a normal for each corner of each face, (3 m, 3): the mean of adjacent faces within `CREASE`."""
+    """Return the normal at each corner of each face, (3 m, 3). Normals are averaged over smooth edges."""
     _, place = np.unique(np.round(surface.vertices, 6), axis=0, return_inverse=True)
     triangles = surface.vertices[surface.faces]
     weighted = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -244,7 +244,7 @@ def _without_slivers(vertices: Floats, faces: NDArray[np.int64]) -> NDArray[np.i
 
 
 def _inward(outline: Floats) -> Floats:
-    """Return unit normals at the vertices of a counter-clockwise outline, pointing inwards, (n, 2)."""
+    """Return unit normals (n, 2) that point inwards, at the vertices of a counter-clockwise outline."""
     ahead = np.roll(outline, -1, axis=0) - outline
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     along = ahead + np.roll(ahead, 1, axis=0)

@@ -1,4 +1,4 @@
-"""Writer of the meshes and label textures of object and receptacle models."""
+"""Write the meshes and label textures of object and receptacle models."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def receptacle_meshes() -> dict[str, LabelledMesh]:
 
 
 def build_meshes(models_root: Path) -> list[Path]:
-    """Write meshes and label textures below `models_root`, and return their paths in a fixed order.
+    """Write the meshes and label textures below `models_root`. Return their paths in a fixed order.
 
     Raises:
         AssetError: A texture cannot be encoded.

@@ -1,4 +1,4 @@
-"""Textiles of the apartment: carpet, cloth, bed linen and rugs (see `tools.authoring.textures`)."""
+"""Paint the textiles of the apartment: carpet, cloth, bed linen and rugs (see `tools.authoring.textures`)."""
 
 import numpy as np
 
@@ -6,20 +6,20 @@ from tools.authoring.patterns import Floats, blend, flat, grid, joints, noise, r
 
 
 def carpet(rng: np.random.Generator) -> Floats:
-    """Grey: short pile."""
+    """Paint a grey carpet with a short pile."""
     fine = noise(rng, (256, 256), roll_off=0.35)
     return 0.9 + 0.028 * fine + 0.014 * noise(rng, (256, 256), roll_off=1.4)
 
 
 def fabric(rng: np.random.Generator) -> Floats:
-    """Grey: a plain weave."""
+    """Paint a grey fabric with a plain weave."""
     x, y = grid((256, 256))
     weave = np.sin(x * 2 * np.pi * 48) * np.sin(y * 2 * np.pi * 48)
     return 0.9 + 0.04 * weave + 0.03 * noise(rng, (256, 256), roll_off=0.6)
 
 
 def towel(rng: np.random.Generator) -> Floats:
-    """Grey: terry cloth with a woven border near the lower edge."""
+    """Paint grey terry cloth with a woven border near its lower edge."""
     shape = (256, 256)
     _, y = grid(shape)
     border = ((y > 0.80) & (y < 0.83)) | ((y > 0.86) & (y < 0.89))
@@ -27,7 +27,7 @@ def towel(rng: np.random.Generator) -> Floats:
 
 
 def curtain(rng: np.random.Generator) -> Floats:
-    """Grey: vertical folds."""
+    """Paint a grey curtain with vertical folds."""
     x, _ = grid((128, 256))
     phase = 0.25 * np.repeat(noise(rng, (1, 256), roll_off=1.5), 128, axis=0)
     folds = np.sin(x * 2 * np.pi * 7 + phase)
@@ -35,7 +35,7 @@ def curtain(rng: np.random.Generator) -> Floats:
 
 
 def stripes(rng: np.random.Generator) -> Floats:
-    """Bed linen: white with blue pinstripes."""
+    """Paint white bed linen with blue pinstripes."""
     x, _ = grid((256, 256))
     lines = smooth_step(np.abs((x * 8) % 1.0 - 0.5), 0.34, 0.40)
     cloth = flat((256, 256), "eef0f2") + 0.012 * noise(rng, (256, 256), roll_off=0.7)[..., None]
@@ -43,7 +43,7 @@ def stripes(rng: np.random.Generator) -> Floats:
 
 
 def quilt(rng: np.random.Generator) -> Floats:
-    """A child's quilt: 4 x 4 coloured patches with stitched edges."""
+    """Paint a child's quilt of 4 x 4 coloured patches with stitched edges."""
     shape = (256, 256)
     palette = [rgb(code) for code in ("f2c14e", "5fb3b3", "ee8572", "f6ead2", "7fa6d6", "a7c66a")]
     picks = np.array([[(3 * row + 2 * column) % 6 for column in range(4)] for row in range(4)])
@@ -55,7 +55,7 @@ def quilt(rng: np.random.Generator) -> Floats:
 
 
 def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, str]]) -> Floats:
-    """Put borders around `field`. Each band starts at its distance from the edge, in image heights."""
+    """Paint borders around `field`. Each border starts at a distance from the edge, in image heights."""
     x, y = grid(shape)
     edge = np.minimum(np.minimum(x, 1 - x) * shape[1] / shape[0], np.minimum(y, 1 - y))
     image = field
@@ -65,7 +65,7 @@ def _framed_rug(shape: tuple[int, int], field: Floats, bands: list[tuple[float, 
 
 
 def rug_living(rng: np.random.Generator) -> Floats:
-    """Cream and blue rug with lozenges."""
+    """Paint a cream and blue rug with lozenges."""
     shape = (256, 384)
     x, y = grid(shape)
     u, v = (x * 6) % 1.0 - 0.5, (y * 4) % 1.0 - 0.5
@@ -78,7 +78,7 @@ def rug_living(rng: np.random.Generator) -> Floats:
 
 
 def rug_round(rng: np.random.Generator) -> Floats:
-    """RGBA: a round rug of concentric rings, with transparent corners."""
+    """Paint a round rug of concentric rings as RGBA, with transparent corners."""
     shape = (256, 256)
     x, y = grid(shape)
     radius = np.hypot(x - 0.5, y - 0.5) * 2
@@ -89,7 +89,7 @@ def rug_round(rng: np.random.Generator) -> Floats:
 
 
 def rug_runner(rng: np.random.Generator) -> Floats:
-    """Red hall runner with a border."""
+    """Paint a red hall runner with a border."""
     shape = (128, 512)
     x, y = grid(shape)
     u, v = (x * 16) % 1.0 - 0.5, (y * 4) % 1.0 - 0.5
@@ -99,7 +99,7 @@ def rug_runner(rng: np.random.Generator) -> Floats:
 
 
 def rug_bedroom(rng: np.random.Generator) -> Floats:
-    """Shaggy ivory rug."""
+    """Paint a shaggy ivory rug."""
     return flat((256, 256), "ded7cc") + 0.045 * noise(rng, (256, 256), roll_off=0.8)[..., None]
 
 

@@ -1,9 +1,9 @@
-"""Procedural textures of the apartment: repeating surfaces and decals.
+"""Paint the procedural textures of the apartment: repeating surfaces and decals.
 
-Each texture has a random generator seeded by its name, so that adding one does not change the others. "Grey" textures
-are tinted by a material's colour. Those marked "tinted" are divided by the colour of their material, so that the
-material has the right colour without its texture, too. Textiles are in `tools.authoring.textiles`, pictures (views,
-art, screens) in `tools.authoring.artwork`.
+The random generator of each texture is seeded by its name, so that a new texture does not change the others.
+Grey textures get their colour from a material. "Tinted" textures are divided by the colour of their material,
+so that the material also looks right if textures are off. Textiles are in `tools.authoring.textiles`, and
+pictures such as views, art and screens are in `tools.authoring.artwork`.
 """
 
 import zlib
@@ -36,7 +36,7 @@ Painter = Callable[[np.random.Generator], Floats]
 
 
 def _planks(rng: np.random.Generator, light: str, dark: str) -> Floats:
-    """Floor boards along x: 16 rows of two boards. 512 pixels are 2 m."""
+    """Paint 16 rows of two floor boards each, along x. 512 pixels correspond to 2 m."""
     size, rows = 512, 16
     height = size // rows
     grain = 0.5 * noise(rng, (size, size), roll_off=1.1, stretch=14.0)
@@ -58,24 +58,24 @@ def _planks(rng: np.random.Generator, light: str, dark: str) -> Floats:
 
 
 def oak_planks(rng: np.random.Generator) -> Floats:
-    """Tinted d3ab7c: warm oak boards."""
+    """Paint warm oak boards, tinted with d3ab7c."""
     return _planks(rng, "d3ab7c", "ad8152")
 
 
 def pine_planks(rng: np.random.Generator) -> Floats:
-    """Tinted e3cfab: pale pine boards."""
+    """Paint pale pine boards, tinted with e3cfab."""
     return _planks(rng, "e3cfab", "c9ad80")
 
 
 def wood_grain(rng: np.random.Generator) -> Floats:
-    """Grey: furniture wood, grain along x."""
+    """Paint grey furniture wood with the grain along x."""
     bands = noise(rng, (256, 256), roll_off=1.3, stretch=10.0)
     fibres = noise(rng, (256, 256), roll_off=0.3, stretch=30.0)
     return 0.86 + 0.055 * np.sin(bands * 2.2) + 0.02 * fibres
 
 
 def kitchen_tiles(rng: np.random.Generator) -> Floats:
-    """Tinted cbc4b8: square stone tiles, 4 x 4."""
+    """Paint 4 x 4 square stone tiles, tinted with cbc4b8."""
     shape = (256, 256)
     tone = 0.5 + 0.22 * tile_tones(rng, shape, 4, 4) + 0.1 * noise(rng, shape, roll_off=1.2)
     stone = ramp(np.clip(tone, 0.0, 1.0), [(0.0, "a9a196"), (1.0, "cbc4b8")])
@@ -84,7 +84,7 @@ def kitchen_tiles(rng: np.random.Generator) -> Floats:
 
 
 def bath_tiles(rng: np.random.Generator) -> Floats:
-    """Checkerboard of white and pale sea-green, 4 x 4."""
+    """Paint a checkerboard of 4 x 4 white and pale sea-green tiles."""
     shape = (256, 256)
     x, y = grid(shape)
     checker = (np.floor(x * 4) + np.floor(y * 4)) % 2
@@ -94,14 +94,14 @@ def bath_tiles(rng: np.random.Generator) -> Floats:
 
 
 def metro_tiles(rng: np.random.Generator) -> Floats:
-    """Grey: glazed wall tiles in a running bond, 8 rows of 4."""
+    """Paint grey glazed wall tiles in a running bond, with 8 rows of 4."""
     shape = (256, 256)
     glaze = 0.95 + 0.02 * tile_tones(rng, shape, 8, 4, 0.5) + 0.004 * noise(rng, shape, roll_off=0.8)
     return np.asarray(glaze * (1.0 - 0.16 * joints(shape, 8, 4, 2.4, 0.5)), dtype=np.float64)
 
 
 def bricks(rng: np.random.Generator) -> Floats:
-    """Whitewashed brickwork, 12 courses of 4."""
+    """Paint a whitewashed brick wall with 12 rows of 4 bricks."""
     shape = (256, 256)
     tone = 0.5 + 0.3 * tile_tones(rng, shape, 12, 4, 0.5) + 0.16 * noise(rng, shape, roll_off=0.9)
     clay = ramp(np.clip(tone, 0.0, 1.0), [(0.0, "a8644c"), (1.0, "c98b70")])
@@ -117,12 +117,12 @@ def marble(rng: np.random.Generator) -> Floats:
 
 
 def brushed_steel(rng: np.random.Generator) -> Floats:
-    """Grey: metal brushed along x."""
+    """Paint grey metal that is brushed along x."""
     return 0.92 + 0.012 * noise(rng, (128, 128), roll_off=0.5, stretch=40.0)
 
 
 def leaves(rng: np.random.Generator) -> Floats:
-    """Tinted 79ac55: foliage of many small leaves."""
+    """Paint foliage of many small leaves, tinted with 79ac55."""
     shape = (256, 256)
     dark, light = rgb("24502a"), rgb("79ac55")
     image = (flat(shape, "21452a") * 255).astype(np.uint8)
@@ -138,7 +138,7 @@ def leaves(rng: np.random.Generator) -> Floats:
 
 
 def polka_dots(rng: np.random.Generator) -> Floats:
-    """Wallpaper: pale yellow with staggered white, orange and teal dots."""
+    """Paint a pale yellow wallpaper with staggered white, orange and teal dots."""
     shape = (256, 256)
     image = flat(shape, "fae7b8") + 0.006 * noise(rng, shape, roll_off=0.8)[..., None]
     for index in range(16):
@@ -150,7 +150,7 @@ def polka_dots(rng: np.random.Generator) -> Floats:
 
 
 def damask(rng: np.random.Generator) -> Floats:
-    """Grey: wallpaper of interlocking leaf-shaped lozenges."""
+    """Paint a grey wallpaper of interlocking leaf-shaped lozenges."""
     shape = (256, 256)
     x, y = grid(shape)
     motif = (
@@ -160,28 +160,28 @@ def damask(rng: np.random.Generator) -> Floats:
 
 
 def _black_with_alpha(alpha: Floats) -> Floats:
-    """Return an RGBA image that darkens what is below it by `alpha`."""
+    """Return a black RGBA image with the given opacity."""
     return np.concatenate([np.zeros((*alpha.shape, 3)), alpha[..., None]], axis=-1)
 
 
 def shadow_box(rng: np.random.Generator) -> Floats:  # noqa: ARG001 (all painters take a generator)
-    """RGBA: contact shadow of a box that covers the middle 80 % of the image."""
+    """Paint the contact shadow of a box that covers the middle 80 % of the image, as RGBA."""
     x, y = grid((128, 128))
     inside = smooth_step(np.minimum(x, 1 - x), 0.0, 0.2) * smooth_step(np.minimum(y, 1 - y), 0.0, 0.2)
     return _black_with_alpha(0.38 * inside)
 
 
 def shadow_round(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """RGBA: contact shadow of something round."""
+    """Paint the contact shadow of a round object, as RGBA."""
     x, y = grid((128, 128))
     return _black_with_alpha(0.38 * (1.0 - smooth_step(np.hypot(x - 0.5, y - 0.5), 0.15, 0.5)))
 
 
 def shadow_edge(rng: np.random.Generator) -> Floats:  # noqa: ARG001
-    """RGBA: darkening towards a corner of the room, strongest at the lower edge of the image."""
+    """Paint the shadow in a corner of the room as RGBA. It is darkest at the lower edge of the image."""
     x, y = grid((64, 64))
     ends = smooth_step(np.minimum(x, 1 - x), 0.0, 0.1)
-    # The last rows are under the skirting. They are transparent because textures wrap to the opposite edge.
+    # The last rows are hidden by the skirting board. They are transparent because the texture wraps around.
     return _black_with_alpha(np.where(y < 0.95, 0.3 * ends * y**2, 0.0))
 
 
@@ -195,10 +195,10 @@ TEXTURES: Mapping[str, Painter] = {
 
 
 def paint(name: str) -> NDArray[np.uint8]:
-    """Return texture `name` as (height, width), (height, width, 3) RGB or (height, width, 4) RGBA bytes.
+    """Return texture `name` as bytes of shape (height, width), (height, width, 3) or (height, width, 4).
 
     Raises:
-        AssetError: there is no texture of that name.
+        AssetError: There is no texture with this name.
     """
     if name not in TEXTURES:
         raise AssetError(f"no texture is called {name!r}; use one of {', '.join(sorted(TEXTURES))}")

@@ -1,4 +1,4 @@
-"""The exact planner against itself: table, bound and search agree."""
+"""Check that the table, the bound and the search of the exact planner agree."""
 
 import dataclasses
 import functools
@@ -51,7 +51,7 @@ def test_a_pass_that_drops_states_bounds_the_optimum_from_both_sides(seed, n, wi
     problem = random_problem(seed, n, seed % 3)
     instance = make_instance(problem, problem.integers.metric)
     optimum = integer_length(problem, ExactSolver(table_bytes=1 << 30).solve(problem))
-    poor = optimum + optimum // 3  # far from optimal, so that the claim rests on the states that were dropped
+    poor = optimum + optimum // 3  # far from optimal, so that the bound depends on the dropped states
     bound = grown(first_bound(instance, poor), poor, rows, NEVER)
     found = beam_pass(bound, poor, width, 10**9, NEVER)
     assert found.lower <= optimum <= found.upper
@@ -105,7 +105,7 @@ def test_fitted_multipliers_bound_the_optimum_and_growing_does_not_harm(seed, n,
 
 
 def dropped_every_way(instance, order):
-    """Least length for an order of picks, over every choice of drops between them."""
+    """Return the minimum length for an order of picks, over all possible drops between them."""
     n = len(order)
     best = np.inf
     carried = tuple(int(b) for b in instance.carried)
@@ -165,7 +165,7 @@ def test_with_one_hand_the_table_the_pass_and_single_plans_cost_each_next_visit_
 
 
 def test_distances_that_are_no_metric_are_taken_as_given():
-    # The closed metric goes 1 -> 0 -> 3 for 3, but the leg 1 -> 3 as given costs 50, and no visit lies between.
+    # The shortest path from 1 to 3 is via 0 and costs 3, but the given leg from 1 to 3 costs 50.
     d = np.array([[0, 1, 9, 2.0], [1, 0, 9, 50], [9, 9, 0, 9], [2.0, 50, 9, 0]])
     problem = RoutingProblem(d, 0, (Shipment(1, 3),), (), 2)
     plan = solver("exact").solve(problem)

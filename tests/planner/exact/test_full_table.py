@@ -1,4 +1,4 @@
-"""The full table in plain numpy against the one of the compiled kernels: same numbers, same choice between equals."""
+"""Compare the full table in NumPy with the compiled kernels: values and tie-breaking must be equal."""
 
 import dataclasses
 
@@ -16,7 +16,7 @@ from planner.exact.table_kernels import walk as compiled_walk
 
 cases = given(
     seed=st.integers(0, 2**32 - 1),
-    n=st.integers(0, 9),  # kernels take eight objects of a bin, and eight bins, at a time
+    n=st.integers(0, 9),  # the kernels process eight objects of a bin, and eight bins, at a time
     onboard=st.integers(0, 2),
     bins=st.integers(1, 10),
     coincide=st.booleans(),
@@ -36,7 +36,7 @@ def test_numpy_and_the_kernels_fill_in_and_follow_the_same(seed, n, onboard, bin
     fill(instance, one)
     fill_layers(instance, other)
     np.testing.assert_array_equal(other.bin, one.bin)
-    gone = ~(np.arange(1 << n)[:, None] >> np.arange(n) & 1).astype(bool)  # the others are left undefined
+    gone = ~(np.arange(1 << n)[:, None] >> np.arange(n) & 1).astype(bool)  # the other values are undefined
     np.testing.assert_array_equal(other.object[gone], one.object[gone])
     actions, plain = np.empty(2 * n + 2, np.int64), np.empty(2 * n + 2, np.int64)
     length, count = compiled_walk(instance, one, (1 << n) - 1, actions)

@@ -1,4 +1,4 @@
-"""The exact planner against a plain table of all states, on small problems with many ties."""
+"""Compare the exact planner with a simple table of all states, on small problems with many ties."""
 
 import numba
 import numpy as np
@@ -17,10 +17,10 @@ FAR = 1 << 60
 
 @numba.njit
 def oracle(d, start, pickup, delivery, onboard, capacity):
-    """Least length, by the state of each object alone: 0 lies about, 1 is carried, 2 is done; every visit is a move.
+    """Return the minimum tour length by dynamic programming over the states of all objects.
 
-    Digit k of a code in base 3 is the state of object k, those onboard last; the table has a row for each code and
-    a column for each location.
+    An object is loose (0), carried (1) or delivered (2). The row of the table is a number in base 3 whose
+    digit k is the state of object k, with carried objects last. The column is the current location.
     """
     n, k = pickup.size, pickup.size + onboard.size
     codes = 3**k
@@ -30,7 +30,7 @@ def oracle(d, start, pickup, delivery, onboard, capacity):
         code += 3**i
     cost[code, start] = 0
     best = FAR
-    for code in range(codes):  # every move makes the code greater
+    for code in range(codes):  # every visit leads to a larger code
         carried, done = 0, 0
         for i in range(k):
             carried += code // 3**i % 3 == 1
@@ -66,13 +66,13 @@ def expected(problem):
 
 
 def grid_problem(rng, most, capacity):
-    """Objects, bins and person on a coarse grid by streets or as the crow flies, several in one place."""
+    """Return a problem on a coarse grid with Manhattan or Euclidean distances. Places may coincide."""
     n, side = int(rng.integers(0, most + 1)), int(rng.integers(1, 6))
     places = int(rng.integers(2, 3 + n + 4))
     points = rng.integers(0, side, (places, 2)).astype(float)
     apart = np.abs(points[:, None] - points[None])
     d = apart.sum(axis=2) if rng.random() < 0.5 else np.hypot(apart[..., 0], apart[..., 1])
-    bins = rng.integers(0, places, int(rng.integers(1, n + 2)))  # often each object's own
+    bins = rng.integers(0, places, int(rng.integers(1, n + 2)))  # often a different bin for every object
     shipments = tuple(Shipment(int(rng.integers(places)), int(rng.choice(bins))) for _ in range(n))
     onboard = tuple(int(j) for j in rng.choice(bins, int(rng.integers(0, capacity + 1))))
     return RoutingProblem(d, int(rng.integers(places)), shipments, onboard, capacity)
@@ -95,14 +95,14 @@ def test_any_problem_is_solved_to_the_optimum(seed, capacity):
 
 
 def test_the_oracle_knows_a_tour_that_was_worked_out_by_hand():
-    d = np.abs(np.subtract.outer([0.0, 1, 2, 5], [0.0, 1, 2, 5]))  # person 0, objects at 1 and 5, bin at 2
+    d = np.abs(np.subtract.outer([0.0, 1, 2, 5], [0.0, 1, 2, 5]))  # person at 0, objects at 1 and 5, bin at 2
     pair = (Shipment(1, 2), Shipment(3, 2))
-    assert expected(RoutingProblem(d, 0, pair, (), 1, resolution=1e-4)) == 80_000  # 0 1 2 5 2
+    assert expected(RoutingProblem(d, 0, pair, (), 1, resolution=1e-4)) == 80_000  # tour: 0 1 2 5 2
     assert expected(RoutingProblem(d, 0, pair, (), 2, resolution=1e-4)) == 80_000
     assert (
         expected(RoutingProblem(d, 0, pair, (0,), 1, resolution=1e-4)) == 80_000
-    )  # what is onboard belongs here
-    assert expected(RoutingProblem(d, 0, pair, (3,), 1, resolution=1e-4)) == 100_000  # 0 5 2 1 2
+    )  # the carried object belongs to the start
+    assert expected(RoutingProblem(d, 0, pair, (3,), 1, resolution=1e-4)) == 100_000  # tour: 0 5 2 1 2
 
 
 @pytest.mark.parametrize("capacity", [1, 2])

@@ -1,4 +1,4 @@
-"""The exact planner gives the same plan whatever runs beside it, and its selection of states is right."""
+"""Check that the exact planner's result does not depend on concurrent threads or on their number."""
 
 import os
 import subprocess
@@ -36,7 +36,7 @@ def problem_of(seed, n=16):
 
 
 def claim(plan):
-    """All of a plan but the time it took."""
+    """Return all attributes of a plan except its computation time."""
     return plan.visits, plan.cost, plan.lower_bound, plan.status, plan.certificate
 
 

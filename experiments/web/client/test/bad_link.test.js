@@ -1,4 +1,4 @@
-// Walking over a slow link that loses packets: what is drawn is compared with what a person would see without a link.
+// Tests of walking over a slow link that loses packets: the drawn view must move as smoothly as without a link.
 
 import { describe, expect, test, vi } from "vitest";
 
@@ -23,12 +23,12 @@ vi.mock("../static/drawing/world.js", () => ({
   },
 }));
 
-const FRAME = 1000 / 60; // ms
-const PATIENCE = 750; // ms that the server waits for inputs
-const RESENT = 250; // ms until a lost packet is sent again
-const [EARTHLY, TURNING] = [GAIT.max_speed * 0.001 * FRAME, GAIT.max_turn * 0.001 * FRAME]; // most in a picture, m and rad
+const FRAME = 1000 / 60; // duration of a frame in ms
+const PATIENCE = 750; // how long the server waits for inputs, in ms
+const RESENT = 250; // time until a lost packet is sent again, in ms
+const [EARTHLY, TURNING] = [GAIT.max_speed * 0.001 * FRAME, GAIT.max_turn * 0.001 * FRAME]; // largest change per frame in m and rad
 
-/** A way between client and server on which packets come in order, and some late. */
+/** One direction of a network connection. Packets arrive in order, but some are late. */
 class Way {
   /** @type {{ at: number, message: any }[]} */
   #flying = [];
@@ -57,7 +57,7 @@ class Way {
   }
 }
 
-/** Takes control steps as the server does: when they are due and their inputs are there, or after a while without. */
+/** A server that takes control steps when their inputs have arrived, or without the inputs after a timeout. */
 class Server {
   forced = 0;
   #due = Infinity;
@@ -99,7 +99,7 @@ class Server {
   }
 }
 
-/** Plays for 60 s, and says how what was drawn moved. @param {number} delay ms @param {number} lost */
+/** Plays for 60 s and returns measurements of how the drawn view moved. @param {number} delay ms @param {number} lost */
 async function played(delay, lost) {
   vi.stubGlobal("fetch", async () => new Response(JSON.stringify(EMPTY)));
   let seed = 1;
@@ -145,19 +145,19 @@ async function played(delay, lost) {
   return { jump, turn, moved, forced: server.forced };
 }
 
-describe("the picture does not jump", () => {
+describe("the drawn view on a bad link", () => {
   test.each([
     ["a good link", 5, 0],
-    ["200 ms there and back, and 2 % of all packets lost", 100, 0.02],
-    ["400 ms and 5 % lost", 200, 0.05],
-  ])("over %s", async (_, delay, lost) => {
+    ["a link with a round trip of 200 ms and 2 % packet loss", 100, 0.02],
+    ["a link with a round trip of 400 ms and 5 % packet loss", 200, 0.05],
+  ])("the view moves without jumps over %s", async (_, delay, lost) => {
     const { jump, turn, moved } = await played(delay, lost);
-    expect(moved).toBeGreaterThan(20); // m
+    expect(moved).toBeGreaterThan(20); // metres
     expect(jump).toBeLessThan(1.5 * EARTHLY);
     expect(turn).toBeLessThan(1.5 * TURNING);
   });
 
-  test("and no control step is taken without the person over a usual bad link", async () => {
+  test("the server never has to take a step without inputs at 200 ms and 2 % packet loss", async () => {
     expect((await played(100, 0.02)).forced).toBe(0);
   });
 });

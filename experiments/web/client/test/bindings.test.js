@@ -16,13 +16,13 @@ function action(name) {
   return found;
 }
 
-test("no default key has two actions", () => {
+test("no key is bound to two actions by default", () => {
   const codes = ACTIONS.flatMap(({ keys }) => keys);
   expect(new Set(codes).size).toBe(codes.length);
 });
 
-describe("a changed key", () => {
-  test("belongs to its new action alone, also on the next page", () => {
+describe("changing a key", () => {
+  test("a changed key triggers only its new action, and the change is saved", () => {
     new Bindings().bind(action("act"), "KeyW");
     const bindings = new Bindings();
     expect(bindings.action("KeyW")?.name).toBe("act");
@@ -30,7 +30,7 @@ describe("a changed key", () => {
     expect(bindings.label("forward")).toBe("↑");
   });
 
-  test("is forgotten by a reset", () => {
+  test("a reset restores the default keys", () => {
     const bindings = new Bindings();
     bindings.bind(action("act"), "KeyW");
     bindings.reset();
@@ -38,18 +38,18 @@ describe("a changed key", () => {
     expect(new Bindings().label("forward")).toBe("W or ↑");
   });
 
-  test("may leave an action without one", () => {
+  test("an action has no key if its only key is bound to another action", () => {
     const bindings = new Bindings();
     bindings.bind(action("help"), "KeyP");
     expect(bindings.label("pause")).toBe("none");
   });
 });
 
-test.each(["{", "[]", '{"act":"KeyQ"}', '{"act":[1]}', "null"])("a damaged store is ignored: %s", (kept) => {
+test.each(["{", "[]", '{"act":"KeyQ"}', '{"act":[1]}', "null"])("invalid saved bindings are ignored: %s", (kept) => {
   localStorage.setItem("mjsim-keys", kept);
   expect(new Bindings().label("act")).toBe("E");
 });
 
-test("keys have names", () => {
+test("keys have readable names", () => {
   expect(["KeyQ", "Digit4", "ArrowLeft", "Space"].map(keyName)).toEqual(["Q", "4", "←", "Space"]);
 });

@@ -1,4 +1,4 @@
-// @ts-nocheck: types of node are not installed
+// @ts-nocheck: Node's type declarations are not installed
 import { execFileSync } from "node:child_process";
 import { createHash } from "node:crypto";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -11,14 +11,14 @@ import { expect, onTestFinished, test } from "vitest";
 const folder = join("static", "vendor");
 const bundle = readFileSync(join(folder, "three.js"));
 
-test("the bundle of three.js is what the packages of package-lock.json give", () => {
+test("building three.js from the locked packages reproduces the committed bundle", () => {
   const fresh = mkdtempSync(join(tmpdir(), "bundle-"));
   onTestFinished(() => rmSync(fresh, { recursive: true }));
   execFileSync(execPath, ["bundle.js", fresh]);
   expect(readFileSync(join(fresh, "three.js")).equals(bundle)).toBe(true);
 });
 
-test("the bundle is small, has its licence in it and its hash beside it", () => {
+test("the bundle is small, contains its licence, and matches its hash file", () => {
   expect(gzipSync(bundle).length).toBeLessThan(220_000);
   expect(bundle.toString()).toContain("The MIT License");
   const hash = createHash("sha256").update(bundle).digest("hex");

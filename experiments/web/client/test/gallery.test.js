@@ -4,13 +4,13 @@ import { beforeAll, expect, test } from "vitest";
 import { made } from "../static/dom.js";
 import { showPage } from "./page.js";
 
-const HOMES = [[3, 50], [1, 30], [3, 40]]; // rooms, m2
+const HOMES = [[3, 50], [1, 30], [3, 40]]; // number of rooms and area in m2
 
 /** @param {string} id */
 const part = (id) => /** @type {any} */ (document.getElementById(id));
 const shown = () => [...part("homes").children].map((home) => Number(home.dataset.number));
 
-/** Homes that are listed after a choice. @param {Record<string, string>} values */
+/** Returns the homes that are listed for a choice of filters. @param {Record<string, string>} values */
 function chosen(values) {
   for (const [name, value] of Object.entries(values)) {
     /** @type {HTMLInputElement} */ (part("choice").querySelector(`[name=${name}]`)).value = value;
@@ -30,14 +30,14 @@ beforeAll(async () => {
   await import("../static/gallery.js");
 });
 
-test("homes are listed as given, and in other orders", () => {
+test("homes are listed in the original order or sorted by another one", () => {
   expect(shown()).toEqual([1, 2, 3]);
   expect(chosen({ order: "rooms" })).toEqual([2, 1, 3]);
   expect(chosen({ order: "area" })).toEqual([2, 3, 1]);
   expect(chosen({ order: "largest" })).toEqual([1, 3, 2]);
 });
 
-test("those of some rooms and areas are listed", () => {
+test("homes can be filtered by number of rooms and area", () => {
   expect(chosen({ order: "number", rooms: "3" })).toEqual([1, 3]);
   expect(part("count").textContent).toBe("2 of 3 homes");
   expect(chosen({ least: "45" })).toEqual([1]);

@@ -13,7 +13,7 @@ import { giveTexts } from "./page.js";
 class Session extends EventTarget {
   inputSources = ["left", "right"].map((handedness) => ({ handedness, gamepad: { axes: [0, 0, 0, 0], buttons: Array.from({ length: 6 }, () => ({ pressed: false })) } }));
 
-  /** @param {number} side 0 left @param {number} button @param {boolean} pressed */
+  /** @param {number} side 0 for the left controller @param {number} button @param {boolean} pressed */
   press(side, button, pressed) {
     const pad = this.inputSources[side]?.gamepad;
     if (pad) pad.buttons[button] = { pressed };
@@ -50,7 +50,7 @@ beforeEach(async () => {
   page = new HeadsetPage(world, new Inputs((input) => sent.push(input)));
 });
 
-/** Puts the headset on, while the person looks north. */
+/** Starts a headset session while the person looks north. */
 async function worn() {
   const own = /** @type {HTMLElement} */ (button.cloneNode());
   await page.offer(own, () => Math.PI / 2);
@@ -58,7 +58,7 @@ async function worn() {
   await vi.advanceTimersByTimeAsync(0);
 }
 
-/** A picture, and what was sent with it. @returns {any[]} */
+/** Draws a frame and returns the inputs that were sent with it. @returns {any[]} */
 function picture() {
   sent.length = 0;
   page.place(EYE);
@@ -67,7 +67,7 @@ function picture() {
   return sent.filter((input) => Object.keys(input).length > 0);
 }
 
-test("the button shows only where there is a headset", async () => {
+test("the headset button is shown only if a headset is available", async () => {
   await page.offer(button, () => 0);
   expect(button.hidden).toBe(false);
   Object.assign(navigator, { xr: undefined });
@@ -75,23 +75,23 @@ test("the button shows only where there is a headset", async () => {
   expect([button.hidden, page.place(EYE)]).toEqual([true, false]);
 });
 
-describe("while it is worn", () => {
-  test("the world stands around the person, who looks where they looked before", async () => {
+describe("while the headset is worn", () => {
+  test("the person keeps their position and viewing direction when the headset starts", async () => {
     await worn();
     picture();
     expect(camera.getWorldPosition(camera.position.clone()).toArray()).toEqual([2, 1.6, -3]);
-    expect(camera.getWorldDirection(camera.position.clone()).z).toBeCloseTo(-1); // north
+    expect(camera.getWorldDirection(camera.position.clone()).z).toBeCloseTo(-1); // looks north
   });
 
-  test("the head turns the person", async () => {
+  test("turning the head turns the person", async () => {
     await worn();
     picture();
     camera.rotation.set(0.2, 0.3, 0, "YXZ");
     expect(picture()).toEqual([{ yaw: expect.closeTo(0.3), pitch: expect.closeTo(0.2) }]);
-    expect(picture()).toEqual([]); // and not again
+    expect(picture()).toEqual([]); // each movement counts once
   });
 
-  test("the left stick walks, and the right one turns once for each push", async () => {
+  test("the left stick walks, and each push of the right stick turns once", async () => {
     await worn();
     picture();
     session.push(0, 0.1, -1);
@@ -101,7 +101,7 @@ describe("while it is worn", () => {
     expect(yaws).toEqual([expect.closeTo(-Math.PI / 6), 0, 0]);
   });
 
-  test("a trigger is the hand's key, and counts once", async () => {
+  test("a trigger uses the hand on its side, once for each press", async () => {
     await worn();
     picture();
     session.press(0, 0, true);
@@ -112,7 +112,7 @@ describe("while it is worn", () => {
     expect(picture()).toEqual([{ press: "act" }]);
   });
 
-  test("the panel shows the task; its rows follow the current one", async () => {
+  test("the panel shows the task and scrolls to the current row", async () => {
     /** @type {string[]} */
     const written = [];
     const context = { fillRect() {}, fillText: (/** @type {string} */ text) => written.push(text) };
@@ -126,7 +126,7 @@ describe("while it is worn", () => {
     });
     giveTexts();
     page.show(hud, 61);
-    expect(written).toEqual([]); // nobody wears it
+    expect(written).toEqual([]); // the panel is drawn only while the headset is worn
     await worn();
     page.show(hud, 61);
     getContext.mockRestore();
@@ -136,7 +136,7 @@ describe("while it is worn", () => {
   });
 });
 
-test("when it is taken off, the page draws as before and nothing is held", async () => {
+test("taking the headset off restores the page and releases all inputs", async () => {
   await worn();
   session.push(0, 0, -1);
   picture();

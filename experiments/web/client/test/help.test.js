@@ -30,17 +30,17 @@ beforeEach(() => {
   help.show();
 });
 
-describe("a key is changed", () => {
-  test("by the next key; the table says so, and the action that had it says that it has none", () => {
+describe("changing a key in the table", () => {
+  test("the next key is bound to the chosen action and taken from its previous action", () => {
     change("act");
     expect(report()).toContain("Press the new key for: Pick up");
     key("KeyP");
     expect([keys("act"), keys("pause"), report()]).toEqual(["P", "none", "Pick up or place: P"]);
     expect(bindings.action("KeyP")?.name).toBe("act");
-    expect(document.activeElement).toBe(dialog.querySelector("[data-action=act]")); // where a person without mouse was
+    expect(document.activeElement).toBe(dialog.querySelector("[data-action=act]")); // the focus returns for keyboard users
   });
 
-  test("not by Esc, which keeps the old one, nor by Tab, which leads on", () => {
+  test("Esc cancels the change, and Tab is not accepted as a new key", () => {
     change("act");
     key("Tab");
     key("Escape");
@@ -48,7 +48,7 @@ describe("a key is changed", () => {
     expect([keys("act"), report()]).toEqual(["E", ""]);
   });
 
-  test("back by a reset", () => {
+  test("the reset button restores the default keys", () => {
     change("forward");
     key("KeyZ");
     expect(keys("forward")).toBe("Z");
@@ -57,7 +57,7 @@ describe("a key is changed", () => {
   });
 });
 
-test("the table is closed by the key that opens it, and by its button", () => {
+test("the table closes with the key that opens it and with its button", () => {
   key("KeyH");
   expect(help.open).toBe(false);
   help.show();
@@ -66,7 +66,7 @@ test("the table is closed by the key that opens it, and by its button", () => {
   expect(closed).toHaveBeenCalledTimes(2);
 });
 
-test("keys are called as they are labelled on this keyboard, where the browser knows", async () => {
+test("keys have the labels of the person's keyboard layout if the browser provides it", async () => {
   Object.assign(navigator, { keyboard: { getLayoutMap: async () => new Map([["KeyW", "z"]]) } });
   await learnLayout();
   expect(bindings.label("forward")).toBe("Z or ↑");

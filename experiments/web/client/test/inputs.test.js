@@ -13,35 +13,35 @@ beforeEach(() => {
   inputs = new Inputs((input) => sent.push(input));
 });
 
-describe("what is held", () => {
-  test("is sent when it changes", () => {
+describe("held inputs", () => {
+  test("held inputs are sent only when they change", () => {
     inputs.hold("keyboard", { forward: 1 });
     inputs.hold("keyboard", { forward: 1 });
     inputs.hold("keyboard", {});
     expect(sent).toEqual([{ forward: 1 }, {}]);
   });
 
-  test("is the sum of all sources, at most 1", () => {
+  test("held inputs of all devices are added and limited to 1", () => {
     inputs.hold("keyboard", { forward: 1, left: 1 });
     inputs.hold("gamepad", { forward: 0.5, left: -1, turn: -0.25 });
     expect(sent.at(-1)).toEqual({ forward: 1, turn: -0.25 });
   });
 
-  test("is released by all sources at once", () => {
+  test("releasing clears the held inputs of all devices", () => {
     inputs.release();
     inputs.hold("keyboard", { forward: 1 });
     inputs.release();
     expect(sent).toEqual([{ forward: 1 }, {}]);
   });
 
-  test("is repeated for a session that may have another state", () => {
+  test("held inputs can be sent again to synchronize a session", () => {
     inputs.hold("touch", { look: -1 });
     inputs.send();
     expect(sent).toEqual([{ look: -1 }, { look: -1 }]);
   });
 });
 
-test("mouse and wheel are collected for a while", () => {
+test("mouse and wheel movements are combined before they are sent", () => {
   inputs.look(0.1, -0.2);
   inputs.look(0.1, 0);
   inputs.scroll(3);
@@ -50,7 +50,7 @@ test("mouse and wheel are collected for a while", () => {
   expect(sent).toEqual([{ yaw: 0.2, pitch: -0.2, scroll: 3 }]);
 });
 
-test("a press is sent at once, with all that was collected", () => {
+test("a press is sent immediately together with all pending movements", () => {
   inputs.look(100, 0);
   inputs.scroll(-1000);
   inputs.press("left hand");

@@ -14,7 +14,7 @@ beforeEach(() => {
 /** @param {number} input */
 const frame = (input) => /** @type {FrameMessage} */ ({ input, data: new Uint8Array(1000) });
 
-test("frames are counted: how many a second, the times between them, those that came and were not shown", () => {
+test("the meter reports the frame rate, the times between frames, and the number of dropped frames", () => {
   for (let i = 0; i < 100; i++) {
     vi.advanceTimersByTime(i % 10 === 9 ? 140 : 40);
     meter.came(frame(0));
@@ -24,7 +24,7 @@ test("frames are counted: how many a second, the times between them, those that 
   expect(meter.take()).toMatchObject({ frames_per_s: 0, dropped: 0, kilobits: 0 });
 });
 
-test("the latency is from an input to what shows it, and each input counts once", () => {
+test("latency is measured once per input, until the first frame that shows it", () => {
   meter.sent(1);
   vi.advanceTimersByTime(10);
   meter.sent(2);

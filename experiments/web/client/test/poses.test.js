@@ -14,19 +14,19 @@ const state = (more) => ({ objects: {}, gone: [], held: [null, null], body: REST
 /** @param {number[] | undefined} pose @param {number[]} expected */
 const near = (pose, expected) => expected.forEach((value, i) => expect(pose?.[i]).toBeCloseTo(value, 9));
 
-describe("poses", () => {
-  test("lead through the frame of the body and back", () => {
+describe("poses of objects", () => {
+  test("converting a pose to the body frame and back does not change it", () => {
     const body = [0.4, -1.2, 2.5];
     const pose = [1, 2, 0.5, Math.SQRT1_2, 0, Math.SQRT1_2, 0];
     near(toHouse(toBody(pose, body), body), pose);
     near(toBody(pose, [1, 2, 0]), [0, 0, 0.5, ...pose.slice(3)]);
   });
 
-  test("of the same orientation with another sign are the same", () => {
+  test("quaternions of opposite sign are treated as the same orientation", () => {
     near(mixed([0, 0, 0, 1, 0, 0, 0], [2, 0, 0, -1, 0, 0, 0], 0.5), [1, 0, 0, 1, 0, 0, 0]);
   });
 
-  test("glide from one state to the next", () => {
+  test("poses are interpolated between two states", () => {
     const poses = new Poses();
     poses.take(state({ objects: { cup: POSE } }), 0, REST);
     near(poses.at("cup", 0, REST), POSE);
@@ -35,24 +35,24 @@ describe("poses", () => {
     near(poses.at("cup", 9, REST), AHEAD);
   });
 
-  test("in a hand follow the body that is drawn, not the one of the state", () => {
+  test("a held object follows the drawn body instead of the server's body", () => {
     const poses = new Poses();
     poses.take(state({ objects: { cup: POSE }, held: ["cup", null] }), 0, REST);
     near(poses.at("cup", 1, [3, 0, 0]), [4, 2, 0.5, 1, 0, 0, 0]);
     near(poses.at("cup", 1, [0, 0, Math.PI / 2])?.slice(0, 3), [-2, 1, 0.5]);
   });
 
-  test("leave the hand where they are drawn", () => {
+  test("a released object starts from the pose at which it was drawn", () => {
     const poses = new Poses();
     poses.take(state({ objects: { cup: POSE }, held: ["cup", null] }), 0, REST);
-    const drawn = [0.2, 0, 0]; // ahead of the server
+    const drawn = [0.2, 0, 0]; // the drawn body is ahead of the server
     const before = poses.at("cup", 1, drawn);
     poses.take(state({ objects: { cup: POSE } }), 1, drawn);
     near(poses.at("cup", 1, drawn), before ?? []);
     near(poses.at("cup", 2, drawn), POSE);
   });
 
-  test("of an object that may not be known any more are forgotten", () => {
+  test("the pose of an object that must no longer be visible is deleted", () => {
     const poses = new Poses();
     poses.take(state({ objects: { cup: POSE } }), 0, REST);
     poses.take(state({ gone: ["cup"] }), 1, REST);

@@ -12,7 +12,7 @@ const predictor = () => new Predictor(new Walker(GAIT, EMPTY), SPEEDS, DT, 0, ne
 /** @param {number} number @param {Partial<Input>} values @returns {Input} */
 const input = (number, values) => ({ number, ...values });
 
-/** The largest step in what is drawn, in m and rad, between two pictures of 60 a second. */
+/** Measures the largest change of the drawn pose between two frames at 60 fps, in m and rad. */
 class Eye {
   /** @type {number[] | null} */
   #last = null;
@@ -31,13 +31,13 @@ class Eye {
 /** @type {Predictor} */
 let mine;
 /** @type {Predictor} */
-let server; // the same kernel, to which inputs come at their steps
+let server; // the same predictor, which receives each input at its step
 beforeEach(() => {
   mine = predictor();
   server = predictor();
 });
 
-/** Both take a control step with these inputs. @param {Input[]} inputs */
+/** Advances the prediction and the server by a control step with these inputs. @param {Input[]} inputs */
 function both(...inputs) {
   for (const one of [mine, server]) {
     for (const some of inputs) one.add(some);
@@ -46,48 +46,48 @@ function both(...inputs) {
 }
 const state = () => server.body;
 
-describe("a prediction", () => {
-  test("shows an input before any answer, in the next picture", () => {
+describe("prediction", () => {
+  test("an input is visible in the next frame before the server responds", () => {
     mine.add(input(1, { forward: 1, turn: 1 }));
     const seen = mine.drawn(0.4);
     expect(seen[X]).toBeGreaterThan(0);
     expect(seen[HEADING]).toBeGreaterThan(0);
   });
 
-  test("is not touched by states that agree, however late they come", () => {
+  test("states that agree with the prediction do not change it, even if they are late", () => {
     /** @type {Float64Array[]} */
     const states = [];
     for (let k = 0; k < 60; k++) {
       states.push(state());
       both(...(k % 7 ? [] : [input(k + 1, { forward: 1, yaw: 0.3 * Math.sin(k) })]));
       const before = mine.drawn(0.5).slice();
-      const late = states[k - 12]; // half a second
+      const late = states[k - 12]; // half a second late
       if (late) mine.correct(k - 12, late, false);
       expect(mine.drawn(0.5)).toEqual(before);
     }
     expect(mine.body).toEqual(server.body);
   });
 
-  test("follows the mouse to where it points, and stops there", () => {
+  test("the view turns by the movement of the mouse and then stops", () => {
     both(input(1, { yaw: 1.2, pitch: -0.4 }));
     for (let k = 0; k < 60; k++) both();
     expect(mine.drawn(0)[HEADING]).toBeCloseTo(1.2, 2);
     expect(mine.drawn(0)[PITCH]).toBeCloseTo(-0.4, 2);
   });
 
-  test("is continuous over control steps, when nothing is pressed", () => {
+  test("the drawn pose is continuous across control steps without new inputs", () => {
     both(input(1, { forward: 1, turn: 0.5 }));
     const eye = new Eye();
     for (let k = 0; k < 40; k++) {
       for (const share of [0, 0.4, 0.8]) eye.look(mine, share);
       both();
     }
-    expect(eye.jump).toBeLessThan(1.4 / 50); // the fastest walk, m a picture
+    expect(eye.jump).toBeLessThan(1.4 / 50); // metres per frame at the highest walking speed
   });
 });
 
-describe("a correction", () => {
-  /** Walks, and learns 10 steps later that an input has counted 3 steps late. @returns {Eye} */
+describe("correction of the prediction", () => {
+  /** Walks while the server applies an input 3 steps late and reports this 10 steps later. @returns {Eye} */
   function disagreement() {
     const walk = input(1, { forward: 1 });
     mine.add(walk);
@@ -108,23 +108,23 @@ describe("a correction", () => {
     return eye;
   }
 
-  test("leads to what the server says", () => {
+  test("the prediction converges to the server's state", () => {
     disagreement();
     expect(mine.drawn(0)[X]).toBeCloseTo(server.drawn(0)[X] ?? NaN, 3);
   });
 
-  test("is not seen as a jump", () => {
-    expect(disagreement().jump).toBeLessThan(0.05); // m in a picture, of 0.15 m to correct
+  test("a small correction does not make the view jump", () => {
+    expect(disagreement().jump).toBeLessThan(0.05); // metres per frame for a correction of 0.15 m
   });
 
-  test("of more than a step is shown at once", () => {
+  test("a large correction is shown immediately", () => {
     const elsewhere = new Float64Array(16);
     elsewhere[X] = 3;
     mine.correct(0, elsewhere, false);
     expect(mine.drawn(0)[X]).toBe(3);
   });
 
-  test("by a server that is ahead continues from its state", () => {
+  test("the prediction continues from the server's state if the server is ahead", () => {
     for (let k = 0; k < 30; k++) server.advance();
     mine.correct(30, state(), false);
     expect(mine.step).toBe(30);
@@ -134,7 +134,7 @@ describe("a correction", () => {
   });
 });
 
-test("a walk that is physics is shown as the server says, without jumps", () => {
+test("without a prediction, the view follows the server's walk without jumps", () => {
   mine = new Predictor(null, SPEEDS, DT, 0, new Float64Array(16));
   const eye = new Eye();
   server.add(input(1, { forward: 1 }));
@@ -148,8 +148,8 @@ test("a walk that is physics is shown as the server says, without jumps", () => 
   expect(mine.drawn(0)[X]).toBeCloseTo(server.drawn(0)[X] ?? NaN, 0);
 });
 
-describe("a pick or place", () => {
-  test("stops the prediction until the server has finished it", () => {
+describe("prediction during a pick or place", () => {
+  test("the prediction stops until the server has finished the pick or place", () => {
     both(input(1, { forward: 1 }));
     const start = state();
     mine.correct(1, start, true);
@@ -159,10 +159,10 @@ describe("a pick or place", () => {
     mine.correct(2, start, false);
     expect(mine.predicting).toBe(true);
     for (let k = 0; k < 50; k++) mine.advance();
-    expect(mine.drawn(0)[X]).toBeGreaterThan(1); // what was held down still counts
+    expect(mine.drawn(0)[X]).toBeGreaterThan(1); // held inputs still apply
   });
 
-  test("that was pressed lets the person stand for that step", () => {
+  test("the person stands still in the step in which a pick is requested", () => {
     both(input(1, { forward: 1 }));
     const walking = mine.drawn(1).slice();
     mine.add(input(2, { forward: 1, press: "act" }));

@@ -5,7 +5,7 @@ import { Screen, bestCodec } from "../static/screen.js";
 
 /** @import { FrameMessage } from "../static/protocol.js" */
 
-/** A decoder of which the test says when a picture is ready. */
+/** A decoder whose pictures become ready when the test calls `ready`. */
 class Decoder {
   /** @type {Decoder[]} */
   static all = [];
@@ -61,36 +61,36 @@ beforeEach(() => {
   screen = new Screen(canvas, (found) => shown(found.number), failed);
 });
 
-describe("H.264 is asked for", () => {
-  test("where the browser decodes it", async () => {
+describe("choice of the video codec", () => {
+  test("H.264 is requested if the browser can decode it", async () => {
     expect(await bestCodec()).toBe("h264");
   });
 
   test.each([
-    ["does not know it", () => Decoder.isConfigSupported.mockResolvedValueOnce({ supported: false })],
-    ["cannot say", () => Decoder.isConfigSupported.mockRejectedValueOnce(new Error())],
-    ["page is not secure", () => vi.stubGlobal("isSecureContext", false)],
-  ])("not where the %s", async (_, given) => {
+    ["the browser does not support H.264", () => Decoder.isConfigSupported.mockResolvedValueOnce({ supported: false })],
+    ["the browser cannot determine its support", () => Decoder.isConfigSupported.mockRejectedValueOnce(new Error())],
+    ["the page is not secure", () => vi.stubGlobal("isSecureContext", false)],
+  ])("JPEG is requested if %s", async (_, given) => {
     given();
     expect(await bestCodec()).toBe("jpeg");
   });
 });
 
-test("JPEG frames are drawn in their size", async () => {
+test("JPEG frames are drawn at their own size", async () => {
   await screen.show(frame(1, true, "jpeg"));
   expect(drawImage).toHaveBeenCalledOnce();
   expect([canvas.width, canvas.height]).toEqual([320, 240]);
   expect(shown).toHaveBeenCalledWith(1);
 });
 
-test("a frame that was overtaken is not drawn, but counts as seen", async () => {
+test("an outdated frame is not drawn but is reported as shown", async () => {
   await Promise.all([screen.show(frame(1, true)), screen.show(frame(2, false)), screen.show(frame(3, false))]);
   for (const number of [1, 3, 2]) decoder()?.ready(number);
   expect(drawImage).toHaveBeenCalledTimes(2);
   expect(shown.mock.calls.flat()).toEqual([1, 3, 2]);
 });
 
-test("a new view begins with its key frame", async () => {
+test("a new video stream starts with its first key frame", async () => {
   await screen.show(frame(1, false));
   expect(decoder()).toBeUndefined();
   await screen.show(frame(2, true));
@@ -98,11 +98,11 @@ test("a new view begins with its key frame", async () => {
   await screen.show(frame(1, true));
   expect(first?.state).toBe("closed");
   expect(decoder()?.came).toEqual([1]);
-  decoder()?.ready(7); // of the view before
+  decoder()?.ready(7); // a frame of the previous stream
   expect(drawImage).not.toHaveBeenCalled();
 });
 
-test("a decoder that fails is told, so that JPEG can be asked for", async () => {
+test("an error of the decoder is reported so that the page can switch to JPEG", async () => {
   await screen.show(frame(1, true));
   decoder()?.on.error();
   expect(failed).toHaveBeenCalledTimes(1);
@@ -112,7 +112,7 @@ test("a decoder that fails is told, so that JPEG can be asked for", async () => 
   expect(failed).toHaveBeenCalledTimes(2);
 });
 
-test("frames are asked for in pixels of the display, within what the server draws", () => {
+test("frames are requested in display pixels, up to the server's maximum size", () => {
   vi.stubGlobal("devicePixelRatio", 2);
   canvas.getBoundingClientRect = () => new DOMRect(0, 0, 640.3, 5000);
   expect(screen.size).toEqual({ width: 1281, height: 8192 });

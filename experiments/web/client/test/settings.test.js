@@ -18,7 +18,7 @@ describe("settings", () => {
   });
   const input = (/** @type {string} */ name) => /** @type {HTMLInputElement} */ (form.querySelector(`[name=${name}]`));
 
-  test("are told at once, and when they change", () => {
+  test("the callback receives the settings initially and after every change", () => {
     const told = vi.fn();
     new Settings(form, told);
     expect(told).toHaveBeenCalledTimes(1);
@@ -27,7 +27,7 @@ describe("settings", () => {
     expect(told.mock.lastCall?.[0]).toMatchObject({ sensitivity: 2, sounds: true });
   });
 
-  test("are kept for the next page", () => {
+  test("settings are saved for the next page", () => {
     new Settings(form, () => {});
     input("inverted").checked = true;
     input("inverted").dispatchEvent(new Event("change"));
@@ -37,7 +37,7 @@ describe("settings", () => {
     expect(input("inverted").checked).toBe(true);
   });
 
-  test("of another kind than ours are not taken", () => {
+  test("saved settings of the wrong type are ignored", () => {
     localStorage.setItem("mjsim-settings", JSON.stringify({ sensitivity: "fast", sounds: false }));
     expect(new Settings(form, () => {}).values).toMatchObject({ sensitivity: 1, sounds: false });
   });
@@ -72,19 +72,19 @@ describe("sounds", () => {
     [4, "the end", { delivered: 2 }],
     [2, "a refusal", { message: { text: "Nothing in reach", kind: "refusal" } }],
     [0, "anything else", { message: { text: "Walk", kind: "info" } }],
-  ])("have %i tones for %s", (count, _, more) => {
+  ])("plays %i tones for %s", (count, _, more) => {
     sounds.hear(state(more));
     expect(tones).toHaveLength(count);
     sounds.hear(state(more));
-    expect(tones).toHaveLength(count); // not again
+    expect(tones).toHaveLength(count); // the sound is played only once
   });
 
-  test("of steps come every stride", () => {
+  test("a footstep sounds at every stride", () => {
     for (let x = 0; x <= 2.2; x += 0.1) sounds.walk(x, 0);
     expect(tones).toHaveLength(3);
   });
 
-  test("can be switched off", () => {
+  test("no sounds are played when sounds are switched off", () => {
     sounds.on = false;
     sounds.play("done");
     expect(tones).toHaveLength(0);

@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
-describe("a form of a study", () => {
+describe("study form", () => {
   const sent = vi.fn(async () => new Response(null, { status: 204 }));
   beforeEach(async () => {
     vi.useFakeTimers();
@@ -16,14 +16,14 @@ describe("a form of a study", () => {
 
   const body = () => Object.fromEntries(/** @type {any} */ (sent.mock.lastCall)?.[1].body);
 
-  test("saves a choice at once", () => {
+  test("a choice is saved immediately", () => {
     const radio = /** @type {HTMLInputElement} */ (document.querySelector("[name=useful]"));
     radio.checked = true;
     radio.dispatchEvent(new Event("change", { bubbles: true }));
     expect(body()).toMatchObject({ phase: "survey", useful: "2" });
   });
 
-  test("saves a text once the person pauses, not at every key", () => {
+  test("text is saved when the participant stops typing", () => {
     const text = /** @type {HTMLTextAreaElement} */ (document.querySelector("[name=comments]"));
     for (const words of ["s", "so", "so far"]) {
       text.value = words;
@@ -36,7 +36,7 @@ describe("a form of a study", () => {
     expect(body().comments).toBe("so far");
   });
 
-  test("does not save after it was sent", () => {
+  test("nothing is saved after the form has been submitted", () => {
     const [form, text] = [document.querySelector("form"), document.querySelector("textarea")];
     text?.dispatchEvent(new Event("input", { bubbles: true }));
     form?.dispatchEvent(new Event("submit"));
@@ -45,7 +45,7 @@ describe("a form of a study", () => {
   });
 });
 
-describe("the check of a computer", () => {
+describe("device check", () => {
   beforeEach(() => {
     vi.resetModules();
     vi.stubGlobal("requestAnimationFrame", (/** @type {FrameRequestCallback} */ next) => setTimeout(() => next(performance.now()), 16));
@@ -58,7 +58,7 @@ describe("the check of a computer", () => {
   const value = (/** @type {string} */ name) => /** @type {HTMLInputElement} */ (document.querySelector(`[name=${name}]`)).value;
   const button = () => /** @type {HTMLButtonElement} */ (document.querySelector(".button"));
 
-  test("measures, asks for a key, and lets the person continue", async () => {
+  test("the participant can continue after the measurements and the requested key", async () => {
     vi.stubGlobal("fetch", async () => new Response(null, { status: 204 }));
     const checked = import("../static/study/device.js");
     await vi.waitFor(() => expect(document.body.textContent).toContain("Press W"), 5000);
@@ -72,10 +72,10 @@ describe("the check of a computer", () => {
     expect(Number(value("frames_per_s"))).toBeGreaterThan(10);
     expect(Number(value("latency_ms"))).toBeLessThan(1000);
     expect(value("width")).toBe(String(window.innerWidth));
-    expect(value("webgl")).toBe(""); // there is none here
+    expect(value("webgl")).toBe(""); // the test environment has no WebGL
   });
 
-  test("tells of a connection that does not answer", async () => {
+  test("a failed connection is recorded as a very long latency", async () => {
     vi.stubGlobal("fetch", async () => {
       throw new TypeError("no network");
     });
@@ -87,7 +87,7 @@ describe("the check of a computer", () => {
   });
 });
 
-test("the numbers of the researcher's page are taken anew, and nothing else of it", async () => {
+test("the researcher page refreshes its live numbers and keeps everything else", async () => {
   vi.useFakeTimers();
   vi.stubGlobal("fetch", async () => new Response(`<p id="people" data-live>2</p><input id="wanted" value="3">`));
   document.body.innerHTML = `<p id="people" data-live>1</p><input id="wanted" value="4">`;

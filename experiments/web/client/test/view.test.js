@@ -26,27 +26,27 @@ const run = new Run({
   pictures: {},
 });
 
-describe("a run", () => {
-  test("has a control step for every time", () => {
+describe("recorded run", () => {
+  test("every time corresponds to a control step", () => {
     expect(run.at(0.06)).toEqual({ step: 1, share: expect.closeTo(0.5) });
     expect(run.at(99)).toEqual({ step: 3, share: 0 });
     expect(run.duration).toBe(0.12);
   });
 
-  test("turns the shorter way", () => {
+  test("headings are interpolated in the shorter direction", () => {
     expect(run.body(0, 0.5)[2]).toBeCloseTo(Math.PI, 2);
     expect(run.body(3, 0.5)).toEqual([0.3, 0, -3.1, 0.2]);
   });
 
-  test("moves objects only in the step before a new pose", () => {
+  test("an object moves only during the step before its next recorded pose", () => {
     const pose = (/** @type {number} */ step, /** @type {number} */ share) => [...run.poses(step, share)][0]?.pose;
     expect(pose(0, 0.9)?.[0]).toBe(1);
     expect(pose(1, 0.5)?.[0]).toBe(1.5);
-    expect(pose(1, 0.5)?.[3]).toBe(1); // the same turn with the other sign
+    expect(pose(1, 0.5)?.[3]).toBe(1); // the same orientation with the opposite sign
     expect(pose(3, 0)?.[0]).toBe(2);
   });
 
-  test("shows the last change", () => {
+  test("the latest recorded HUD, markers and plan are shown", () => {
     expect(run.hud(1)).toBe(EMPTY);
     expect(run.hud(3)).toBe(FULL);
     expect(run.markers(2)).toEqual([CRUMB, POLE]);
@@ -58,20 +58,20 @@ describe("a run", () => {
   });
 });
 
-describe("a view from outside", () => {
-  test("shows which way the person looks", () => {
+describe("view from outside", () => {
+  test("the figure of the person shows their heading", () => {
     const nose = figure(1, 2, Math.PI / 2, run.recorded.person).at(-1);
     expect(nose?.position[1]).toBeCloseTo(2.15);
   });
 
-  test("has dots at the same distance over corners", () => {
+  test("the dots of a path are equally spaced around corners", () => {
     const found = dots([0, 0, 1.1, 0, 1.1, 1], "walked").map((marker) => marker.position);
     expect(found).toHaveLength(9);
     expect(found[4]?.[0]).toBeCloseTo(1);
     expect(found[5]?.[1]).toBeCloseTo(0.15);
   });
 
-  test("turns by dragging, moves by the other button, and comes nearer by the wheel", () => {
+  test("the camera turns and moves by dragging and zooms with the wheel", () => {
     const canvas = document.createElement("canvas");
     const orbit = new Orbit(canvas, [0, 0, 8, 6]);
     const before = orbit.pose();

@@ -13,7 +13,7 @@ const hud = (delivered, clock) => ({
   checklist_title: "Objects", checklist: [], bins: [], inventory: [null, { label: null, picture: null }], message: null, markers: [],
   rerouted: false, delivered, total: 2, clock, pointer: null, minimap: null, scroll: 0,
 });
-const STEPS = 100; // of 0.1 s
+const STEPS = 100; // number of steps of 0.1 s
 const steps = Array.from({ length: STEPS + 1 }, (_, k) => k);
 const RUN = {
   title: "a run", person: { eye_height: 1.6, eye_forward: 0.06, body_radius: 0.2, field_of_view: 1.5 }, bounds: [0, 0, 8, 6],
@@ -26,7 +26,7 @@ const RUN = {
 
 /** @param {string} id */
 const part = (id) => /** @type {any} */ (document.getElementById(id));
-/** The next picture, some time later. @param {number} [ms] */
+/** Advances the time so that the next frame is drawn. @param {number} [ms] */
 const later = (ms = 20) => vi.advanceTimersByTime(ms);
 const markers = () => /** @type {Marker[]} */ (world.setMarkers.mock.lastCall?.[0]);
 
@@ -37,7 +37,7 @@ const camera = (name) => {
 };
 
 /** @type {any} */
-let told; // how the world was told what to load
+let told; // arguments with which the world was loaded
 beforeAll(async () => {
   vi.useFakeTimers({ toFake: ["performance", "requestAnimationFrame"] });
   showPage("view");
@@ -48,7 +48,7 @@ beforeAll(async () => {
   told = { load: world.load.mock.lastCall, setObjects: world.setObjects.mock.lastCall, setFieldOfView: world.setFieldOfView.mock.lastCall };
 });
 
-test("a run is shown from its start, through the person's eyes, without any other file", () => {
+test("a run is shown from its start in first person without loading other files", () => {
   expect(told.load[0]("house.glb")).toBe("data:,house");
   expect(told.setObjects).toEqual([{ cup: { model: "mug", pose: [1, 1, 1, 1, 0, 0, 0] } }]);
   expect(told.setFieldOfView).toEqual([1.5]);
@@ -59,7 +59,7 @@ test("a run is shown from its start, through the person's eyes, without any othe
   expect(markers()).toEqual(RUN.markers);
 });
 
-test("it plays at the speed that was chosen, to its end, and from its start again", () => {
+test("a run plays to its end at the chosen speed and can be replayed", () => {
   part("speed").value = "4";
   part("run").click();
   expect(part("run").textContent).toBe("Pause");
@@ -74,7 +74,7 @@ test("it plays at the speed that was chosen, to its end, and from its start agai
   part("run").click();
 });
 
-test("events lead to when they happened", () => {
+test("clicking an event jumps to its time", () => {
   expect([...part("ticks").children].map((tick) => tick.style.left)).toEqual(["20%", "50%"]);
   part("moments").children[1].querySelector("button").click();
   later();
@@ -82,7 +82,7 @@ test("events lead to when they happened", () => {
   expect([...part("moments").children].map((item) => item.getAttribute("aria-current"))).toEqual(["false", "step"]);
 });
 
-test("slider and keys lead to a time", () => {
+test("the slider and the arrow keys change the time", () => {
   const key = (/** @type {string} */ code) => part("screen").dispatchEvent(new KeyboardEvent("keydown", { code, cancelable: true }));
   part("time").value = "3";
   part("time").dispatchEvent(new Event("input"));
@@ -96,16 +96,16 @@ test("slider and keys lead to a time", () => {
   key("Space");
   expect(part("run").textContent).toBe("Pause");
   key("Space");
-  expect(key("KeyX")).toBe(true); // not taken from the browser
+  expect(key("KeyX")).toBe(true); // other keys are left to the browser
 });
 
-test("from above one sees the person and both paths, and no ceiling", () => {
+test("the view from above shows the person and both paths but no ceilings", () => {
   camera("above");
   expect(world.showCeilings).toHaveBeenLastCalledWith(false);
   expect(world.setCamera.mock.lastCall?.[0].position[2]).toBeGreaterThan(5);
   expect(document.querySelector("[data-camera=above]")?.getAttribute("aria-pressed")).toBe("true");
   const shapes = markers().map(({ shape }) => shape);
-  expect(shapes).toContain("cylinder"); // the body
+  expect(shapes).toContain("cylinder"); // the person's body
   part("paths").checked = false;
   part("paths").dispatchEvent(new Event("change"));
   later();
@@ -117,7 +117,7 @@ test("from above one sees the person and both paths, and no ceiling", () => {
   for (const key of ["ArrowLeft", "+"]) part("screen").dispatchEvent(new KeyboardEvent("keydown", { key, code: key }));
   later();
   expect(Math.hypot(...pose())).toBeLessThan(Math.hypot(...before));
-  expect([pose()[0] === before[0], part("time").value]).toEqual([false, at]); // turned, at the same time
+  expect([pose()[0] === before[0], part("time").value]).toEqual([false, at]); // the camera has turned and the time has not changed
   camera("person");
   expect(markers()).toEqual(RUN.markers);
 });

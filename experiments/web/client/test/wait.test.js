@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
 import { expect, test, vi } from "vitest";
 
-test("a button waits, says how long, and has the focus then", async () => {
+test("a delayed button counts down and then receives the focus", async () => {
   vi.useFakeTimers();
   document.body.innerHTML = '<button data-wait="2">Begin</button><button data-wait="0">Continue</button>';
   const [begin, go] = document.querySelectorAll("button");
@@ -14,7 +14,7 @@ test("a button waits, says how long, and has the focus then", async () => {
   expect([begin?.disabled, begin?.textContent, document.activeElement]).toEqual([false, "Begin", begin]);
 });
 
-test("a button below a long text gets the focus without being scrolled to", async () => {
+test("a button below a long text receives the focus without scrolling the page", async () => {
   document.body.innerHTML = '<button data-wait="0" data-focus>Continue</button>';
   const [button] = document.querySelectorAll("button");
   const focus = vi.spyOn(HTMLElement.prototype, "focus");

@@ -28,7 +28,7 @@ beforeAll(async () => {
 });
 afterAll(() => vi.useRealTimers());
 
-test("the state and the view of the person are shown, also what comes while the house is loaded", async () => {
+test("the participant's phase and view are shown, including snapshots received while loading", async () => {
   say({ type: "state", phase: "running", reason: "", input: 0 });
   say(SCENE);
   say(SNAPSHOT);
@@ -40,7 +40,7 @@ test("the state and the view of the person are shown, also what comes while the 
   expect(world.setEye.mock.lastCall?.[0].position).toEqual([1.06, 2, 1.6]);
 });
 
-test("a session that stops is looked for again, and nothing is ever sent", async () => {
+test("the page reconnects after the connection closes, and never sends anything", async () => {
   const socket = FakeSocket.latest();
   socket.onclose({ code: 1006 });
   expect(part("note").textContent).toContain("reconnects");
